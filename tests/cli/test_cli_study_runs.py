@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 from command_line import BRAKING, QUICK, no_half_files, refused
 
+from emulated_driver import EmulatedDriver, emulated
+
 STUDY = 'bench = "bench.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n[design]\ncases = 64\n'
 
 
@@ -58,6 +60,16 @@ def test_bad_input_is_one_error(bywire, study, tmp_path):
     refused(bywire("study", "run", study), "motor.R_m", str(study))
     refused(bywire("study", "status", tmp_path), "holds no study")
     refused(bywire("study", "tolerances.toml"), "bywire study run tolerances.toml")
+
+
+def test_a_graphics_processor_that_is_not_there_is_no_study(bywire, study, tmp_path):
+    driver = EmulatedDriver()
+    driver.count = 0
+    with emulated(driver):
+        outcome = bywire("study", "run", study, "--out", tmp_path / "out", "--engine", "cuda")
+    refused(outcome, "finds no graphics processor", "nvidia-smi", status=3)
+    assert not (tmp_path / "out").exists()
+    refused(bywire("study", "run", study, "--engine", "cudo"), "did you mean 'cuda'")
 
 
 def test_help_names_both_kinds_of_studies(bywire):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.simulation import ensemble
+from bywire.simulation import case_kernels, ensemble
 from bywire.simulation.c_runtime import LANES
 from bywire.simulation.compiler import VECTOR, compile_library, find_compiler
 from bywire.simulation.native import pointer
@@ -116,10 +116,10 @@ def test_arithmetic(library: ctypes.CDLL) -> None:
 @pytest.mark.parametrize("width", WIDTHS)
 def test_kernels_of_every_width(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The heart of a wedge brake in lanes: the same run, whatever the processor offers."""
-    monkeypatch.setattr(ensemble, "VECTOR", (*VECTOR, *WIDTHS[width]))
+    monkeypatch.setattr(case_kernels, "VECTOR", (*VECTOR, *WIDTHS[width]))
     monkeypatch.setattr(
-        ensemble, "lane_kernel",
-        lambda prepared, *rest: ensemble.LaneKernel.of(prepared.program, *rest),
+        case_kernels, "lane_kernel",
+        lambda prepared, *rest: case_kernels.LaneKernel.of(prepared.program, *rest),
     )  # fmt: skip
     run, names = heart(0.02), ["X_1", "x", "f_1"]
     result = ensemble.simulate_ensemble(run, {"F_S0": [250.0, 260.0, 270.0]}, names)

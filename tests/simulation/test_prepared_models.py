@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bywire.simulation import ensemble, native, sensitivity
+from bywire.simulation import case_kernels, ensemble, native, sensitivity
 from bywire.simulation.compiler import load_library
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, simulate
@@ -57,7 +57,7 @@ def test_threads_that_ask_at_once_compile_once(monkeypatch: pytest.MonkeyPatch) 
         time.sleep(0.1)
         return load_library(source, *others)
 
-    for module in (native, ensemble, sensitivity):
+    for module in (native, case_kernels, sensitivity):
         monkeypatch.setattr(module, "load_library", slow)
     for wanted in (
         lambda _: simulate(run, ["omega"]),

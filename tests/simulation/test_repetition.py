@@ -18,7 +18,7 @@ from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.core.catalog import parameters
 from bywire.simulation import window as part
-from bywire.simulation.ensemble import LaneKernel
+from bywire.simulation.case_kernels import LaneKernel
 from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
 

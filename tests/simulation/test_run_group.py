@@ -9,7 +9,7 @@ import pytest
 
 from bywire.bench.bench_file import read
 from bywire.core.errors import ParameterError, SolverError
-from bywire.simulation import run_group
+from bywire.simulation import case_kernels
 from bywire.simulation.run import simulate
 from bywire.simulation.run_group import fit_lanes, simulate_group
 
@@ -60,7 +60,7 @@ def test_vectors_that_take_turns_change_no_bit(runs, monkeypatch):
     longer = [replace(run, duration=stopping.duration) for run in runs]
     many = [*longer, *[stopping] * 5]  # both vectors are used, the second not in all lanes
     usual = simulate_group(many, ["p_mc", "i"])
-    monkeypatch.setattr(run_group, "PAIRED", len(many))
+    monkeypatch.setattr(case_kernels, "PAIRED", len(many))
     in_turn = simulate_group(many, ["p_mc", "i"])
     assert in_turn.kernel.lanes == 2 * usual.kernel.lanes
     np.testing.assert_array_equal(in_turn.values, usual.values)

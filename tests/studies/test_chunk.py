@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bywire.bench import running
-from bywire.core.errors import RunError
+from bywire.core.errors import DeviceError, RunError
 from bywire.studies import chunk as chunks
 from bywire.studies.chunk import case_bench, computed_chunk
+from bywire.studies.executor import InProcess
 from bywire.studies.study_file import read_study
+from emulated_driver import EmulatedDriver, Status, emulated
 
 
 @pytest.fixture
@@ -68,3 +72,19 @@ def test_values_that_contradict_each_other_are_a_failure(study):
 def test_drawn_cases_have_noise_of_their_own(plan):
     values = {name: column[0] for name, column in plan.values(0).items()}
     assert case_bench(plan, 5, values).seed == plan.bench.seed + 5
+
+
+def test_chunks_that_a_graphics_processor_computes_together_are_as_they_are_alone(plan):
+    there = replace(plan, bench=replace(plan.bench, engine="cuda"))
+    with emulated(EmulatedDriver()) as driver:
+        computed = list(InProcess(together=3).computed(there, [4, 0, 2, 1]))
+        assert len(driver.launches) == 2
+        driver.cuCtxSynchronize = lambda: (Status.CUDA_ERROR_ILLEGAL_ADDRESS,)
+        with pytest.raises(DeviceError, match="failed"):  # and is no case without a result
+            computed_chunk(there, 3)
+    assert [number for number, _ in computed] == [4, 0, 2, 1]
+    for number, columns in computed:
+        alone = computed_chunk(plan, number)
+        assert columns.keys() == alone.keys()
+        for name, column in alone.items():
+            np.testing.assert_array_equal(columns[name], column)

@@ -159,6 +159,12 @@ def test_who_computes_is_chosen_by_the_work():
         executor_of(0, "", 1)
     with pytest.raises(ParameterError, match="the cluster's own"):
         executor_of(2, "tcp://host:8786", 1)
+    alone = executor_of(None, "", 1000, engine="cuda")
+    assert isinstance(alone, InProcess)
+    assert alone.together > 1
+    for workers, cluster in ((4, ""), (None, "tcp://host:8786")):
+        with pytest.raises(ParameterError, match="one graphics processor: leave out"):
+            executor_of(workers, cluster, 1000, engine="cuda")
 
 
 def test_more_cases_extend_a_study_and_requirements_may_change(study, tmp_path):

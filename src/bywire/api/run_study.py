@@ -36,6 +36,7 @@ def run_study(
     cases: int | None = None,
     workers: int | None = None,
     cluster: str = "",
+    engine: str = "auto",
     progress: Progress | None = None,
 ) -> StudyRun:
     """Run a study: a bench for many values of what varies.
@@ -58,6 +59,8 @@ def run_study(
         Processes; by default one a core where the work is worth their start.
     cluster
         Address of a Dask scheduler that computes instead.
+    engine
+        What computes; ``auto`` is what the bench says. ``cuda``: a graphics processor.
     progress
         Called with a label and the finished share, 0 to 1.
 
@@ -81,7 +84,7 @@ def run_study(
         raise ParameterError(f"study = {quoted(study)}: name a study file, see docs/studies.md")
     source = Path(study)
     store = StudyStore(Path(out) if out is not None else Path(source.stem))
-    plan = _with_cases(read_study(source, overrides), store, cases)
+    plan = _with_cases(_by(engine, read_study(source, overrides)), store, cases)
     return _completed(Origin(source, overrides), plan, store, workers, cluster, progress)
 
 
@@ -110,6 +113,7 @@ def resume_study(
     cases: int | None = None,
     workers: int | None = None,
     cluster: str = "",
+    engine: str = "auto",
     progress: Progress | None = None,
 ) -> StudyRun:
     """Go on with the study of a folder, where it was interrupted or with more cases.
@@ -121,7 +125,7 @@ def resume_study(
     cases
         Cases in place of those that were asked for so far; more of them extend the study by points
         of the same sequence.
-    workers, cluster, progress
+    workers, cluster, engine, progress
         See `run_study`.
 
     Returns
@@ -140,6 +144,7 @@ def resume_study(
     """
     store = StudyStore(Path(folder))
     plan, origin = _kept(store)
+    plan = _by(engine, plan)
     if cases is not None:
         _refuse_cases(plan, cases)
         plan = _with_cases(plan, store, cases)
@@ -198,6 +203,11 @@ def _kept(store: StudyStore) -> tuple[StudyPlan, Origin]:
         ) from None
     is_listed = plan.design in SPANNED
     return (plan if is_listed else replace(plan, cases=int(said["cases"]))), origin
+
+
+def _by(engine: str, plan: StudyPlan) -> StudyPlan:
+    """Return the plan computed by an engine; its cases are the same by whichever."""
+    return plan if engine == "auto" else replace(plan, bench=replace(plan.bench, engine=engine))
 
 
 def _with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPlan:

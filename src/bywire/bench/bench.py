@@ -63,8 +63,9 @@ class Bench:
         Which model of the parameters' brake is tested, where an experiment of any brake leaves
         the choice; that of the parameter set where empty.
     engine
-        What computes its runs: ``auto``, ``compiled``, ``virtual-machine``, or the compiled C of
-        the ECU in the loop, ``sil`` (double precision) or ``sil-single``.
+        What computes its runs: ``auto``, ``compiled``, ``virtual-machine``, a graphics processor,
+        ``cuda``, or the compiled C of the ECU in the loop, ``sil`` (double precision) or
+        ``sil-single``.
 
     Raises
     ------

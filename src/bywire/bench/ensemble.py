@@ -71,14 +71,16 @@ class BenchEnsemble:
 
 @overload
 def simulate_ensemble(
-    run: Run, variations: Variations, signals: Sequence[str], threads: int | None = None
-) -> Ensemble: ...
+    run: Run, variations: Variations, signals: Sequence[str], threads: int | None = None,
+    engine: str = "auto",
+) -> Ensemble: ...  # fmt: skip
 
 
 @overload
 def simulate_ensemble(
-    run: Bench, variations: Variations, signals: None = None, threads: int | None = None
-) -> BenchEnsemble: ...
+    run: Bench, variations: Variations, signals: None = None, threads: int | None = None,
+    engine: str = "auto",
+) -> BenchEnsemble: ...  # fmt: skip
 
 
 def simulate_ensemble(
@@ -86,6 +88,7 @@ def simulate_ensemble(
     variations: Variations,
     signals: Sequence[str] | None = None,
     threads: int | None = None,
+    engine: str = "auto",
 ) -> Ensemble | BenchEnsemble:
     """Compute one run, or a bench with all its runs, for many values of its parameters.
 
@@ -102,6 +105,9 @@ def simulate_ensemble(
         Outputs of a run to record. A bench records all that its key figures need.
     threads
         Threads to use, >= 1; all cores by default.
+    engine
+        What computes: ``auto``, the bench's own or lanes of this machine's processor;
+        ``compiled``, ``virtual-machine``, or ``cuda``, a graphics processor (``docs/studies.md``).
 
     Returns
     -------
@@ -120,7 +126,7 @@ def simulate_ensemble(
     if isinstance(run, Run):
         if signals is None:
             raise ParameterError("signals are missing: name the outputs of the run to record")
-        return ensemble.simulate_ensemble(run, variations, signals, threads)
+        return ensemble.simulate_ensemble(run, variations, signals, threads, engine)
     if signals is not None:
         raise ParameterError("a bench records all signals: leave signals out")
     arrays = {name: np.atleast_1d(np.asarray(v, dtype=float)) for name, v in variations.items()}
@@ -131,7 +137,7 @@ def simulate_ensemble(
         changed(run, {name: float(array[k]) for name, array in arrays.items()})
         for k in range(next(iter(lengths.values())))
     ]
-    return BenchEnsemble(arrays, run_benches(benches, threads=threads))
+    return BenchEnsemble(arrays, run_benches(benches, engine=engine, threads=threads))
 
 
 def varied_leaf(bench: Bench, name: str) -> Leaf:
@@ -197,7 +203,7 @@ def run_benches(
     progress
         Called with a run's label and the finished share, 0 to 1.
     engine
-        ``auto``, ``compiled`` or ``virtual-machine``, which has no lanes.
+        ``auto``, ``compiled``, ``cuda``, or ``virtual-machine``, which has no lanes.
     threads
         Threads to use, >= 1; all cores by default.
     estimate_error

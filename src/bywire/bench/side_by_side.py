@@ -76,11 +76,13 @@ def rounds(
         report = None if progress is None else partial(progress, cases[0].label)
         kept = {(case.settle, case.keep) for case in cases}
         kinds = [benches[k].engine if engine == "auto" else engine for k in places]
-        is_free = all(kind in ("auto", "compiled") for kind in kinds)
-        if is_free and len(runs) > 1 and len(kept) == 1 and fit_lanes(runs):
+        computing = {"auto" if kind == "compiled" else kind for kind in kinds}
+        is_alike = len(computing) == 1 and len(kept) == 1
+        if is_alike and len(runs) > 1 and fit_lanes(runs, kinds[0]):
             times = runs[0].schedule().record_times - cases[0].settle
             first = int(np.searchsorted(times, -cases[0].keep - 1e-9))
-            yield Round(places, cases, runs, simulate_group(runs, wanted, threads, report, first))
+            group = simulate_group(runs, wanted, threads, report, first, kinds[0])
+            yield Round(places, cases, runs, group)
         else:
             yield Round(places, cases, runs, _one_by_one(runs, report, kinds))
 

@@ -46,6 +46,7 @@ Workers = Annotated[
 ClusterAddress = Annotated[
     str, typer.Option("--cluster", metavar="ADDRESS", help="Dask scheduler that computes instead.")
 ]
+EngineName = Annotated[str, typer.Option("--engine", help="What computes, e.g. cuda: a GPU.")]
 
 
 @study_app.command("run")
@@ -62,6 +63,7 @@ def study_run_command(
     cases: Cases = None,
     workers: Workers = None,
     cluster: ClusterAddress = "",
+    engine: EngineName = "auto",
     json: JsonFlag = False,
 ) -> None:
     """Run a bench for many values of what varies: probabilities, spread, what drives them."""
@@ -71,7 +73,7 @@ def study_run_command(
     show(
         lambda progress: run_study(
             study, place, changes(overrides), cases=cases, workers=workers, cluster=cluster,
-            progress=progress,
+            engine=engine, progress=progress,
         ),
         place, json,
     )  # fmt: skip
@@ -80,10 +82,10 @@ def study_run_command(
 @study_app.command("resume")
 def resume_command(
     place: StudyFolder, workers: Workers = None, cluster: ClusterAddress = "",
-    json: JsonFlag = False,
+    engine: EngineName = "auto", json: JsonFlag = False,
 ) -> None:  # fmt: skip
     """Go on with a study that was interrupted or killed."""
-    _resumed(place, None, workers, cluster, json)
+    _resumed(place, None, workers, cluster, engine, json)
 
 
 @study_app.command("extend")
@@ -92,10 +94,11 @@ def extend_command(
     cases: Annotated[int, typer.Option(help="Cases altogether.", min=1, show_default=False)],
     workers: Workers = None,
     cluster: ClusterAddress = "",
+    engine: EngineName = "auto",
     json: JsonFlag = False,
 ) -> None:
     """Add cases to a study, by points of the same sequence."""
-    _resumed(place, cases, workers, cluster, json)
+    _resumed(place, cases, workers, cluster, engine, json)
 
 
 @study_app.command("report")
@@ -135,13 +138,14 @@ def surrogate_command(
 
 
 def _resumed(
-    place: Path, cases: int | None, workers: int | None, cluster: str, as_json: bool
+    place: Path, cases: int | None, workers: int | None, cluster: str, engine: str, as_json: bool
 ) -> None:
     from bywire.api.run_study import resume_study
 
     show(
         lambda progress: resume_study(
-            place, cases=cases, workers=workers, cluster=cluster, progress=progress
+            place, cases=cases, workers=workers, cluster=cluster, engine=engine,
+            progress=progress,
         ),
         place, as_json,
     )  # fmt: skip

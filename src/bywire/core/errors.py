@@ -12,7 +12,8 @@
     │   └── StepError             steps and sample times that do not divide each other
     └── RunError                  exit status 3: the computation failed
         ├── SolverError           a trajectory that left the numbers or did not settle
-        └── CompilerError         a compiler that failed on a generated kernel
+        ├── CompilerError         a compiler that failed on a generated kernel
+        └── DeviceError           a graphics processor that is missing, full or failed
 """
 
 from __future__ import annotations
@@ -75,6 +76,10 @@ class SolverError(RunError):
 
 class CompilerError(RunError):
     """A compiler that failed on a generated kernel."""
+
+
+class DeviceError(RunError):
+    """A graphics processor that is missing, full or failed."""
 
 
 def place_of(thing: Any) -> str:

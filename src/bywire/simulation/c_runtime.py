@@ -236,7 +236,7 @@ static FUNCTION V N(pow)(V a, V b) {
 """
 
 # One lane: functions of the kernel's own, too.
-_ONE_LANE = (
+ONE_LANE = (
     r"""
 #define MAGIC 6755399441055744.0
 static inline int64_t bits_of(double x) { int64_t i; memcpy(&i, &x, sizeof(i)); return i; }
@@ -331,5 +331,15 @@ static inline V EXP_DECAYED(B c, V x) {
 """
 )
 
-SCALAR = _INCLUDES + _ONE_LANE
+# What NVRTC, which compiles C++ without headers, is to know before it reads a kernel: it has the
+# mathematical functions built in.
+CUDA = r"""
+typedef int int32_t;
+typedef long long int64_t;
+typedef unsigned long long uint64_t;
+#define restrict __restrict__
+#define KERNEL extern "C" __global__
+"""
+
+SCALAR = _INCLUDES + ONE_LANE
 LANES = SCALAR + _TYPES + _ALL_LANES

@@ -1,8 +1,13 @@
-"""Kernel of a single run: everything in local scalars, one function."""
+"""Kernel of a single run: everything in local scalars, one function.
+
+What stands around its statements depends on who calls it: a run of the processor, or a thread of
+a graphics processor for each of many cases.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 from bywire.simulation.branches import branch, branched
 from bywire.simulation.c_runtime import SCALAR
@@ -31,7 +36,46 @@ SIGNATURE = """void bw_run(const double *restrict p, double h, const double *res
     double *restrict rec)"""
 
 
-def emit_single(stages: Stages) -> str:
+@dataclass(frozen=True)
+class Caller:
+    """Who calls a kernel of scalars, and how memory is laid out there, as C text.
+
+    Parameters
+    ----------
+    runtime, head
+        What the source starts with; the function's head.
+    begin
+        Statements after the plan, which leave the parameters in ``p``.
+    stimulus, entry
+        Format strings of number ``k`` of a stimulus' row ``uk`` and of the state vector.
+    row
+        Where the stimulus' row begins; ``nu``: its length.
+    record
+        Statements that keep the outputs ``o``; ``count``: how many.
+    """
+
+    runtime: str
+    head: str
+    begin: str
+    stimulus: str
+    entry: str
+    row: str
+    record: str
+
+
+ONE_RUN = Caller(
+    runtime=SCALAR,
+    head=SIGNATURE,
+    begin="",
+    stimulus="uk[{k}]",
+    entry="state[{k}]",
+    row="u + (f / stim) * {nu}",
+    record="""double *row = rec + (f / every - row0) * chosen;
+      for (int64_t j = 0; j < chosen; ++j) row[j] = o[selection[j]];""",
+)
+
+
+def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
     """Return the C source of the kernel for one run.
 
     What depends on parameters alone is computed once, what depends on the tick's data once a
@@ -41,7 +85,7 @@ def emit_single(stages: Stages) -> str:
 
     def leaf(kind: str, index: int) -> str:
         if kind in ("p", "u"):
-            return f"{kind}[{index}]" if kind == "p" else f"uk[{index}]"
+            return f"p[{index}]" if kind == "p" else caller.stimulus.format(k=index)
         return "h" if kind == "h" else f"{kind}{index}"
 
     skipped = unread(stages)
@@ -105,27 +149,27 @@ def emit_single(stages: Stages) -> str:
         ticks.append(f"if (f % plan[{8 + k}] == 0) {{\n      {indented(lines, 6)}\n    }}")
     outputs = block(needed(graph, stages.output, lambda n: level[n] == 0))
     outputs += [f"o[{j}] = {as_number(graph, n, name)};" for j, n in enumerate(stages.output)]
-    counters = layout.start["counters"]
-    return f"""{SCALAR}{rare_substep(stages)}
-{SIGNATURE} {{
+    parts = {"nu": leaf_count(stages, "u"), "np": leaf_count(stages, "p"),
+             "tasks": len(stages.ticks), "count": len(stages.output)}  # fmt: skip
+    return f"""{caller.runtime}{rare_substep(stages)}
+{caller.head} {{
   {PLAN}
-  double failures = state[{counters}], repeats = state[{counters + 1}];
+  {caller.begin.format(**parts)}
   double c[CONSTANTS + 1];
   constants(p, c);
-  {indented(_loads(layout), 2)}
+  {indented(_loads(layout, caller), 2)}
   {indented(block(hoisted), 2)}
   {indented(_mode_state(mode, name), 2)}
   {indented(declarations(groups, name), 2)}
   {indented([f"double {each}" for each in ahead], 2)}
   for (int64_t f = begin; f < end + last; ++f) {{
-    const double *restrict uk = u + (f / stim) * {leaf_count(stages, "u")};
+    const double *restrict uk = {caller.row.format(**parts)};
     (void)uk;
     {indented(ticks, 4)}
     if (f % every == 0) {{
       double o[{max(len(stages.output), 1)}];
       {indented(outputs, 6)}
-      double *row = rec + (f / every - row0) * chosen;
-      for (int64_t j = 0; j < chosen; ++j) row[j] = o[selection[j]];
+      {caller.record.format(**parts)}
     }}
     if (f == end) break;
     {indented(block(framed), 4)}
@@ -144,9 +188,7 @@ def emit_single(stages: Stages) -> str:
     }}
     {indented(_integrals(stages, name), 4)}
   }}
-  {indented(_stores(layout), 2)}
-  state[{counters}] = failures;
-  state[{counters + 1}] = repeats;
+  {indented(_stores(layout, caller), 2)}
 }}
 """
 
@@ -173,20 +215,24 @@ def _mode_change(mode: Modes, graph: Graph, name: Namer) -> list[str]:
     ]
 
 
-def _entries(layout: Layout) -> list[tuple[str, int]]:
-    return [
+def _entries(layout: Layout, caller: Caller) -> list[tuple[str, str]]:
+    """Return the name of each entry of the state vector, and where it is kept."""
+    places = [
         (f"{kind}{k}", layout.start[kind] + k)
         for kind, count in layout.length.items()
         for k in range(count)
     ]
+    counters = layout.start["counters"]
+    places += [("failures", counters), ("repeats", counters + 1)]
+    return [(name, caller.entry.format(k=at)) for name, at in places]
 
 
-def _loads(layout: Layout) -> list[str]:
-    return [f"double {name} = state[{at}];" for name, at in _entries(layout)]
+def _loads(layout: Layout, caller: Caller) -> list[str]:
+    return [f"double {name} = {place};" for name, place in _entries(layout, caller)]
 
 
-def _stores(layout: Layout) -> list[str]:
-    return [f"state[{at}] = {name};" for name, at in _entries(layout)]
+def _stores(layout: Layout, caller: Caller) -> list[str]:
+    return [f"{place} = {name};" for name, place in _entries(layout, caller)]
 
 
 def _commit(results: dict[str, Node], products: list[Node], name: Namer) -> list[str]:

@@ -26,6 +26,9 @@ from bywire.simulation.virtual_machine import VirtualMachine
 if TYPE_CHECKING:
     from bywire.simulation.program import Program
 
+CUDA = "cuda"
+"""engine that computes on a graphics processor"""
+
 _LOCK = threading.RLock()
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -45,7 +48,7 @@ def built_once(build: Callable[_P, _T]) -> Callable[_P, _T]:
 
 def engine_names() -> tuple[str, ...]:
     """Return what may compute a run: ours, then what rooms above declare."""
-    return ("auto", "compiled", "virtual-machine", *declared_engines())
+    return ("auto", "compiled", "virtual-machine", CUDA, *declared_engines())
 
 
 class Engine(Protocol):
@@ -122,8 +125,8 @@ class Prepared:
         ----------
         kind
             ``"compiled"``, ``"virtual-machine"``, or ``"auto"``: compiled where there is a
-            compiler, else the virtual machine, with one warning; or a declared one, see
-            `core.engines`.
+            compiler, else the virtual machine, with one warning; ``"cuda"``: a graphics
+            processor; or a declared one, see `core.engines`.
 
         Raises
         ------
@@ -131,6 +134,8 @@ class Prepared:
             For any other name.
         CompilerError
             For ``"compiled"`` or a declared engine without a compiler.
+        DeviceError
+            For ``"cuda"`` without a graphics processor, its driver or the extra.
         ModelError
             Where a declared engine cannot serve the model.
         """
@@ -143,6 +148,10 @@ class Prepared:
             return self._engines[kind]
 
     def _build(self, kind: str) -> Engine:
+        if kind == CUDA:
+            from bywire.simulation.cuda_kernel import CudaEngine
+
+            return CudaEngine(self.program)
         compiler = None if kind == "virtual-machine" else find_compiler()
         make = declared_engines().get(kind)
         if compiler is not None:

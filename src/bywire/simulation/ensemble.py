@@ -1,14 +1,10 @@
-"""Ensembles: many cases of one model, in lanes and on all cores."""
+"""Ensembles: many cases of one model, in lanes on all cores, or on a graphics processor."""
 
 from __future__ import annotations
 
-import ctypes
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +12,8 @@ from numpy.typing import NDArray
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
-from bywire.simulation.compiler import IN_TURN, VECTOR, Compiler, find_compiler, load_library
-from bywire.simulation.engine import Prepared, built_once, prepare
-from bywire.simulation.kernel_cache import load
-from bywire.simulation.layout import Layout
-from bywire.simulation.native import plan_array, pointer
+from bywire.simulation.case_kernels import case_kernel, is_side_by_side
+from bywire.simulation.engine import prepare
 from bywire.simulation.run import (
     Run,
     initial_vector,
@@ -28,14 +21,7 @@ from bywire.simulation.run import (
     selected,
     simulate,
 )
-from bywire.simulation.schedule import Schedule
 from bywire.simulation.variations import Variations, case_matrix
-
-if TYPE_CHECKING:
-    from bywire.simulation.program import Program
-
-PAIRED = 32
-"""cases from which on kernels may carry on two vectors in turn: with fewer, lanes would be idle"""
 
 
 @dataclass(frozen=True)
@@ -64,86 +50,12 @@ class Ensemble:
         return np.asarray(self.values[:, :, self.names.index(name)])
 
 
-class LaneKernel:
-    """Compiled kernel for a group of cases, of the signals that are wanted and nothing else.
-
-    ``signals``: how many outputs it records.
-    """
-
-    ENTRY = "bw_run_lanes"
-    """its function in the library"""
-
-    def __init__(self, layout: Layout, library: Path, compiler: Compiler, signals: int) -> None:
-        self.layout, self.library, self.compiler = layout, library, compiler
-        self._signals = signals
-        loaded = load(library, self.ENTRY)
-        self.lanes = int(loaded.bw_lanes())
-        self.label = f"compiled C in {self.lanes} lanes, {compiler.label}"
-        self._run = loaded[self.ENTRY]
-        self._run.restype = None
-
-    @classmethod
-    def of(
-        cls, program: Program, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool
-    ) -> LaneKernel:
-        """Emit the kernel of a program, and compile it unless the cache has it.
-
-        ``in_pairs``: whether there are cases enough for two vectors, should they pay.
-        """
-        from bywire.simulation.emission import layout_of
-        from bywire.simulation.emit_lanes import emit_lanes, takes_turns
-        from bywire.simulation.stages import build_stages
-
-        stages = build_stages(program, outputs=selection)
-        in_turn = in_pairs and takes_turns(stages)
-        flags = IN_TURN if in_turn else VECTOR
-        _, library = load_library(emit_lanes(stages, in_turn), flags, compiler, cls.ENTRY)
-        return cls(layout_of(stages), library, compiler, len(selection))
-
-    def advance(
-        self,
-        schedule: Schedule,
-        parameters: Array,
-        stimulus: Array,
-        vector: Array,
-        rows: Array,
-        end: int,
-        begin: int = 0,
-    ) -> None:
-        """Run frames begin..end of one group; renews ``vector`` and fills ``rows``.
-
-        Parameters
-        ----------
-        parameters
-            Shape (np, lanes).
-        stimulus
-            Shape (rows, nu) shared by all lanes, or (rows, nu, lanes).
-        vector
-            State vectors, shape (entries, lanes).
-        rows
-            Shape (cases, recorded rows of these frames, signals), of any strides; lanes beyond
-            the cases are not recorded.
-        """
-        own = stimulus.ndim == 3
-        apart = [stride // rows.itemsize for stride in rows.strides]
-        plan = np.concatenate(
-            (plan_array(schedule, begin, end, self._signals), [int(own), len(rows), *apart])
-        ).astype(np.int64)
-        self._run(
-            pointer(parameters),
-            ctypes.c_double(schedule.step),
-            pointer(stimulus),
-            pointer(vector),
-            pointer(plan),
-            ctypes.c_void_p(rows.ctypes.data),
-        )
-
-
 def simulate_ensemble(
     run: Run,
     variations: Variations,
     signals: Sequence[str],
     threads: int | None = None,
+    engine: str = "auto",
 ) -> Ensemble:
     """Compute one run for many values of its parameters.
 
@@ -159,6 +71,9 @@ def simulate_ensemble(
         Outputs to record.
     threads
         Threads to use, >= 1; all cores by default.
+    engine
+        ``auto`` and ``compiled``: in lanes, ``cuda``: on a graphics processor, a thread for each
+        case, both side by side; others, and ``auto`` without a compiler, one after the other.
 
     Returns
     -------
@@ -168,26 +83,28 @@ def simulate_ensemble(
     Raises
     ------
     UnknownNameError
-        When a parameter or a signal is unknown.
+        When a parameter, a signal or an engine is unknown.
     SolverError
         When a trajectory leaves the numbers.
     ParameterError
         When a value is out of range, lengths differ, or a sample time varies.
+    CompilerError
+        For ``compiled`` without a compiler.
+    DeviceError
+        For ``cuda`` where there is no graphics processor, or no room on it.
     """
     prepared = prepare(run.model, run.par)
     if threads is not None and threads < 1:
         raise ParameterError(f"threads = {threads} is not admissible: it must be >= 1")
     matrix = case_matrix(run, variations)
-    compiler = find_compiler()
-    if compiler is None:
-        return _one_by_one(run, variations, tuple(signals))
-    selection = selected(tuple(prepared.outputs), signals)
-    count = matrix.shape[1]
-    kernel = lane_kernel(prepared, compiler, tuple(selection.tolist()), count >= PAIRED)
-    schedule = run.schedule()
+    if not is_side_by_side(engine):
+        return _one_by_one(run, variations, tuple(signals), engine)
+    selection = tuple(selected(tuple(prepared.outputs), signals).tolist())
+    count, schedule = matrix.shape[1], run.schedule()
+    kernel = case_kernel(prepared, engine, selection, count, schedule)
     stimulus = sampled_stimulus(run, schedule)
     padded = -(-count // kernel.lanes) * kernel.lanes
-    values = np.empty((padded, schedule.rows, len(signals)))
+    values = kernel.rows(padded, schedule.rows)
     counters = np.zeros((2, padded))
     start = initial_vector(kernel.layout, run.state, run.memory)
 
@@ -202,7 +119,7 @@ def simulate_ensemble(
         require_finite(kernel.layout, vector, f"one of cases {first} to {last} left the numbers")
         counters[:, cases] = vector[kernel.layout.start["counters"] :]
 
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(threads or kernel.at_once) as pool:
         list(pool.map(group, range(0, padded, kernel.lanes)))
     return Ensemble(
         time=schedule.record_times,
@@ -214,32 +131,17 @@ def simulate_ensemble(
     )
 
 
-@built_once
-def lane_kernel(
-    prepared: Prepared, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool = False
-) -> LaneKernel:
-    """Return the kernel that records some outputs, by index; built once.
-
-    What an earlier command kept is taken as it is. ``in_pairs``: see `LaneKernel.of`.
-    """
-    place = None if prepared.place is None else prepared.place.in_lanes(selection, in_pairs)
-    kept = None if place is None else place.kept()
-    if kept is not None and kept.library is not None and kept.compiler == compiler.label:
-        return LaneKernel(kept.layout, kept.library, compiler, len(selection))
-    kernel = LaneKernel.of(prepared.program, compiler, selection, in_pairs)
-    if place is not None:
-        place.keep(kernel)
-        prepared.keep_model()
-    return kernel
-
-
-def _one_by_one(run: Run, variations: Variations, signals: tuple[str, ...]) -> Ensemble:
-    """Serve without a compiler: the cases one after the other."""
+def _one_by_one(
+    run: Run, variations: Variations, signals: tuple[str, ...], engine: str
+) -> Ensemble:
+    """Serve engines without lanes, and without a compiler: the cases one after the other."""
     arrays = {name: np.atleast_1d(values) for name, values in variations.items()}
     count = next(iter(arrays.values())).size
     runs = [
         simulate(
-            replace(run, par=run.par.replace({n: float(v[k]) for n, v in arrays.items()})), signals
+            replace(run, par=run.par.replace({n: float(v[k]) for n, v in arrays.items()})),
+            signals,
+            engine,
         )
         for k in range(count)
     ]

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from bywire.core.errors import StepError
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
+from bywire.simulation.case_kernels import lane_kernel
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.engine import prepare
-from bywire.simulation.ensemble import lane_kernel
 from bywire.simulation.lane_queue import Lanes
 from bywire.simulation.layout import Layout
 from bywire.simulation.run import Run, initial_vector, selected

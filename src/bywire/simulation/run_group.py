@@ -6,7 +6,6 @@ own as well, as the cases of a bench have whose equilibrium or set point follows
 
 from __future__ import annotations
 
-import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -21,10 +20,9 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
+from bywire.simulation.case_kernels import CaseKernel, case_kernel, is_side_by_side
 from bywire.simulation.changes import energies, pieces, put_in_signals
-from bywire.simulation.compiler import find_compiler
 from bywire.simulation.engine import prepare, structure_of
-from bywire.simulation.ensemble import PAIRED, LaneKernel, lane_kernel
 from bywire.simulation.run import (
     Run,
     Trajectory,
@@ -40,9 +38,12 @@ from bywire.simulation.schedule import Schedule
 _CHUNKS, _SUBSTEPS = 20, 20_000
 
 
-def fit_lanes(runs: Sequence[Run]) -> bool:
-    """Return whether runs can be computed side by side: a compiler, one structure, one plan."""
-    if find_compiler() is None or not runs:
+def fit_lanes(runs: Sequence[Run], engine: str = "auto") -> bool:
+    """Return whether runs can be computed side by side: a compiler, one structure, one plan.
+
+    ``engine``: see `bywire.simulation.ensemble.simulate_ensemble`.
+    """
+    if not is_side_by_side(engine) or not runs:
         return False
     first = runs[0]
     structure, schedule = structure_of(first.model, first.par), first.schedule()
@@ -79,7 +80,7 @@ class RunGroup(Sequence[Trajectory]):
     values: Array
     names: tuple[str, ...]
     vectors: Array
-    kernel: LaneKernel
+    kernel: CaseKernel
 
     @property
     def unsettled(self) -> NDArray[np.int64]:
@@ -120,6 +121,7 @@ def simulate_group(
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
     first: int = 0,
+    engine: str = "auto",
 ) -> RunGroup:
     """Compute runs that `fit_lanes`, each with its parameters, initial values and stimulus.
 
@@ -135,6 +137,8 @@ def simulate_group(
         Called with the finished share, 0 to 1, now and then.
     first
         Rows at the beginning that are not recorded, for instance those of a settling time.
+    engine
+        ``auto`` and ``compiled``: in lanes, ``cuda``: on a graphics processor.
 
     Raises
     ------
@@ -144,22 +148,22 @@ def simulate_group(
         When a signal is unknown.
     SolverError
         When a trajectory leaves the numbers.
+    DeviceError
+        For ``cuda`` where there is no graphics processor, or no room on it.
     """
     if threads is not None and threads < 1:
         raise ParameterError(f"threads = {threads} is not admissible: it must be >= 1")
-    if not fit_lanes(runs):
+    if not fit_lanes(runs, engine):
         raise ParameterError(
             "these runs cannot be computed side by side: that takes a C compiler, and one model, "
             "structure, duration, step, recording interval and set of sample times"
         )
-    compiler = find_compiler()
-    assert compiler is not None
     prepared = prepare(runs[0].model, runs[0].par)
     names = tuple(prepared.outputs)
     wanted = names if signals is None else tuple(signals)
     selection = tuple(selected(names, wanted).tolist())
-    kernel = lane_kernel(prepared, compiler, selection, len(runs) >= PAIRED)
     schedule = runs[0].schedule()
+    kernel = case_kernel(prepared, engine, selection, len(runs), schedule)
     edges = _edges(schedule, first, runs)
     output = runs[0].model.Output
     jumping = energies(output, wanted) if any(run.changes for run in runs) else np.empty((0, 0))
@@ -172,7 +176,7 @@ def simulate_group(
         carried = _Carried(kernel, schedule, runs[cases], jumping)
         return carried.to_the_end(values[:, cases], edges, first, watch)
 
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(threads or kernel.at_once) as pool:
         try:
             vectors = list(pool.map(computed, range(0, len(runs), kernel.lanes)))
         except BaseException:
@@ -231,7 +235,7 @@ class _Carried:
     """
 
     def __init__(
-        self, kernel: LaneKernel, schedule: Schedule, group: Sequence[Run], jumping: Array
+        self, kernel: CaseKernel, schedule: Schedule, group: Sequence[Run], jumping: Array
     ) -> None:
         self._kernel, self._schedule, self._jumping = kernel, schedule, jumping
         self._books = len(jumping) if jumping.any() else 0

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed
 from bywire.bench.key_figures import key_figures_of
-from bywire.core.errors import BywireError
+from bywire.core.errors import BywireError, DeviceError
 from bywire.studies.plan import CHUNK, StudyPlan
 
 CASE, FAILURE, WARNINGS = "case", "failure", "warnings"
@@ -63,12 +63,39 @@ def computed_chunk(
 
     Raises
     ------
+    DeviceError
+        When the bench's graphics processor fails: no case is to blame.
     KeyboardInterrupt
         When interrupted.
     """
-    values = plan.values(chunk) if isinstance(chunk, int) else chunk.values
+    ((_, columns),) = computed_chunks(plan, [chunk], threads)
+    return columns
+
+
+def computed_chunks(
+    plan: StudyPlan, chunks: Sequence[int | PlacedChunk], threads: int | None = None
+) -> list[tuple[int, Columns]]:
+    """Return the numbers and the columns of chunks whose cases are computed together.
+
+    As `computed_chunk` gives each of them, in order.
+
+    Raises
+    ------
+    DeviceError, KeyboardInterrupt
+        Likewise.
+    """
+    each = [plan.values(c) if isinstance(c, int) else c.values for c in chunks]
+    sizes = [len(next(iter(values.values()))) for values in each]
+    numbers = [number_of(chunk) for chunk in chunks]
+    cases = [n * CHUNK + np.arange(size) for n, size in zip(numbers, sizes, strict=True)]
+    values = {name: np.concatenate([one[name] for one in each]) for name in each[0]}
     with _garbage_later():
-        return _computed(plan, number_of(chunk), values, threads)
+        columns = _computed(plan, np.concatenate(cases), values, threads)
+    ends = np.cumsum(sizes).tolist()
+    return [
+        (number, {name: column[end - size : end] for name, column in columns.items()})
+        for number, size, end in zip(numbers, sizes, ends, strict=True)
+    ]
 
 
 @contextmanager
@@ -89,10 +116,12 @@ def _garbage_later() -> Iterator[None]:
 
 
 def _computed(
-    plan: StudyPlan, number: int, values: Mapping[str, NDArray[Any]], threads: int | None
+    plan: StudyPlan,
+    numbers: NDArray[np.int64],
+    values: Mapping[str, NDArray[Any]],
+    threads: int | None,
 ) -> Columns:
-    count = len(next(iter(values.values())))
-    numbers = number * CHUNK + np.arange(count)
+    count = len(numbers)
     benches: dict[int, Bench] = {}
     failures = [""] * count
     for k in range(count):
@@ -145,6 +174,8 @@ def _fill(
     """Put what cases give into their rows; where they fail together, each for itself says why."""
     try:
         given = key_figures_of([benches[k] for k in cases], threads)
+    except DeviceError:  # says nothing of a case
+        raise
     except BywireError as error:
         if len(cases) == 1:
             columns[FAILURE][cases[0]] = str(error)

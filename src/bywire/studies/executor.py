@@ -13,6 +13,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager
 from functools import partial
+from itertools import islice
 from multiprocessing import active_children, get_context, parent_process
 from typing import Any, Protocol
 
@@ -20,9 +21,19 @@ from bywire.core.brake import load_system, loaded_files
 from bywire.core.errors import ParameterError, RunError
 from bywire.core.unneeded import allow_dask
 from bywire.data.file_format import library
-from bywire.studies.chunk import Columns, PlacedChunk, computed_chunk, number_of
+from bywire.simulation.engine import CUDA
+from bywire.studies.chunk import (
+    Columns,
+    PlacedChunk,
+    computed_chunk,
+    computed_chunks,
+    number_of,
+)
 from bywire.studies.plan import StudyPlan
 
+# Chunks that a graphics processor is given at once: 4,096 cases, of hard braking 2 GB of this
+# machine's memory for stimuli and rows.
+_TOGETHER = 64
 _AHEAD = 2  # chunks, or tasks of a cluster, in flight for each worker, so that none waits for us
 _SECONDS = 10.0  # to reach a cluster
 _TASK = 0.5  # s that a task of a cluster is to take
@@ -70,12 +81,22 @@ class Executor(Protocol):
 
 
 class InProcess:
-    """The process itself, with lanes on all cores."""
+    """The process itself, with lanes on all cores, or a graphics processor.
+
+    Parameters
+    ----------
+    together
+        How many chunks are computed as one.
+    """
+
+    def __init__(self, together: int = 1) -> None:
+        self.together = together
 
     def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
         """Yield each chunk; see `Executor`."""
-        for chunk in chunks:
-            yield number_of(chunk), computed_chunk(plan, chunk)
+        left = iter(chunks)
+        while several := list(islice(left, self.together)):
+            yield from computed_chunks(plan, several)
 
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
@@ -149,7 +170,11 @@ class Cluster:
 
 
 def executor_of(
-    workers: int | None, cluster: str, chunks: int, together: int | None = None
+    workers: int | None,
+    cluster: str,
+    chunks: int,
+    together: int | None = None,
+    engine: str = "auto",
 ) -> Executor:
     """Return who computes: a cluster if one is named, else so many processes.
 
@@ -163,14 +188,23 @@ def executor_of(
         How many chunks are left.
     together
         How many can be computed at once; all by default.
+    engine
+        What computes the bench: a graphics processor is given many chunks at once, by one process.
 
     Raises
     ------
     ParameterError
-        For no workers, and for both at once.
+        For no workers, for both at once, and for either beside a graphics processor.
     """
     if workers is not None and workers < 1:
         raise ParameterError(f"workers = {workers} is not admissible: it must be >= 1")
+    if engine == CUDA:
+        if workers is not None or cluster:
+            raise ParameterError(
+                "engine = 'cuda' computes all cases on one graphics processor: leave out "
+                f"{'--cluster' if cluster else '--workers'}"
+            )
+        return InProcess(_TOGETHER)
     if cluster:
         if workers is not None:
             raise ParameterError("workers of a cluster are the cluster's own: leave one out")

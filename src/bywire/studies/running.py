@@ -52,7 +52,8 @@ def complete(
     damaged = store.drop_damaged()
     if plan.sought is not None:
         together = plan.sought.together // CHUNK
-        executor = executor_of(workers, cluster, -(-plan.cases // CHUNK), together)
+        chunks = -(-plan.cases // CHUNK)
+        executor = executor_of(workers, cluster, chunks, together, plan.bench.engine)
         seek = worst_cases if plan.design == WORST else rare_failures
         seek(plan, store, executor, progress)
         return damaged
@@ -62,7 +63,7 @@ def complete(
     done = plan.chunks - len(missing)
     label = f"{plan.total} cases"
     progress(label, done / plan.chunks)
-    executor = executor_of(workers, cluster, len(missing))
+    executor = executor_of(workers, cluster, len(missing), engine=plan.bench.engine)
     with executor.opened(plan) as compute:
         for count, (chunk, columns) in enumerate(compute(missing), 1):
             store.write(chunk, columns, plan.column_units)

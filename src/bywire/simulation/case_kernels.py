@@ -1,0 +1,203 @@
+"""Kernels of many cases: in the lanes of the processor's vectors, or in threads of a graphics one.
+
+An engine's name says which; both are called alike, with as many cases as they take at a time.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from bywire.core.errors import unknown_name
+from bywire.core.typing import Array
+from bywire.simulation.compiler import IN_TURN, VECTOR, Compiler, find_compiler, load_library
+from bywire.simulation.engine import CUDA, Prepared, built_once, engine_names
+from bywire.simulation.kernel_cache import load
+from bywire.simulation.layout import Layout
+from bywire.simulation.native import plan_array, pointer
+from bywire.simulation.schedule import Schedule
+
+if TYPE_CHECKING:
+    from bywire.simulation.cuda_device import CudaDevice
+    from bywire.simulation.cuda_kernel import CudaKernel
+    from bywire.simulation.program import Program
+
+PAIRED = 32
+"""cases from which on kernels may carry on two vectors in turn: with fewer, lanes would be idle"""
+
+
+class CaseKernel(Protocol):
+    """What computes many cases, so many at a time.
+
+    Parameters
+    ----------
+    lanes
+        How many.
+    at_once
+        By how many threads it is best called.
+    """
+
+    layout: Layout
+    label: str
+    lanes: int
+    at_once: int
+
+    def rows(self, cases: int, rows: int) -> Array:
+        """Return room for what cases record, shape (cases, rows, signals)."""
+        ...
+
+    def advance(
+        self,
+        schedule: Schedule,
+        parameters: Array,
+        stimulus: Array,
+        vector: Array,
+        rows: Array,
+        end: int,
+        begin: int = 0,
+    ) -> None:
+        """Run frames begin..end of one group; see `LaneKernel.advance`."""
+        ...
+
+
+class LaneKernel:
+    """Compiled kernel for a group of cases, of the signals that are wanted and nothing else.
+
+    ``signals``: how many outputs it records.
+    """
+
+    ENTRY = "bw_run_lanes"
+    """its function in the library"""
+
+    def __init__(self, layout: Layout, library: Path, compiler: Compiler, signals: int) -> None:
+        self.layout, self.library, self.compiler = layout, library, compiler
+        self._signals = signals
+        loaded = load(library, self.ENTRY)
+        self.lanes, self.at_once = int(loaded.bw_lanes()), os.cpu_count() or 1
+        self.label = f"compiled C in {self.lanes} lanes, {compiler.label}"
+        self._run = loaded[self.ENTRY]
+        self._run.restype = None
+
+    @classmethod
+    def of(
+        cls, program: Program, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool
+    ) -> LaneKernel:
+        """Emit the kernel of a program, and compile it unless the cache has it.
+
+        ``in_pairs``: whether there are cases enough for two vectors, should they pay.
+        """
+        from bywire.simulation.emission import layout_of
+        from bywire.simulation.emit_lanes import emit_lanes, takes_turns
+        from bywire.simulation.stages import build_stages
+
+        stages = build_stages(program, outputs=selection)
+        in_turn = in_pairs and takes_turns(stages)
+        flags = IN_TURN if in_turn else VECTOR
+        _, library = load_library(emit_lanes(stages, in_turn), flags, compiler, cls.ENTRY)
+        return cls(layout_of(stages), library, compiler, len(selection))
+
+    def rows(self, cases: int, rows: int) -> Array:
+        """Return room for what cases record; see `CaseKernel`."""
+        return np.empty((cases, rows, self._signals))
+
+    def advance(
+        self,
+        schedule: Schedule,
+        parameters: Array,
+        stimulus: Array,
+        vector: Array,
+        rows: Array,
+        end: int,
+        begin: int = 0,
+    ) -> None:
+        """Run frames begin..end of one group; renews ``vector`` and fills ``rows``.
+
+        Parameters
+        ----------
+        parameters
+            Shape (np, lanes).
+        stimulus
+            Shape (rows, nu) shared by all lanes, or (rows, nu, lanes).
+        vector
+            State vectors, shape (entries, lanes).
+        rows
+            Shape (cases, recorded rows of these frames, signals), of any strides; lanes beyond
+            the cases are not recorded.
+        """
+        own = stimulus.ndim == 3
+        apart = [stride // rows.itemsize for stride in rows.strides]
+        plan = np.concatenate(
+            (plan_array(schedule, begin, end, self._signals), [int(own), len(rows), *apart])
+        ).astype(np.int64)
+        self._run(
+            pointer(parameters),
+            ctypes.c_double(schedule.step),
+            pointer(stimulus),
+            pointer(vector),
+            pointer(plan),
+            ctypes.c_void_p(rows.ctypes.data),
+        )
+
+
+def is_side_by_side(engine: str) -> bool:
+    """Return whether an engine computes many cases side by side here.
+
+    Raises
+    ------
+    UnknownNameError
+        When there is no such engine.
+    """
+    if engine not in engine_names():
+        raise unknown_name("engine", engine, engine_names())
+    return engine == CUDA or (engine in ("auto", "compiled") and find_compiler() is not None)
+
+
+def case_kernel(
+    prepared: Prepared, engine: str, selection: tuple[int, ...], count: int, schedule: Schedule
+) -> CaseKernel:
+    """Return the kernel of so many cases that records some outputs, by index.
+
+    Raises
+    ------
+    DeviceError
+        For ``cuda`` where there is no graphics processor, or no room on it.
+    """
+    if engine == CUDA:
+        from bywire.simulation.cuda_device import find_device
+
+        return cuda_kernel(prepared, find_device(), selection).for_cases(count, schedule)
+    compiler = find_compiler()
+    assert compiler is not None
+    return lane_kernel(prepared, compiler, selection, count >= PAIRED)
+
+
+@built_once
+def cuda_kernel(prepared: Prepared, device: CudaDevice, selection: tuple[int, ...]) -> CudaKernel:
+    """Return a graphics processor's kernel that records some outputs, by index; built once."""
+    from bywire.simulation.cuda_kernel import CudaKernel
+    from bywire.simulation.stages import build_stages
+
+    return CudaKernel(device, build_stages(prepared.program, outputs=selection))
+
+
+@built_once
+def lane_kernel(
+    prepared: Prepared, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool = False
+) -> LaneKernel:
+    """Return the kernel that records some outputs, by index; built once.
+
+    What an earlier command kept is taken as it is. ``in_pairs``: see `LaneKernel.of`.
+    """
+    place = None if prepared.place is None else prepared.place.in_lanes(selection, in_pairs)
+    kept = None if place is None else place.kept()
+    if kept is not None and kept.library is not None and kept.compiler == compiler.label:
+        return LaneKernel(kept.layout, kept.library, compiler, len(selection))
+    kernel = LaneKernel.of(prepared.program, compiler, selection, in_pairs)
+    if place is not None:
+        place.keep(kernel)
+        prepared.keep_model()
+    return kernel

@@ -1,0 +1,168 @@
+"""A graphics processor emulated by this machine's: what NVIDIA's bindings of its driver do.
+
+Its memory is this machine's. A kernel is the CUDA C as it was emitted, compiled as C: a few
+definitions stand before it, and behind it a loop over the threads.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import IntEnum
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from bywire.simulation import cuda_device
+from bywire.simulation.compiler import SINGLE, compile_library, find_compiler
+from bywire.simulation.kernel_cache import load
+
+_BEFORE = """
+#include <stdint.h>
+#include <string.h>
+#include <math.h>
+#define KERNEL
+#define __launch_bounds__(threads)
+static _Thread_local struct { unsigned x; } threadIdx, blockIdx, blockDim;
+"""
+_BEHIND = """
+void emulated(unsigned blocks, unsigned threads, void **given) {
+  blockDim.x = threads;
+  for (blockIdx.x = 0; blockIdx.x < blocks; ++blockIdx.x)
+    for (threadIdx.x = 0; threadIdx.x < threads; ++threadIdx.x)
+      bw_run_cases(*(double **)given[0], *(double *)given[1], *(double **)given[2],
+          *(double **)given[3], *(int64_t **)given[4], *(double **)given[5]);
+}
+"""
+
+
+class Status(IntEnum):
+    """What the driver's functions return first."""
+
+    CUDA_SUCCESS = 0
+    CUDA_ERROR_OUT_OF_MEMORY = 2
+    CUDA_ERROR_NO_DEVICE = 100
+    CUDA_ERROR_INVALID_CONTEXT = 201
+    CUDA_ERROR_ILLEGAL_ADDRESS = 700
+
+
+OK = Status.CUDA_SUCCESS
+
+
+def compiled_here(source: str) -> Path:
+    """Return the library of a kernel, whose function ``emulated`` runs blocks of threads."""
+    compiler = find_compiler()
+    if compiler is None:
+        pytest.skip("no C compiler")
+    return compile_library(_BEFORE + source + _BEHIND, SINGLE, compiler, "emulated")
+
+
+class EmulatedDriver:
+    """The module ``cuda.bindings.driver``, as far as it is used.
+
+    Parameters
+    ----------
+    capacity
+        Memory [byte].
+    """
+
+    CUdevice_attribute = SimpleNamespace(
+        CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR=75,
+        CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR=76,
+    )
+
+    def __init__(self, capacity: int = 1 << 30) -> None:
+        self.capacity, self.count = capacity, 1
+        self.started: Any = OK
+        self.places: dict[int, Any] = {}
+        self.launches: list[int] = []  # threads of each
+        self.most = 0  # bytes that were taken at once
+
+    @property
+    def taken(self) -> int:
+        return sum(len(each) for each in self.places.values())
+
+    def cuInit(self, flags: int) -> Any:
+        if isinstance(self.started, Exception):
+            raise self.started
+        return (self.started,)
+
+    def cuDeviceGetCount(self) -> Any:
+        return OK, self.count
+
+    def cuDeviceGet(self, number: int) -> Any:
+        return OK, number
+
+    def cuDeviceGetName(self, length: int, device: int) -> Any:
+        return OK, f"emulated {device}".encode().ljust(length, b"\0")
+
+    def cuDeviceGetAttribute(self, kind: int, device: int) -> Any:
+        return OK, {75: 9, 76: 0}[kind]
+
+    def cuDevicePrimaryCtxRetain(self, device: int) -> Any:
+        return OK, "context"
+
+    def cuCtxSetCurrent(self, context: str) -> Any:
+        assert context == "context"
+        return (OK,)
+
+    def cuCtxSynchronize(self) -> Any:
+        return (OK,)
+
+    def cuMemGetInfo(self) -> Any:
+        return OK, self.capacity - self.taken, self.capacity
+
+    def cuMemAlloc(self, size: int) -> Any:
+        if self.taken + size > self.capacity:
+            return Status.CUDA_ERROR_OUT_OF_MEMORY, None
+        room = ctypes.create_string_buffer(size)
+        ctypes.memset(room, 0xFF, size)  # what is read before it is written is no number
+        self.places[ctypes.addressof(room)] = room
+        self.most = max(self.most, self.taken)
+        return OK, ctypes.addressof(room)
+
+    def cuMemFree(self, place: int) -> Any:
+        del self.places[place]
+        return (OK,)
+
+    def cuMemcpyHtoD(self, place: int, array: int, size: int) -> Any:
+        assert size <= len(self.places[place])
+        ctypes.memmove(place, array, size)
+        return (OK,)
+
+    def cuMemcpyDtoH(self, array: int, place: int, size: int) -> Any:
+        assert size <= len(self.places[place])
+        ctypes.memmove(array, place, size)
+        return (OK,)
+
+    def cuModuleLoadData(self, binary: bytes) -> Any:
+        return OK, load(compiled_here(binary.decode()), "emulated")
+
+    def cuModuleGetFunction(self, module: Any, name: bytes) -> Any:
+        assert name == b"bw_run_cases"
+        return OK, module.emulated
+
+    def cuLaunchKernel(self, function: Any, *given: int) -> Any:
+        blocks, _, _, threads, _, _, _, _, arguments, _ = given
+        self.launches.append(blocks * threads)
+        function(blocks, threads, ctypes.c_void_p(arguments))
+        return (OK,)
+
+    def cuGetErrorString(self, status: Status) -> Any:
+        return OK, b"it is said why"
+
+
+@contextmanager
+def emulated(driver: EmulatedDriver) -> Iterator[EmulatedDriver]:
+    """Have a driver's processors in place of this machine's; kernels stay text."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cuda_device, "bindings", lambda _: driver)
+        patch.setattr(cuda_device, "cuda_binary", lambda source, *_: source.encode())
+        cuda_device.find_device.cache_clear()
+        try:
+            yield driver
+        finally:
+            cuda_device.find_device.cache_clear()

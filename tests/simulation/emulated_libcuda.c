@@ -1,0 +1,72 @@
+/* A driver's library, libcuda.so.1, that NVIDIA's bindings load and call: its memory is this
+ * machine's, and its kernel the library of EMULATED_KERNEL. */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { ROOM = 1 << 30, INVALID_VALUE = 1, INVALID_IMAGE = 200, INVALID_CONTEXT = 201,
+  NOT_FOUND = 500 };
+static void *const context = (void *)0x1234;
+
+static int fake_cuInit(unsigned flags) { return flags ? INVALID_VALUE : 0; }
+static int fake_cuDeviceGetCount(int *count) { *count = 1; return 0; }
+static int fake_cuDeviceGet(int *device, int number) { *device = number; return 0; }
+static int fake_cuDeviceGetName(char *name, int length, int device) {
+  strncpy(name, "emulated below the bindings", (size_t)length);
+  return device;
+}
+static int fake_cuDeviceGetAttribute(int *value, int kind, int device) {
+  *value = kind == 75 ? 9 : 0; /* compute capability 9.0 */
+  return device;
+}
+static int fake_cuDevicePrimaryCtxRetain(void **given, int device) {
+  *given = context;
+  return device;
+}
+static int fake_cuCtxSetCurrent(void *given) { return given == context ? 0 : INVALID_CONTEXT; }
+static int fake_cuCtxSynchronize(void) { return 0; }
+static int fake_cuMemGetInfo(size_t *free, size_t *total) { *free = *total = ROOM; return 0; }
+static int fake_cuMemAlloc(uint64_t *place, size_t size) {
+  *place = (uint64_t)malloc(size);
+  return 0;
+}
+static int fake_cuMemFree(uint64_t place) { free((void *)place); return 0; }
+static int fake_cuMemcpyHtoD(uint64_t place, const void *array, size_t size) {
+  memcpy((void *)place, array, size);
+  return 0;
+}
+static int fake_cuMemcpyDtoH(void *array, uint64_t place, size_t size) {
+  memcpy(array, (void *)place, size);
+  return 0;
+}
+static int fake_cuModuleLoadData(void **module, const void *image) {
+  if (memcmp(image, "\177ELF", 4)) return INVALID_IMAGE;
+  *module = dlopen(getenv("EMULATED_KERNEL"), RTLD_NOW);
+  return *module ? 0 : INVALID_IMAGE;
+}
+static int fake_cuModuleGetFunction(void **function, void *module, const char *name) {
+  *function = strcmp(name, "bw_run_cases") ? NULL : dlsym(module, "emulated");
+  return *function ? 0 : NOT_FOUND;
+}
+static int fake_cuLaunchKernel(void *function, unsigned blocks, unsigned by, unsigned bz,
+    unsigned threads, unsigned ty, unsigned tz, unsigned shared, void *stream, void **arguments,
+    void **extra) {
+  if (by != 1 || bz != 1 || ty != 1 || tz != 1 || shared || stream || extra) return INVALID_VALUE;
+  ((void (*)(unsigned, unsigned, void **))function)(blocks, threads, arguments);
+  return 0;
+}
+
+int cuGetProcAddress_v2(const char *asked, void **found, int version, uint64_t flags, int *status) {
+  *found = NULL;
+#define HAS(name) if (!strcmp(asked, #name)) *found = (void *)fake_##name;
+  HAS(cuInit) HAS(cuDeviceGetCount) HAS(cuDeviceGet) HAS(cuDeviceGetName)
+  HAS(cuDeviceGetAttribute) HAS(cuDevicePrimaryCtxRetain) HAS(cuCtxSetCurrent)
+  HAS(cuCtxSynchronize) HAS(cuMemGetInfo) HAS(cuMemAlloc) HAS(cuMemFree) HAS(cuMemcpyHtoD)
+  HAS(cuMemcpyDtoH) HAS(cuModuleLoadData) HAS(cuModuleGetFunction) HAS(cuLaunchKernel)
+  if (status) *status = *found == NULL;
+  (void)version;
+  (void)flags;
+  return *found ? 0 : NOT_FOUND;
+}

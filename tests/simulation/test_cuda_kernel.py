@@ -1,0 +1,154 @@
+"""Many cases on an emulated graphics processor: the digits of the processor's own kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bywire.bench.bench import Bench
+from bywire.bench.bench_file import read
+from bywire.bench.ensemble import simulate_ensemble as simulate_ensemble_of_bench
+from bywire.core.brake import load_system
+from bywire.core.errors import DeviceError, UnknownNameError
+from bywire.simulation import cuda_device, cuda_kernel
+from bywire.simulation.ensemble import Ensemble, simulate_ensemble
+from bywire.simulation.run import Run, simulate
+from bywire.simulation.run_group import simulate_group
+from emulated_driver import OK, EmulatedDriver, Status, emulated
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+CASES = 70  # two blocks of threads, the second not full
+# What each is varied in, a tenth either way, and what is recorded: velocities turn, so that
+# substeps are cut.
+BRAKES = {
+    "hard-braking": ({"options.settle": "20 ms", "options.duration": "0.5 s"},
+                     "seal.T_pr", ("p_mc", "i", "E_seal", "t_stuck")),
+    "moment-pulses": ({"options.pulses": "1", "options.t_hold": "50 ms", "options.settle": "10 ms",
+                       "options.t_low": "50 ms", "options.t_high": "50 ms"},
+                      "heart.K_S", ("y_M", "F_N", "E_wedge", "t_stuck")),
+    "power-off": ({"options.duration": "0.75 s"},
+                  "friction.C", ("F_cl", "i", "E_friction", "t_stuck")),
+}  # fmt: skip
+
+
+@pytest.fixture
+def driver() -> Iterator[EmulatedDriver]:
+    with emulated(EmulatedDriver()) as driver:
+        yield driver
+
+
+def run_of(experiment: str, changes: dict[str, str]) -> Run:
+    return next(iter(read(experiment, changes).runs().values()))
+
+
+def computed(experiment: str) -> tuple[Ensemble, Ensemble]:
+    """Return an ensemble in lanes, and on a graphics processor."""
+    load_system(EXAMPLES / "emb_caliper")
+    changes, varied, signals = BRAKES[experiment]
+    run = run_of(experiment, changes)
+    cases = {varied: run.par.leaves()[varied] * np.linspace(0.9, 1.1, CASES)}
+    lanes, there = (simulate_ensemble(run, cases, signals, engine=e) for e in ("auto", "cuda"))
+    return lanes, there
+
+
+@pytest.mark.parametrize("experiment", BRAKES)
+def test_every_case_has_the_digits_that_it_has_in_lanes(experiment, driver, monkeypatch):
+    monkeypatch.setattr(cuda_kernel, "_SUBSTEPS", 1_500)
+    lanes, there = computed(experiment)
+    assert there.engine == "CUDA C, emulated 0"
+    assert set(driver.launches) == {128}
+    assert len(driver.launches) > 2
+    np.testing.assert_array_equal(there.values, lanes.values)
+    np.testing.assert_array_equal(there.repeated, lanes.repeated)
+    assert lanes.repeated.max() > 0
+    assert not driver.places  # all memory was given back
+
+
+@pytest.mark.parametrize("experiment", BRAKES)
+def test_a_processor_that_is_there_agrees_with_this_machines(experiment):
+    try:
+        device = cuda_device.find_device()
+    except DeviceError as error:
+        pytest.skip(str(error))
+    lanes, there = computed(experiment)
+    assert there.engine == f"CUDA C, {device.label}"
+    largest = np.abs(lanes.values).max(axis=(0, 1))
+    assert np.all(np.abs(there.values - lanes.values).max(axis=(0, 1)) <= 1e-9 * largest)
+
+
+@pytest.fixture(scope="module")
+def runs() -> list[Run]:
+    """Return five runs whose starts, set points and noise differ."""
+    changes = {"options.settle": "10 ms", "options.duration": "40 ms", "adc.noise": "1"}
+    return [
+        run_of("hard-braking", changes | {"options.p_to": f"{20 + 5 * k} bar"}) for k in range(5)
+    ]
+
+
+def test_runs_go_there_in_batches_that_its_memory_holds(runs, driver, monkeypatch):
+    monkeypatch.setattr(cuda_kernel, "_SUBSTEPS", 600)
+    lanes = simulate_group(runs, first=7)
+    driver.capacity = 40_000
+    there = simulate_group(runs, first=7, engine="cuda")
+    assert there.kernel.lanes == 2  # in three batches, the last of which is not full
+    assert driver.most <= driver.capacity / 2
+    np.testing.assert_array_equal(there.values, lanes.values)
+    alone = [simulate(run, engine="compiled").vector for run in runs]
+    np.testing.assert_array_equal(there.vectors.T, alone)
+
+
+def test_an_ensemble_goes_there_in_batches(runs, driver, monkeypatch):
+    signals, cases = BRAKES["hard-braking"][2], {"motor.R_m": np.linspace(0.3, 0.4, 5)}
+    lanes = simulate_ensemble(runs[0], cases, signals)
+    monkeypatch.setattr(cuda_kernel, "MOST", 2)
+    there = simulate_ensemble(runs[0], cases, signals, engine="cuda")
+    assert len(driver.launches) == 3
+    np.testing.assert_array_equal(there.values, lanes.values)
+
+
+def test_a_single_run_is_a_batch_of_one(runs, driver):
+    there, here = (simulate(runs[0], ["i", "p_mc"], engine) for engine in ("cuda", "compiled"))
+    assert there.engine == "CUDA C, emulated 0"
+    np.testing.assert_array_equal(there.values, here.values)
+    np.testing.assert_array_equal(there.vector, here.vector)
+
+
+def test_a_bench_says_that_its_cases_go_there(driver):
+    bench = Bench("hard-braking", "dardanelli2010", engine="cuda",
+                  options={"duration": "40 ms", "settle": "10 ms"})  # fmt: skip
+    varied = {"motor.R_m": [0.3, 0.4]}
+    there = simulate_ensemble_of_bench(bench, varied)
+    here = simulate_ensemble_of_bench(replace(bench, engine="auto"), varied)
+    assert there.results[1].recording.attrs["engine"] == "CUDA C, emulated 0"
+    np.testing.assert_array_equal(there["p_mc"], here["p_mc"])
+    assert [k.value for k in there.results[1].kpis] == [k.value for k in here.results[1].kpis]
+
+
+def test_memory_that_is_too_small_is_said(runs, driver):
+    driver.capacity = 10_000
+    with pytest.raises(DeviceError, match=r"emulated 0 has 0\.01 MB free.*takes .* MB: record"):
+        simulate_group(runs, engine="cuda")
+
+
+def test_memory_that_others_took_meanwhile_is_said(runs, driver, monkeypatch):
+    monkeypatch.setattr(driver, "cuMemGetInfo", lambda: (OK, 10**9, 10**9))
+    driver.capacity = 50_000
+    with pytest.raises(DeviceError, match=r"no room for .* MB: .* are free: end what else"):
+        simulate_group(runs, engine="cuda")
+    assert not driver.places
+
+
+def test_a_processor_that_fails_is_said(runs, driver, monkeypatch):
+    status = Status.CUDA_ERROR_ILLEGAL_ADDRESS
+    monkeypatch.setattr(driver, "cuCtxSynchronize", lambda: (status,))
+    with pytest.raises(DeviceError, match=r"emulated 0 failed: .* why \(CUDA_ERROR_ILLEGAL"):
+        simulate_group(runs, engine="cuda")
+
+
+def test_an_engine_that_is_none_is_refused(runs):
+    with pytest.raises(UnknownNameError, match="unknown engine 'cudo': did you mean 'cuda'"):
+        simulate_ensemble(runs[0], {"motor.R_m": [0.3]}, ["i"], engine="cudo")
