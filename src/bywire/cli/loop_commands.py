@@ -19,11 +19,12 @@ from bywire.cli.options import (
     changes,
 )
 from bywire.cli.show import show
+from bywire.core import option_texts as texts
 
 LoopOrPlant = Annotated[
     str,
     typer.Argument(
-        help="Loop or plant, see 'bywire list'.", show_default=False,
+        help=texts.LOOP_OR_PLANT, show_default=False,
         autocompletion=completion.LOOPS_OR_PLANTS,
     ),
 ]  # fmt: skip
@@ -35,17 +36,17 @@ def linearize_command(
     at: At = "",
     set_: Changes = None,
     locus: Annotated[
-        str, typer.Option(help="Poles over a range, e.g. motor.R_m=0.1ohm:1ohm:71.")
+        str, typer.Option(help=texts.LOCUS)
     ] = "",
     reduce: Annotated[
-        str, typer.Option(help="Reduce it to an order, e.g. 4, or to a band, e.g. '150 Hz'.")
+        str, typer.Option(help=texts.REDUCE)
     ] = "",
     friction: Annotated[
-        str, typer.Option(help="Of a plant: removed (as of loops), sliding, or stuck.")
+        str, typer.Option(help=texts.FRICTION)
     ] = "",
-    speed: Annotated[str, typer.Option(help="Motor speed of sliding, e.g. '5 rad/s'.")] = "",
+    speed: Annotated[str, typer.Option(help=texts.SPEED)] = "",
     dither: Annotated[
-        bool, typer.Option("--dither", help="Also about its motion under dither, friction on.")
+        bool, typer.Option("--dither", help=texts.DITHER)
     ] = False,
     out: OutFolder = None,
     json: JsonFlag = False,
@@ -68,12 +69,12 @@ def frequency_response_command(
     at: At = "",
     set_: Changes = None,
     frequencies: Frequencies = "",
-    amplitudes: Annotated[str, typer.Option(help="Amplitudes, e.g. '0.5 rad, 1 rad'.")] = "",
+    amplitudes: Annotated[str, typer.Option(help=texts.AMPLITUDES)] = "",
     excitation: Annotated[
-        str, typer.Option(help="sine (one frequency at a time), multisine, or chirp.")
+        str, typer.Option(help=texts.EXCITATION)
     ] = "sine",
     over: Annotated[
-        str, typer.Option(help="Range, for bandwidths, e.g. motor.R_m=0.2ohm:0.6ohm:5.")
+        str, typer.Option(help=texts.BANDWIDTH_OVER)
     ] = "",
     error_estimate: ErrorEstimate = True,
     out: OutFolder = None,
@@ -98,7 +99,7 @@ def agreement_command(
     set_: Changes = None,
     frequencies: Frequencies = "",
     amplitudes: Annotated[
-        str, typer.Option(help="A small and a large amplitude, e.g. '0.001 rad, 1 rad'.")
+        str, typer.Option(help=texts.AGREEMENT_AMPLITUDES)
     ] = "",
     out: OutFolder = None,
     json: JsonFlag = False,
@@ -121,7 +122,7 @@ def margins_command(
     at: At = "",
     set_: Changes = None,
     over: Annotated[
-        str, typer.Option(help="Range, e.g. motor.R_m=0.2ohm:0.6ohm:9 or at=5bar:35bar:7.")
+        str, typer.Option(help=texts.MARGINS_OVER)
     ] = "",
     out: OutFolder = None,
     json: JsonFlag = False,
