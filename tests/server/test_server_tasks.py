@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,8 @@ from typing import Any
 import pytest
 
 import bywire
-from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.server.contents import Contents, contents
+from bywire.server.field import Field
 from bywire.server.jobs import Job, Jobs
 from bywire.server.live_pages import LivePages
 from bywire.server.pages.bench_page import bench_page
@@ -23,14 +24,26 @@ from bywire.server.task_registry import tasks
 from bywire.server.tasks import study
 
 FUNCTIONS = {
-    "page": "page.page", "run": "run.run", "replay": "replay.replay", "design": "design.design",
-    "identify": "identify.identify", "study": "run_study.run_study",
+    "agreement": "agreement.agreement", "compare": "compare.compare", "design": "design.design",
+    "faults": "run_faults.run_faults",
+    "frequency-response": "frequency_response.frequency_response",
+    "identify": "identify.identify", "life": "life.project_life",
+    "linearize": "linearize.linearize", "margins": "margins.margins", "page": "page.page",
+    "replay": "replay.replay", "reproduce": "reproduce.reproduce", "run": "run.run",
+    "size": "study.study", "study": "run_study.run_study",
 }  # fmt: skip
 FILLED = {
-    "lines": "a=1\n b=2 \n\n", "pairs": "a = 1\n", "names": "a\nb=2 bar", "flag": True,
-    "changes": "motor.R_m = 0.4 ohm\n", "text": "3", "file": "x.csv",
-    "files": "x.csv\n", "bench": "b.toml",
+    "lines": "a=1\n b=2 \n\n", "pairs": "a = 1\n", "names": "a\nb=2 bar",
+    "changes": "motor.R_m = 0.4 ohm\n", "text": "3", "whole": "3", "file": "x.csv",
+    "files": "x.csv\n", "thing": "b.toml", "things": "x.csv\nb.toml",
 }  # fmt: skip
+
+
+def filled(field: Field) -> Any:
+    """Return what a field does not hold by default."""
+    if field.kind == "flag":
+        return not field.default
+    return field.choices()[-1] if field.kind == "choice" else FILLED[field.kind]
 
 
 @pytest.fixture
@@ -55,32 +68,21 @@ def test_every_field_reaches_the_function(name, place, monkeypatch):
 
     monkeypatch.setattr(home, function, called)
     task = tasks()[name]
-    filled = {field.name: FILLED[field.kind] for field in task.fields}
-    task.compute(task.read(filled, place), place.root / "out", lambda *_: None)
-    empty = {field.name: filled[field.name] for field in task.fields if field.is_required}
-    task.compute(task.read(empty, place), place.root / "out", lambda *_: None)
-    full, least = ({k: repr(v) for k, v in given.items() if k != "progress"} for given in calls)
+    fields = [replace(field, fits=None) for field in task.fields]
+    task = replace(task, fields=tuple(fields))  # what they hold means nothing
+    every = {field.name: filled(field) for field in fields}
+    least = {field.name: every[field.name] for field in fields if field.is_required}
+
+    def given(form: dict[str, Any]) -> dict[str, str]:
+        task.compute(task.read(form, place), place.root / "out", lambda *_: None)
+        return {k: repr(v) for k, v in calls[-1].items() if k != "progress"}
+
+    by_default = given(least)
+    assert (given(every) != by_default) == (every != least)
     # A field that is filled in changes what the function is given, each one for itself.
-    for field in task.fields:
+    for field in fields:
         if not field.is_required:
-            task.compute(task.read({**empty, field.name: filled[field.name]}, place),
-                         place.root / "out", lambda *_: None)  # fmt: skip
-            given = {k: repr(v) for k, v in calls[-1].items() if k != "progress"}
-            assert given != least, field.name
-    assert full != least
-
-
-def test_forms_are_checked(place):
-    task = tasks()["identify"]
-    for given, text in ({"method": ""}, "Method"), ({"method": 1}, "a text"), (
-        {"method": "m", "measurements": "x.csv\ny.csv"}, "y.csv",
-    ):  # fmt: skip
-        with pytest.raises((ParameterError, RefusedError), match=text):
-            task.read(given, place)
-    with pytest.raises(UnknownNameError, match="metod"):
-        task.read({"metod": "x"}, place)
-    with pytest.raises(ParameterError, match="whole number"):
-        task.compute(task.read({"method": "m", "starts": "1.5"}, place), place.root, print)
+            assert given({**least, field.name: every[field.name]}) != by_default, field.name
 
 
 def test_forms_escape_what_the_folder_has(place):
@@ -159,6 +161,8 @@ def test_a_page_of_a_bench_simulates_nothing(monkeypatch):
 def test_a_folder_is_listed_by_what_its_files_are(place):
     (place.root / "study.toml").write_text('bench = "b.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n')
     (place.root / "map.toml").write_text("[columns]\n")
+    (place.root / "campaign.toml").write_text('bench = "b.toml"\n[vary]\n[[criteria]]\n')
+    (place.root / "life.toml").write_text('life = "wedge-pads"\n[vary]\n')
     (place.root / "broken.toml").write_text("[")
     result = place.root / "results" / "run-b-1"
     result.mkdir(parents=True)
@@ -168,6 +172,9 @@ def test_a_folder_is_listed_by_what_its_files_are(place):
     there = contents(place)
     assert there.benches == {"b.toml": "stribeck"}
     assert there.studies == {"study.toml": "b.toml"}
+    assert there.campaigns == {"campaign.toml": "b.toml"}
+    assert there.lives == {"life.toml": "wedge-pads"}
+    assert there.results == ["results/run-b-1"]
     assert there.maps == ["map.toml"]
     assert there.reports == ["results/run-b-1/report.html"]
     assert there.measurements == ["rig.nc", "x.csv"]

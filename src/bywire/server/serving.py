@@ -13,11 +13,11 @@ from urllib.parse import quote
 
 from bywire.core.errors import FileError, ParameterError, unknown_name
 from bywire.server.address import HERE, PORT
+from bywire.server.field import is_file_name
 from bywire.server.handler import Handler, quiet_error
 from bywire.server.live_pages import experiments
 from bywire.server.place import Place, place_of
 from bywire.server.service import LARGEST_FILE, Service, service_of
-from bywire.server.task import is_file_name
 
 
 class _Server(ThreadingHTTPServer):

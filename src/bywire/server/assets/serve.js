@@ -20,7 +20,7 @@ async function ask(address, method = "GET", body = undefined) {
     throw new Error("the server does not answer: was it ended? Start bywire serve again");
   }
   const said = await answer.json().catch(() => ({ error: `status ${answer.status}` }));
-  if (!answer.ok) throw new Error(said.error);
+  if (!answer.ok) throw Object.assign(new Error(said.error), { field: said.field });
   return said;
 }
 
@@ -35,22 +35,50 @@ function valueOf(field) {
   return field.value;
 }
 
+/* What does not fit is said beside its field, which gets the focus; of no field that is seen, on top. */
+function complainOf(form, { message, field: name }) {
+  const field = name && form.querySelector(`:is(input:not([type=hidden]), select, textarea)[name="${CSS.escape(name)}"]`);
+  if (!field) return complain(message);
+  const said = element("p", message, { className: "wrong", id: `${field.id}-wrong` });
+  field.closest(".field").append(said);
+  field.setAttribute("aria-invalid", "true");
+  field.setAttribute("aria-describedby", [field.dataset.hint, said.id].filter(Boolean).join(" "));
+  const folded = field.closest("details");
+  if (folded) folded.open = true;
+  field.focus();
+}
+
+function forgive(field) {
+  if (field.getAttribute("aria-invalid") !== "true") return;
+  place(`${field.id}-wrong`).remove();
+  field.removeAttribute("aria-invalid");
+  if (field.dataset.hint) field.setAttribute("aria-describedby", field.dataset.hint);
+  else field.removeAttribute("aria-describedby");
+}
+
 async function begin(event) {
   event.preventDefault();
-  const form = event.target;
-  const fields = [...form.elements].filter(({ name }) => name);
+  const form = event.target, fields = [...form.elements].filter(({ name }) => name);
+  if (form.getAttribute("aria-busy") === "true") return;
   const asked = Object.fromEntries(fields.map((field) => [field.name, valueOf(field)]));
-  const button = form.querySelector("button[type=submit]");
-  button.disabled = true;
+  form.setAttribute("aria-busy", "true"); // a button that is disabled would lose the focus
+  fields.forEach(forgive);
+  complain("");
   try {
     await ask("/api/jobs", "POST", { task: form.dataset.task, form: asked });
-    complain("");
     await refresh();
     place("jobs-title").scrollIntoView({ block: "nearest" });
   } catch (error) {
-    complain(error.message);
+    complainOf(form, error);
   }
-  button.disabled = false;
+  form.removeAttribute("aria-busy");
+}
+
+function armForm(form) {
+  form.addEventListener("submit", begin);
+  form.addEventListener("input", ({ target }) => forgive(target));
+  for (const field of form.elements) field.dataset.hint = field.getAttribute("aria-describedby") ?? "";
+  form.querySelector("button[type=submit]").disabled = false;
 }
 
 /* Measurement files */
@@ -161,7 +189,17 @@ async function cancel(job, button) {
   await refresh();
 }
 
-/* An item is made anew only when it changes: a button that has the focus keeps it. */
+/* Whoever is in an item stays there when it is made anew: at what is called the same, or at the item itself. */
+function replace(old, item) {
+  const here = old.contains(document.activeElement) && document.activeElement;
+  const name = here && here.getAttribute("aria-label");
+  old.replaceWith(item);
+  if (!here) return;
+  const same = name && [...item.querySelectorAll("[aria-label]")].find((each) => each.getAttribute("aria-label") === name);
+  item.tabIndex = -1;
+  (same || item.querySelector("a") || item).focus({ preventScroll: true });
+}
+
 function update(job) {
   const said = JSON.stringify(job), old = place("jobs").querySelector(`[data-number="${job.number}"]`);
   if (states.get(job.number)?.said === said && old) return old;
@@ -175,7 +213,7 @@ function update(job) {
     place("spoken").textContent = `${job.title} of ${job.subject}: ${outcome(job)}`;
   }
   states.set(job.number, { said, state: job.state, report: job.report });
-  if (old && item !== old) old.replaceWith(item);
+  if (old && item !== old) replace(old, item);
   return item;
 }
 
@@ -198,7 +236,9 @@ async function refresh() {
   try {
     jobs = (await ask("/api/jobs")).jobs;
     const items = jobs.map(update), list = place("jobs");
-    if (items.some((item, k) => list.children[k] !== item)) list.replaceChildren(...items);
+    // One by one: what is moved loses the focus. The latest come first, and the oldest go.
+    items.forEach((item, k) => { if (list.children[k] !== item) list.insertBefore(item, list.children[k] ?? null); });
+    while (list.children.length > items.length) list.lastElementChild.remove();
     place("no-jobs").hidden = jobs.length > 0;
     showStudy(jobs);
   } catch (error) {
@@ -207,7 +247,7 @@ async function refresh() {
   pause = setTimeout(refresh, jobs.some(isActive) ? 500 : 4000);
 }
 
-document.querySelectorAll("form.task").forEach((form) => form.addEventListener("submit", begin));
+document.querySelectorAll("form.task").forEach(armForm);
 document.querySelectorAll(".drop").forEach(arm);
 // A file that misses its place must not be opened instead of the page.
 for (const kind of ["dragover", "drop"]) addEventListener(kind, (event) => event.preventDefault());

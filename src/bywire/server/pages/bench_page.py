@@ -28,8 +28,9 @@ def bench_page(bench: ShownBench, there: Contents, largest: int) -> str:
         section("Run with Python", "run", form(tasks()["run"], there, given)),
         section("Replay a measurement", "replay", form(tasks()["replay"], there, given)),
     ]
-    if bench.name in there.benches:
-        body.append(f"<p>{link(f'/file/{bench.name}', 'The bench file')}</p>")
+    compared = link("/task/compare", "Compare it with other runs", runs=bench.name)
+    file = link(f"/file/{bench.name}", "The bench file") if bench.name in there.benches else ""
+    body.append(f"<p>{compared}</p>\n<p>{file}</p>" if file else f"<p>{compared}</p>")
     return frame(bench.name, bench.summary, body, largest=largest)
 
 

@@ -8,10 +8,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bywire.core.errors import BywireError, ParameterError, quoted
+from bywire.core import option_texts as texts
+from bywire.core.errors import BywireError
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.server.task import Field, Task
+from bywire.server.common_fields import bench_changes, changes_of, path_of
+from bywire.server.field import Field
+from bywire.server.place import Place
+from bywire.server.task import Task
 from bywire.server.telling import tell
 
 _PAUSE = 5.0  # s of computing between two reports, and in a report's own time five times that
@@ -47,25 +51,27 @@ class _Reports:
         tell(report=True)
 
 
+def _plan(asked: Mapping[str, Any], place: Place) -> object:
+    from bywire.studies.study_file import read_study
+
+    return read_study(path_of(asked["study"], place), changes_of(asked, place))
+
+
 def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     from bywire.api.run_study import run_study
 
-    return run_study(asked["study"], out, asked["set"], cases=_cases(asked["cases"]),
+    return run_study(asked["study"], out, asked["set"], cases=asked["cases"],
                      progress=_Reports(out, progress))  # fmt: skip
-
-
-def _cases(text: str) -> int | None:
-    if text and (not text.isdecimal() or len(text) > 9):
-        raise ParameterError(f"cases = {quoted(text)}: a whole number is wanted")
-    return int(text) if text else None
 
 
 TASK = Task(
     "study", "Run the study", "Run, or go on",
     (
-        Field("study", "Study", "file", is_required=True),
-        Field("cases", "Cases", hint="those of the file by default; more extend the study"),
-        Field("set", "Changes", "changes", "motor.R_m=0.4 ohm, one in a line"),
+        Field("study", "Study", "thing", texts.STUDY_FILE, is_required=True,
+              offered=lambda there: list(there.studies), fits=lambda asked, place:
+              _plan({**asked, "set": {}}, place)),
+        Field("cases", "Cases", "whole", texts.STUDY_CASES, least=1),
+        bench_changes(_plan),
     ),
-    _compute, subject="study", is_kept=True,
+    _compute, subject="study", command="study run", is_kept=True,
 )  # fmt: skip
