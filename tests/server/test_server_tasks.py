@@ -123,23 +123,26 @@ def test_live_pages_are_made_again_when_their_bench_changes(place, tmp_path):
 
 
 def test_a_study_reports_now_and_then_what_there_is(monkeypatch, tmp_path):
-    written, told = [], []
+    told, pages = [], [[], *[[tmp_path / "report.html"]] * 9]
+    clock, shown = [0.0], []
 
     class Report:
         def write(self, folder):
-            written.append(folder)
+            assert folder == tmp_path
+            shown.append(clock[0])
+            return pages[len(shown) - 1]
 
     monkeypatch.setattr("bywire.api.run_study.study_report", lambda _: Report())
     monkeypatch.setattr(study, "tell", lambda **said: told.append(said))
-    clock = [0.0]
     monkeypatch.setattr(study.time, "monotonic", lambda: clock[0])
     reports = study._Reports(tmp_path, lambda *_: None)
     for second in range(20):
         clock[0] = float(second)
         reports("16 cases", second / 20)
     reports("16 cases", 1.0)
-    assert len(written) == len(told) == 3
-    assert set(written) == {tmp_path}
+    # From the first chunk on; one that has no page yet is none, which a page would show as missing.
+    assert shown == [1.0, 7.0, 13.0, 19.0]
+    assert told == [{"report": True}] * 3
 
 
 def test_a_page_of_a_bench_simulates_nothing(monkeypatch):

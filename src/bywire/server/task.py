@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -76,11 +77,11 @@ class Task:
                 raise unknown_name(f"field of {self.name!r}", name, known)
         asked: dict[str, Any] = {}
         for field in self.fields:
-            with _beside(field):
+            with _beside(field, place):
                 asked[field.name] = field.read(form.get(field.name), place)
         for field in self.fields:
             if field.fits is not None and asked[field.name]:
-                with _beside(field):
+                with _beside(field, place):
                     field.fits(asked, place)
         return asked
 
@@ -98,11 +99,12 @@ class Task:
 
 
 @contextmanager
-def _beside(field: Field) -> Iterator[None]:
-    """Have what is refused say which field it stands beside."""
+def _beside(field: Field, place: Place) -> Iterator[None]:
+    """Have what is refused say which field it stands beside, with paths as the folder has them."""
     try:
         yield
     except RefusedError as refused:
         raise RefusedError(refused.status, refused.text, field.name) from None
     except InputError as error:
-        raise RefusedError(422, str(error), field.name) from None
+        said = str(error).replace(f"{place.root}{os.sep}", "")
+        raise RefusedError(422, said, field.name) from None

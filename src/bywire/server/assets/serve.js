@@ -180,7 +180,8 @@ function shown(job) {
 }
 
 async function cancel(job, button) {
-  button.disabled = true;
+  if (button.getAttribute("aria-disabled") === "true") return;
+  button.setAttribute("aria-disabled", "true"); // and not disabled, which would lose the focus
   try {
     await ask(`/api/jobs/${job.number}/cancel`, "POST", {});
   } catch (error) {

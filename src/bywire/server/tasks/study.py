@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 import warnings
 from collections.abc import Mapping
@@ -13,6 +14,7 @@ from bywire.core.errors import BywireError
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
 from bywire.server.common_fields import bench_changes, changes_of, path_of
+from bywire.server.contents import REPORT
 from bywire.server.field import Field
 from bywire.server.place import Place
 from bywire.server.task import Task
@@ -27,12 +29,12 @@ class _Reports:
 
     def __init__(self, folder: Path, progress: Progress) -> None:
         self._folder, self._progress = folder, progress
-        self._next = time.monotonic() + _PAUSE
+        self._next = -math.inf  # the first chunk is shown at once
 
     def __call__(self, label: str, share: float) -> None:
         """Be the progress of the study."""
         self._progress(label, share)
-        if share < 1.0 and time.monotonic() > self._next:
+        if 0.0 < share < 1.0 and time.monotonic() > self._next:
             begin = time.monotonic()
             self._write()
             took = time.monotonic() - begin
@@ -45,10 +47,11 @@ class _Reports:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             try:
-                study_report(self._folder).write(self._folder)
+                written = study_report(self._folder).write(self._folder)
             except BywireError:  # too few cases yet; the last report says what is wrong
                 return
-        tell(report=True)
+        if any(path.suffix == REPORT for path in written):
+            tell(report=True)
 
 
 def _plan(asked: Mapping[str, Any], place: Place) -> object:
