@@ -215,6 +215,32 @@ def test_every_field_has_a_label_and_says_its_hint():
         assert text.count('type="submit" disabled') == 1
 
 
+GOOD = [
+    ("run", {"bench": "hard-braking", "set": "motor.R_m=1 ohm", "faults": "pressure.stuck=1 bar"}),
+    ("faults", {"campaign": "two-wheeler", "set": "front.disc.mu_pad=0.4"}),
+    ("life", {"life": "two-wheeler-pads", "check": "20", "set": "stop.pause=60 s"}),
+    ("compare", {"runs": "curve.toml\nhard-braking", "set": "motor.R_m=0.4 ohm"}),
+    ("size", {"study": "drive-train", "set": "t_90=120ms"}),
+    ("linearize", {"loop": "wedge-plant", "friction": "sliding", "speed": "5 rad/s",
+                   "locus": "motor_1.R_ref=0.1ohm:1ohm:3"}),
+    ("frequency-response", {**LOOP, "at": "20 bar", "frequencies": "1 Hz:9 Hz:3",
+                            "amplitudes": "1 bar", "over": "motor.R_m=0.2ohm:0.6ohm:5"}),
+    ("agreement", {**LOOP, "amplitudes": "1 bar, 2 bar"}),
+    ("design", {**LOOP, "set": "motor.R_m=0.4 ohm"}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("task", "given"), GOOD)
+def test_what_fits_is_taken_and_tried_out_without_a_simulation(visit, monkeypatch, task, given):
+    def refused(*_: Any, **__: Any) -> None:
+        raise AssertionError("simulated")
+
+    for place in "simulation.run.simulate", "bench.running.run_of", "bench.running.run":
+        monkeypatch.setattr(f"bywire.{place}", refused)
+    asked = tasks()[task].read(given, visit.server.service.place)
+    assert set(given) <= {name for name, value in asked.items() if value}
+
+
 def test_unknown_fields_are_no_field_s(visit):
     task, place = tasks()["identify"], Place(visit.folder)
     with pytest.raises(UnknownNameError, match="metod"):

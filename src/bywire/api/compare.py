@@ -89,12 +89,16 @@ def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> lis
             f"{len(runs)} {'run is' if len(runs) == 1 else 'runs are'} nothing to compare: name "
             "two at least, bench files, experiments or result folders"
         )
-    benches = [each for each in runs if not isinstance(each, Result) and not _is_folder(each)]
+    benches = [each for each in runs if not _was_run(each)]
     if overrides and not benches:
         raise ParameterError(
             f"{', '.join(overrides)} would have no effect: what is compared was run before"
         )
     return benches
+
+
+def _was_run(source: Comparable) -> bool:
+    return isinstance(source, Result) or _is_folder(source)
 
 
 def _is_folder(source: Comparable) -> bool:

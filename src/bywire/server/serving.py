@@ -96,7 +96,7 @@ def serve(
     """Show a folder's benches, results and studies in a browser of this machine, until Ctrl-C.
 
     Pages compute in the browser as those of `bywire.page` do; what needs Python (reports,
-    measurement files beside the simulation, identification, design, studies) is computed in
+    measurement files beside the simulation, identification, design, campaigns) is computed in
     processes of its own. Only this machine is answered, only with the token of the link, and
     nothing is read or written outside of the folder.
 

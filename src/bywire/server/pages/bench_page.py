@@ -5,7 +5,8 @@ from __future__ import annotations
 from urllib.parse import quote
 
 from bywire.server.contents import Contents
-from bywire.server.pages.frame import form, frame, link, section, text
+from bywire.server.pages.entries import text
+from bywire.server.pages.frame import form, frame, link, section
 from bywire.server.shown_bench import ShownBench
 from bywire.server.task_registry import tasks
 

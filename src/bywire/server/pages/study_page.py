@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from bywire.server.contents import Contents
-from bywire.server.pages.frame import form, frame, link, section, text
+from bywire.server.pages.entries import text
+from bywire.server.pages.frame import form, frame, link, section
 from bywire.server.task_registry import tasks
 
 
