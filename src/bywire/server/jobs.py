@@ -103,7 +103,7 @@ class Jobs:
             if len(active) >= MOST:
                 raise RefusedError(429, f"{MOST} jobs wait already: cancel some, or wait")
             same = [each.out for each in active if each.task is task and each.asked == asked]
-            out = out or (same[0] if task.holds and same else self._folder(task, asked))
+            out = out or (same[0] if task.begun and same else self._folder(task, asked))
             if any(each.out == out for each in active):
                 raise RefusedError(
                     409, f"{task.said_of(asked)} is being computed: wait, or cancel it"
@@ -118,10 +118,9 @@ class Jobs:
 
     def begun(self, task: Task, asked: Mapping[str, Any]) -> Path | None:
         """Return the folder that holds what is asked already, to go on in it; None for none."""
-        if task.holds is None:
+        if task.begun is None:
             return None
-        known = self._place.folders(_name(task, asked))
-        return next((each for each in known if task.holds(asked, self._place, each)), None)
+        return task.begun(asked, self._place, self._place.folders(_name(task, asked)))
 
     def all(self) -> list[Job]:
         """Return all jobs, the latest first."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,8 +42,9 @@ class Task:
         What the same is called in a terminal, behind ``bywire``; its name by default.
     is_kept
         Whether the same subject goes on in the same folder.
-    holds
-        Whether a folder holds what is asked already, unfinished perhaps: then it is gone on with.
+    begun
+        ``begun(asked, place, folders)``: returns which of the folders of its subject holds what is
+        asked, unfinished perhaps: then it is gone on with; None for none.
     is_file
         Whether ``out`` is a file that the task itself writes.
     """
@@ -57,7 +58,7 @@ class Task:
     summary: str = ""
     command: str = ""
     is_kept: bool = False
-    holds: Callable[[Mapping[str, Any], Place, Path], bool] | None = None
+    begun: Callable[[Mapping[str, Any], Place, Sequence[Path]], Path | None] | None = None
     is_file: bool = False
 
     def read(self, form: Mapping[str, Any], place: Place) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,10 +24,13 @@ def _plan(asked: Mapping[str, Any], place: Place) -> CampaignPlan:
     return read_campaign(path_of(asked["campaign"], place), changes_of(asked, place))
 
 
-def _holds(asked: Mapping[str, Any], place: Place, folder: Path) -> bool:
+def _begun(
+    asked: Mapping[str, Any], place: Place, folders: Sequence[Path]
+) -> Path | None:
     from bywire.campaigns.store import CampaignStore
 
-    return CampaignStore(folder).holds(_plan(asked, place))
+    plan = _plan(asked, place)
+    return next((each for each in folders if CampaignStore(each).holds(plan)), None)
 
 
 def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
@@ -44,6 +47,6 @@ TASK = Task(
               fits=lambda asked, place: _plan({**asked, "set": {}}, place)),
         bench_changes(_plan),
     ),
-    _compute, subject="campaign", holds=_holds,
+    _compute, subject="campaign", begun=_begun,
     summary="What every fault of a brake does in a maneuver, when it is seen, what is covered",
 )  # fmt: skip
