@@ -8,9 +8,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
 
 import bywire
+from bywire.core.errors import ParameterError
 from bywire.server.contents import Contents, contents
 from bywire.server.field import Field
 from bywire.server.jobs import Job, Jobs
@@ -20,9 +23,23 @@ from bywire.server.pages.frame import form
 from bywire.server.place import Place
 from bywire.server.refusal import RefusedError
 from bywire.server.shown_bench import shown_bench
+from bywire.server.study_so_far import so_far
 from bywire.server.task_registry import tasks
 from bywire.server.tasks import study
+from bywire.studies.chunk import CASE, FAILURE, WARNINGS
+from bywire.studies.findings import Findings
+from bywire.studies.study_file import read_study
 
+STUDY = """
+bench = "curve.toml"
+[vary]
+"seal.T_pr" = "+-20 %"
+[design]
+kind = "monte-carlo"
+cases = 64
+[requirements]
+breakaway_apply = "<= 0.5 N*m with 90 %"
+"""
 FUNCTIONS = {
     "agreement": "agreement.agreement", "compare": "compare.compare", "design": "design.design",
     "faults": "run_faults.run_faults",
@@ -122,27 +139,59 @@ def test_live_pages_are_made_again_when_their_bench_changes(place, tmp_path):
         pages.file("b.toml", "third")
 
 
-def test_a_study_reports_now_and_then_what_there_is(monkeypatch, tmp_path):
+def test_a_study_tells_now_and_then_what_there_is(monkeypatch, tmp_path):
     told, pages = [], [[], *[[tmp_path / "report.html"]] * 9]
-    clock, shown = [0.0], []
+    clock, shown, estimated = [0.0], [], []
 
     class Report:
+        findings = None
+
         def write(self, folder):
             assert folder == tmp_path
             shown.append(clock[0])
             return pages[len(shown) - 1]
 
-    monkeypatch.setattr("bywire.api.run_study.study_report", lambda _: Report())
+    def estimate(findings):
+        estimated.append(clock[0])
+        if len(estimated) == 1:
+            raise ParameterError("too few cases")
+        return []
+
+    for function in "study_report", "kept_study":
+        monkeypatch.setattr(f"bywire.api.run_study.{function}", lambda _: Report())
+    monkeypatch.setattr("bywire.server.study_so_far.so_far", estimate)
     monkeypatch.setattr(study, "tell", lambda **said: told.append(said))
     monkeypatch.setattr(study.time, "monotonic", lambda: clock[0])
-    reports = study._Reports(tmp_path, lambda *_: None)
+    progress = study._SoFar(tmp_path, lambda *_: None)
     for second in range(20):
         clock[0] = float(second)
-        reports("16 cases", second / 20)
-    reports("16 cases", 1.0)
+        progress("16 cases", second / 20)
+    progress("16 cases", 1.0)
     # From the first chunk on; one that has no page yet is none, which a page would show as missing.
     assert shown == [1.0, 7.0, 13.0, 19.0]
-    assert told == [{"report": True}] * 3
+    assert estimated == [float(second) for second in range(1, 20, 2)]
+    assert [said for said in told if "report" in said] == [{"report": True}] * 3
+    assert [said for said in told if "so_far" in said] == [{"so_far": []}] * 9
+
+
+def test_what_a_study_shows_so_far_is_counted_from_its_cases(tmp_path):
+    (tmp_path / "curve.toml").write_text('experiment = "stribeck"\nparameters = "dardanelli2010"\n')
+    (tmp_path / "study.toml").write_text(STUDY)
+    plan = read_study(tmp_path / "study.toml")
+    torques = np.append(np.linspace(0.2, 0.6, 63), np.nan)
+    columns = {"breakaway_apply": torques, "breakaway_release": np.full(64, np.nan),
+               CASE: np.arange(64), FAILURE: "", WARNINGS: "", "seal.T_pr": 1.0}  # fmt: skip
+    found = Findings(plan, pd.DataFrame(columns), ())
+    [row] = so_far(found)
+    met = int(np.sum(torques <= 0.5))
+    assert f"breakaway_apply <= 0.5 N*m with 90 %: {met} of 64 cases, probability 7" in row["text"]
+    assert sum(row["counts"]) == 63
+    assert max(row["counts"]) <= 3
+    assert row["ends"] == ["0.2 N·m", "0.6 N·m"]
+    [free] = so_far(Findings(replace(plan, demands=()), found.cases, ()))
+    assert free["text"].startswith("breakaway_apply: mean 0.4 N·m, standard deviation 0.1")
+    assert so_far(replace(found, cases=found.cases[:0])) == []
+    assert so_far(replace(found, plan=replace(plan, design="grid"))) == []
 
 
 def test_a_page_of_a_bench_simulates_nothing(monkeypatch):

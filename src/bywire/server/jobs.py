@@ -50,6 +50,7 @@ class Job:
     progress: tuple[str, float] = ("", 0.0)
     message: str = ""
     reports: int = 0
+    so_far: list[dict[str, Any]] = field(default_factory=list)
     result: Mapping[str, Any] = field(default_factory=dict)
     ended: threading.Event = field(default_factory=threading.Event)
     process: subprocess.Popen[bytes] | None = None
@@ -65,6 +66,7 @@ class Job:
             "number": self.number, "task": self.task.name, "title": self.task.title,
             "subject": self.task.said_of(self.asked), "state": self.state, "label": label,
             "share": share, "message": self.message, "reports": self.reports,
+            "so_far": self.so_far if self.state == "running" else [],
             "said": list(self.result.get("said", ())), "holds": self.result.get("holds"),
             "headline": self.result.get("headline", ""),
             "folder": place.named(self.out) if is_inside else "",
@@ -209,6 +211,9 @@ class Jobs:
         if "progress" in said:
             label, share = said["progress"]
             job.progress = (str(label), float(share))
+            return {}
+        if "so_far" in said:
+            job.so_far = said["so_far"]
             return {}
         if "report" in said:
             job.reports += 1

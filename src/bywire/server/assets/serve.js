@@ -3,7 +3,7 @@
 
 const place = (id) => document.getElementById(id);
 const states = new Map();
-let pause = 0, reports = 0;
+let pause = 0, reports = 0, shownSoFar = "[]";
 
 function complain(text) {
   place("message").textContent = text;
@@ -218,10 +218,42 @@ function update(job) {
   return item;
 }
 
+const NS = "http://www.w3.org/2000/svg";
+
+/* Bars of a histogram; what they say stands beside them. */
+function bars({ counts, ends }) {
+  const drawn = document.createElementNS(NS, "svg"), most = Math.max(...counts);
+  const set = (node, values) => Object.entries(values).forEach(([name, value]) => node.setAttribute(name, value));
+  set(drawn, { viewBox: `0 0 ${counts.length} 100`, preserveAspectRatio: "none", role: "img", "aria-label": `histogram from ${ends[0]} to ${ends[1]}` });
+  counts.forEach((count, k) => {
+    const bar = document.createElementNS(NS, "rect"), height = 100 * count / most;
+    set(bar, { x: k + 0.05, y: 100 - height, width: 0.9, height });
+    drawn.append(bar);
+  });
+  return drawn;
+}
+
+function showSoFar(rows) {
+  const said = JSON.stringify(rows);
+  if (said === shownSoFar) return;
+  shownSoFar = said;
+  place("study-so-far").replaceChildren(...rows.map((row) => {
+    const item = element("li");
+    item.append(element("p", row.text));
+    if (row.counts.length) {
+      const ends = element("p", "", { className: "ends" });
+      ends.append(...row.ends.map((end) => element("span", end)));
+      item.append(bars(row), ends);
+    }
+    return item;
+  }));
+}
+
 function showStudy(jobs) {
   const frame = place("study-report"), study = document.querySelector('[data-task="study"] [name="study"]');
   const job = jobs.find((each) => each.task === "study" && each.subject === study?.value);
   if (!frame || !job) return;
+  showSoFar(job.so_far);
   if (job.label) place("study-progress").textContent = `${job.label}: ${Math.round(100 * job.share)} %, ${job.state}`;
   const count = job.reports + (job.state === "done" && job.report ? 1 : 0);
   if (count !== reports) {

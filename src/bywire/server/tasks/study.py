@@ -6,6 +6,7 @@ import math
 import time
 import warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,36 +21,41 @@ from bywire.server.place import Place
 from bywire.server.task import Task
 from bywire.server.telling import tell
 
-_PAUSE = 5.0  # s of computing between two reports, and in a report's own time five times that
-_SHARE = 5.0
+_ESTIMATE, _REPORT = 1.0, 5.0  # s of computing between two of each at least
+_SHARE = 5.0  # and this many times what one took
 
 
-class _Reports:
-    """Writes what a study shows so far, now and then: between its chunks, which go on after it."""
+class _SoFar:
+    """Tells what a study shows so far, now and then: between its chunks, which go on after it."""
 
     def __init__(self, folder: Path, progress: Progress) -> None:
         self._folder, self._progress = folder, progress
-        self._next = -math.inf  # the first chunk is shown at once
+        self._pauses = {self._estimate: _ESTIMATE, self._report: _REPORT}
+        self._next = dict.fromkeys(self._pauses, -math.inf)  # the first chunk is shown at once
 
     def __call__(self, label: str, share: float) -> None:
         """Be the progress of the study."""
         self._progress(label, share)
-        if 0.0 < share < 1.0 and time.monotonic() > self._next:
+        for tell_it, pause in self._pauses.items():
             begin = time.monotonic()
-            self._write()
-            took = time.monotonic() - begin
-            self._next = time.monotonic() + max(_PAUSE, _SHARE * took)
-            self._progress(label, share)
+            if 0.0 < share < 1.0 and begin > self._next[tell_it]:
+                with warnings.catch_warnings(), suppress(BywireError):  # too few cases yet: the
+                    warnings.simplefilter("ignore")  # last report says what is wrong
+                    tell_it()
+                end = time.monotonic()
+                self._next[tell_it] = end + max(pause, _SHARE * (end - begin))
+                self._progress(label, share)
 
-    def _write(self) -> None:
+    def _estimate(self) -> None:
+        from bywire.api.run_study import kept_study
+        from bywire.server.study_so_far import so_far
+
+        tell(so_far=so_far(kept_study(self._folder).findings))
+
+    def _report(self) -> None:
         from bywire.api.run_study import study_report
 
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            try:
-                written = study_report(self._folder).write(self._folder)
-            except BywireError:  # too few cases yet; the last report says what is wrong
-                return
+        written = study_report(self._folder).write(self._folder)
         if any(path.suffix == REPORT for path in written):
             tell(report=True)
 
@@ -64,7 +70,7 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     from bywire.api.run_study import run_study
 
     return run_study(asked["study"], out, asked["set"], cases=asked["cases"],
-                     progress=_Reports(out, progress))  # fmt: skip
+                     progress=_SoFar(out, progress))  # fmt: skip
 
 
 TASK = Task(
