@@ -44,9 +44,7 @@ def list_command(
 def run(
     bench: BenchFile,
     set_: BenchChanges = None,
-    over: Annotated[
-        str, typer.Option(help=texts.RUN_OVER)
-    ] = "",
+    over: Annotated[str, typer.Option(help=texts.RUN_OVER)] = "",
     fault: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME[=VALUE][@ONSET]", help=texts.RUN_FAULT),

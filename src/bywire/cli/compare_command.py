@@ -24,9 +24,7 @@ def compare(
         ),
     ],
     set_: BenchChanges = None,
-    full: Annotated[
-        bool, typer.Option("--full", help=texts.COMPARE_FULL)
-    ] = False,
+    full: Annotated[bool, typer.Option("--full", help=texts.COMPARE_FULL)] = False,
     error_estimate: ErrorEstimate = True,
     out: OutFolder = None,
     json: JsonFlag = False,

@@ -81,9 +81,7 @@ def identify(
         list[str] | None,
         typer.Option("--option", metavar="KEY=VALUE", help=texts.METHOD_OPTION),
     ] = None,
-    starts: Annotated[
-        int | None, typer.Option(help=texts.STARTS, min=1)
-    ] = None,
+    starts: Annotated[int | None, typer.Option(help=texts.STARTS, min=1)] = None,
     seed: Annotated[int, typer.Option(help=texts.SEED, min=0)] = 1,
     synthetic: Annotated[
         int | None,

@@ -20,9 +20,7 @@ def life_command(
                        autocompletion=completion.LIVES),
     ],
     set_: BenchChanges = None,
-    check: Annotated[
-        int, typer.Option(help=texts.LIFE_CHECK, min=0)
-    ] = 0,
+    check: Annotated[int, typer.Option(help=texts.LIFE_CHECK, min=0)] = 0,
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:

@@ -35,19 +35,11 @@ def linearize_command(
     parameters: Parameters = "",
     at: At = "",
     set_: Changes = None,
-    locus: Annotated[
-        str, typer.Option(help=texts.LOCUS)
-    ] = "",
-    reduce: Annotated[
-        str, typer.Option(help=texts.REDUCE)
-    ] = "",
-    friction: Annotated[
-        str, typer.Option(help=texts.FRICTION)
-    ] = "",
+    locus: Annotated[str, typer.Option(help=texts.LOCUS)] = "",
+    reduce: Annotated[str, typer.Option(help=texts.REDUCE)] = "",
+    friction: Annotated[str, typer.Option(help=texts.FRICTION)] = "",
     speed: Annotated[str, typer.Option(help=texts.SPEED)] = "",
-    dither: Annotated[
-        bool, typer.Option("--dither", help=texts.DITHER)
-    ] = False,
+    dither: Annotated[bool, typer.Option("--dither", help=texts.DITHER)] = False,
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -70,12 +62,8 @@ def frequency_response_command(
     set_: Changes = None,
     frequencies: Frequencies = "",
     amplitudes: Annotated[str, typer.Option(help=texts.AMPLITUDES)] = "",
-    excitation: Annotated[
-        str, typer.Option(help=texts.EXCITATION)
-    ] = "sine",
-    over: Annotated[
-        str, typer.Option(help=texts.BANDWIDTH_OVER)
-    ] = "",
+    excitation: Annotated[str, typer.Option(help=texts.EXCITATION)] = "sine",
+    over: Annotated[str, typer.Option(help=texts.BANDWIDTH_OVER)] = "",
     error_estimate: ErrorEstimate = True,
     out: OutFolder = None,
     json: JsonFlag = False,
@@ -98,9 +86,7 @@ def agreement_command(
     at: At = "",
     set_: Changes = None,
     frequencies: Frequencies = "",
-    amplitudes: Annotated[
-        str, typer.Option(help=texts.AGREEMENT_AMPLITUDES)
-    ] = "",
+    amplitudes: Annotated[str, typer.Option(help=texts.AGREEMENT_AMPLITUDES)] = "",
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -121,9 +107,7 @@ def margins_command(
     parameters: Parameters = "",
     at: At = "",
     set_: Changes = None,
-    over: Annotated[
-        str, typer.Option(help=texts.MARGINS_OVER)
-    ] = "",
+    over: Annotated[str, typer.Option(help=texts.MARGINS_OVER)] = "",
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:

@@ -36,9 +36,7 @@ LoopName = Annotated[
         help=texts.LOOP, show_default=False, autocompletion=completion.LOOPS
     ),
 ]
-Parameters = Annotated[
-    str, typer.Option(help=texts.PARAMETERS, autocompletion=completion.SETS)
-]
+Parameters = Annotated[str, typer.Option(help=texts.PARAMETERS, autocompletion=completion.SETS)]
 At = Annotated[str, typer.Option("--at", help=texts.AT)]
 Changes = Annotated[
     list[str] | None,
@@ -50,19 +48,11 @@ BenchChanges = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help=texts.BENCH_CHANGES,
                  autocompletion=completion.changeable),
 ]
-ErrorEstimate = Annotated[
-    bool, typer.Option(help=texts.ERROR_ESTIMATE)
-]
-Frequencies = Annotated[
-    str, typer.Option(help=texts.FREQUENCIES)
-]
-Map = Annotated[
-    Path | None, typer.Option("--map", metavar="PATH", help=texts.MAP)
-]
+ErrorEstimate = Annotated[bool, typer.Option(help=texts.ERROR_ESTIMATE)]
+Frequencies = Annotated[str, typer.Option(help=texts.FREQUENCIES)]
+Map = Annotated[Path | None, typer.Option("--map", metavar="PATH", help=texts.MAP)]
 Inputs = Annotated[
     list[str] | None,
     typer.Option("--input", metavar="STIMULUS=SIGNAL", help=texts.INPUTS),
 ]
-CaseName = Annotated[
-    str, typer.Option("--case", help=texts.CASE)
-]
+CaseName = Annotated[str, typer.Option("--case", help=texts.CASE)]

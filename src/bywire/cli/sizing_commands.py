@@ -59,16 +59,12 @@ def design_command(
         list[str] | None,
         typer.Option(help=texts.DESIGN_OVER),
     ] = None,
-    amplitudes: Annotated[
-        str, typer.Option(help=texts.DESIGN_AMPLITUDES)
-    ] = "",
+    amplitudes: Annotated[str, typer.Option(help=texts.DESIGN_AMPLITUDES)] = "",
     schedule: Annotated[
         bool,
         typer.Option("--schedule", help=texts.DESIGN_SCHEDULE),
     ] = False,
-    linear_only: Annotated[
-        bool, typer.Option("--linear-only", help=texts.DESIGN_LINEAR)
-    ] = False,
+    linear_only: Annotated[bool, typer.Option("--linear-only", help=texts.DESIGN_LINEAR)] = False,
     free_derivative: Annotated[
         bool,
         typer.Option(

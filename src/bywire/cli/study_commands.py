@@ -38,9 +38,7 @@ study_app = typer.Typer(
 StudyFolder = Annotated[
     Path, typer.Argument(help="Folder of the study.", metavar="FOLDER", show_default=False)
 ]
-Cases = Annotated[
-    int | None, typer.Option(help=texts.STUDY_CASES, min=1)
-]
+Cases = Annotated[int | None, typer.Option(help=texts.STUDY_CASES, min=1)]
 Workers = Annotated[
     int | None, typer.Option(help="Processes; one a core by default, where it is worth it.", min=1)
 ]
