@@ -110,7 +110,8 @@ def test_what_is_not_there_and_what_is_not_taken(visit):
     assert visit("POST", "/api/jobs", "[", Content_Type="application/json").status == 400
     assert visit.begin("page", bench="curve.toml").status == 400
     assert visit.begin("run", bench="curve.toml", shell="x").status == 400
-    assert visit.begin("run", bench="").status == 400
+    missing = visit.begin("run", bench="")
+    assert (missing.status, missing.object["field"]) == (422, "bench")
     assert visit("GET", "/api/jobs/99").status == 404
     assert visit("POST", "/api/jobs/99/cancel", {}).status == 404
 

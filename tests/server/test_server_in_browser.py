@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import os
+import threading
 
 import pytest
 
+from bywire.server import routes
+from bywire.server.task_registry import tasks
+
 NEWEST = '() => document.querySelector("#jobs li")?.className'
+HERE = "() => document.activeElement.getAttribute('aria-label') ?? document.activeElement.tagName"
+RUN = "form[data-task=run] button:enabled"
+posix = pytest.mark.skipif(os.name != "posix", reason="processes of POSIX")
 
 
-@pytest.mark.skipif(os.name != "posix", reason="processes of POSIX")
+@posix
 @pytest.mark.usefixtures("standin")
 def test_forms_files_and_jobs(visit, chromium, tmp_path):
     page, noise, asked = chromium.new_page(), [], []
@@ -21,16 +28,14 @@ def test_forms_files_and_jobs(visit, chromium, tmp_path):
     assert page.url.endswith("/bench?of=curve.toml")
     # a run, to its end
     page.fill("#run-set", "motor.R_m=0.4 ohm")
-    page.press("form[data-task=run] button", "Enter")
+    page.press(RUN, "Enter")
     page.wait_for_function(f"() => ({NEWEST})() === 'held'")
     report = page.get_attribute("#jobs li a", "href")
     assert report.startswith("/file/results/run-curve-")
     # another, canceled
     page.fill("#run-set", "")
-    page.click("form[data-task=run] button")
-    page.wait_for_selector("#jobs progress")
-    page.focus("#jobs button")
-    page.keyboard.press("Enter")
+    page.click(RUN)
+    page.press("#jobs button", "Enter")
     page.wait_for_function(f"() => ({NEWEST})() === 'canceled'")
     # files: one that is taken, one that is too large, one of no format
     assert noise == []
@@ -59,4 +64,94 @@ def test_forms_files_and_jobs(visit, chromium, tmp_path):
     assert len(asked) == before + 1
     here = visit.server.link.partition("/?")[0]
     assert [url for url in asked if not url.startswith(here)] == []
+    page.close()
+
+
+@posix
+@pytest.mark.usefixtures("standin")
+def test_a_key_that_comes_before_the_script_sends_nothing(visit, chromium, monkeypatch):
+    """Pressed too early, a button would send its form as browsers do, which leads nowhere."""
+    asset, comes = routes._ROUTES["/assets/"]["GET"], threading.Event()
+
+    def late(service, request, rest):
+        assert rest != "serve.js" or comes.wait(20)
+        return asset(service, request, rest)
+
+    monkeypatch.setitem(routes._ROUTES["/assets/"], "GET", late)
+    page, noise = chromium.new_page(), []
+    page.on("console", lambda said: noise.append(said.text))
+    comes.set()
+    page.goto(visit.server.link)
+    comes.clear()
+    page.goto(f"{page.url}bench?of=curve.toml", wait_until="commit")
+    page.fill("#run-set", "motor.R_m=0.4 ohm")
+    before = len(visit.server.service.jobs.all())
+    page.press("form[data-task=run] button", "Enter")
+    comes.set()
+    page.press(RUN, "Enter")
+    page.wait_for_selector(f"#jobs li.held[data-number='{before + 1}']")
+    assert noise == []
+    assert page.evaluate(HERE) == "BUTTON"  # it keeps the focus while it sends
+    page.close()
+
+
+@posix
+@pytest.mark.usefixtures("standin")
+def test_who_is_in_the_list_of_jobs_stays_there(visit, chromium):
+    page = chromium.new_page()
+    page.goto(visit.server.link)
+    page.goto(f"{page.url}bench?of=curve.toml")
+    turn = visit.server.service.jobs._turn
+    for _ in range(2):
+        turn.acquire()
+    page.click(RUN)
+    item = page.locator("#jobs li", has=page.locator("progress"))
+    number = item.get_attribute("data-number")
+    page.wait_for_selector(f"#jobs li.waiting[data-number='{number}']")
+    page.focus("#jobs button")
+    for _ in range(2):
+        turn.release()
+    page.wait_for_selector(f"#jobs li.running[data-number='{number}']")
+    assert page.evaluate(HERE) == "cancel Run with Python of curve.toml"
+    other = visit.begin("run", bench="curve.toml", set="motor.R_m=0.4 ohm").object["number"]
+    page.wait_for_selector(f"#jobs li.held[data-number='{other}']")  # above it
+    assert page.evaluate(HERE) == "cancel Run with Python of curve.toml"
+    page.keyboard.press("Enter")
+    page.wait_for_selector(f"#jobs li.canceled[data-number='{number}']")
+    assert page.evaluate("() => document.activeElement.dataset.number") == number
+    page.close()
+
+
+@posix
+@pytest.mark.usefixtures("standin")
+def test_every_form_says_beside_its_field_what_does_not_fit(visit, chromium):
+    page = chromium.new_page(viewport={"width": 360, "height": 740})
+    page.goto(visit.server.link)
+    start = page.url
+    for name, task in tasks().items():
+        if not task.summary:
+            continue
+        page.goto(f"{start}task/{name}")
+        for folded in page.query_selector_all("form summary"):
+            folded.click()
+        for field in task.fields:  # each is found by what stands beside it
+            found = page.get_by_label(field.label, exact=True)
+            assert found.get_attribute("name") == field.name
+        width = page.evaluate("() => document.documentElement.scrollWidth")
+        assert width <= 360, f"{name} is {width} px wide"
+    page.goto(f"{start}task/faults?campaign=motorcycle")
+    page.fill("#faults-set", "motor.R_mm=1 ohm")
+    page.press("form button:enabled", "Enter")
+    said = page.wait_for_selector("#faults-set-wrong")
+    assert "did you mean 'motor.R_m'" in said.inner_text()
+    field = page.locator("#faults-set")
+    assert field.get_attribute("aria-invalid") == "true"
+    assert field.get_attribute("aria-describedby") == "faults-set-hint faults-set-wrong"
+    assert page.evaluate("() => document.activeElement.id") == "faults-set"
+    page.keyboard.press("End")
+    page.keyboard.press("Backspace")
+    assert page.query_selector(".wrong") is None
+    page.fill("#faults-set", "motor.R_m=1 ohm")
+    page.press("form button:enabled", "Enter")
+    page.wait_for_selector("#jobs li.held a[href='/file/results/faults-motorcycle-1/report.html']")
     page.close()

@@ -99,7 +99,8 @@ def test_canceled_and_killed_jobs_leave_nothing(visit):
     assert "SIGKILL" in ended["message"]
     assert visit.ended(numbers[2])["state"] == "canceled"
     assert set((visit.folder / "results").glob("*")) == before
-    done = visit.ended(visit.begin("run", bench="curve.toml", set="a=b").object["number"])
+    done = visit.begin("run", bench="curve.toml", set="motor.R_m=0.4 ohm").object
+    done = visit.ended(done["number"])
     assert (done["state"], done["share"], done["holds"]) == ("done", 0.5, True)
 
 

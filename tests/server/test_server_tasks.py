@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
 
 import bywire
-from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.core.errors import ParameterError
 from bywire.server.contents import Contents, contents
+from bywire.server.field import Field
 from bywire.server.jobs import Job, Jobs
 from bywire.server.live_pages import LivePages
 from bywire.server.pages.bench_page import bench_page
@@ -19,18 +23,44 @@ from bywire.server.pages.frame import form
 from bywire.server.place import Place
 from bywire.server.refusal import RefusedError
 from bywire.server.shown_bench import shown_bench
+from bywire.server.study_so_far import so_far
 from bywire.server.task_registry import tasks
 from bywire.server.tasks import study
+from bywire.studies.chunk import CASE, FAILURE, WARNINGS
+from bywire.studies.findings import Findings
+from bywire.studies.study_file import read_study
 
+STUDY = """
+bench = "curve.toml"
+[vary]
+"seal.T_pr" = "+-20 %"
+[design]
+kind = "monte-carlo"
+cases = 64
+[requirements]
+breakaway_apply = "<= 0.5 N*m with 90 %"
+"""
 FUNCTIONS = {
-    "page": "page.page", "run": "run.run", "replay": "replay.replay", "design": "design.design",
-    "identify": "identify.identify", "study": "run_study.run_study",
+    "agreement": "agreement.agreement", "compare": "compare.compare", "design": "design.design",
+    "faults": "run_faults.run_faults",
+    "frequency-response": "frequency_response.frequency_response",
+    "identify": "identify.identify", "life": "life.project_life",
+    "linearize": "linearize.linearize", "margins": "margins.margins", "page": "page.page",
+    "replay": "replay.replay", "reproduce": "reproduce.reproduce", "run": "run.run",
+    "size": "study.study", "study": "run_study.run_study",
 }  # fmt: skip
 FILLED = {
-    "lines": "a=1\n b=2 \n\n", "pairs": "a = 1\n", "names": "a\nb=2 bar", "flag": True,
-    "changes": "motor.R_m = 0.4 ohm\n", "text": "3", "file": "x.csv",
-    "files": "x.csv\n", "bench": "b.toml",
+    "lines": "a=1\n b=2 \n\n", "pairs": "a = 1\n", "names": "a\nb=2 bar",
+    "changes": "motor.R_m = 0.4 ohm\n", "text": "3", "whole": "3", "file": "x.csv",
+    "files": "x.csv\n", "thing": "b.toml", "things": "x.csv\nb.toml",
 }  # fmt: skip
+
+
+def filled(field: Field) -> Any:
+    """Return what a field does not hold by default."""
+    if field.kind == "flag":
+        return not field.default
+    return field.choices()[-1] if field.kind == "choice" else FILLED[field.kind]
 
 
 @pytest.fixture
@@ -55,32 +85,21 @@ def test_every_field_reaches_the_function(name, place, monkeypatch):
 
     monkeypatch.setattr(home, function, called)
     task = tasks()[name]
-    filled = {field.name: FILLED[field.kind] for field in task.fields}
-    task.compute(task.read(filled, place), place.root / "out", lambda *_: None)
-    empty = {field.name: filled[field.name] for field in task.fields if field.is_required}
-    task.compute(task.read(empty, place), place.root / "out", lambda *_: None)
-    full, least = ({k: repr(v) for k, v in given.items() if k != "progress"} for given in calls)
+    fields = [replace(field, fits=None) for field in task.fields]
+    task = replace(task, fields=tuple(fields))  # what they hold means nothing
+    every = {field.name: filled(field) for field in fields}
+    least = {field.name: every[field.name] for field in fields if field.is_required}
+
+    def given(form: dict[str, Any]) -> dict[str, str]:
+        task.compute(task.read(form, place), place.root / "out", lambda *_: None)
+        return {k: repr(v) for k, v in calls[-1].items() if k != "progress"}
+
+    by_default = given(least)
+    assert (given(every) != by_default) == (every != least)
     # A field that is filled in changes what the function is given, each one for itself.
-    for field in task.fields:
+    for field in fields:
         if not field.is_required:
-            task.compute(task.read({**empty, field.name: filled[field.name]}, place),
-                         place.root / "out", lambda *_: None)  # fmt: skip
-            given = {k: repr(v) for k, v in calls[-1].items() if k != "progress"}
-            assert given != least, field.name
-    assert full != least
-
-
-def test_forms_are_checked(place):
-    task = tasks()["identify"]
-    for given, text in ({"method": ""}, "Method"), ({"method": 1}, "a text"), (
-        {"method": "m", "measurements": "x.csv\ny.csv"}, "y.csv",
-    ):  # fmt: skip
-        with pytest.raises((ParameterError, RefusedError), match=text):
-            task.read(given, place)
-    with pytest.raises(UnknownNameError, match="metod"):
-        task.read({"metod": "x"}, place)
-    with pytest.raises(ParameterError, match="whole number"):
-        task.compute(task.read({"method": "m", "starts": "1.5"}, place), place.root, print)
+            assert given({**least, field.name: every[field.name]}) != by_default, field.name
 
 
 def test_forms_escape_what_the_folder_has(place):
@@ -120,24 +139,59 @@ def test_live_pages_are_made_again_when_their_bench_changes(place, tmp_path):
         pages.file("b.toml", "third")
 
 
-def test_a_study_reports_now_and_then_what_there_is(monkeypatch, tmp_path):
-    written, told = [], []
+def test_a_study_tells_now_and_then_what_there_is(monkeypatch, tmp_path):
+    told, pages = [], [[], *[[tmp_path / "report.html"]] * 9]
+    clock, shown, estimated = [0.0], [], []
 
     class Report:
-        def write(self, folder):
-            written.append(folder)
+        findings = None
 
-    monkeypatch.setattr("bywire.api.run_study.study_report", lambda _: Report())
+        def write(self, folder):
+            assert folder == tmp_path
+            shown.append(clock[0])
+            return pages[len(shown) - 1]
+
+    def estimate(findings):
+        estimated.append(clock[0])
+        if len(estimated) == 1:
+            raise ParameterError("too few cases")
+        return []
+
+    for function in "study_report", "kept_study":
+        monkeypatch.setattr(f"bywire.api.run_study.{function}", lambda _: Report())
+    monkeypatch.setattr("bywire.server.study_so_far.so_far", estimate)
     monkeypatch.setattr(study, "tell", lambda **said: told.append(said))
-    clock = [0.0]
     monkeypatch.setattr(study.time, "monotonic", lambda: clock[0])
-    reports = study._Reports(tmp_path, lambda *_: None)
+    progress = study._SoFar(tmp_path, lambda *_: None)
     for second in range(20):
         clock[0] = float(second)
-        reports("16 cases", second / 20)
-    reports("16 cases", 1.0)
-    assert len(written) == len(told) == 3
-    assert set(written) == {tmp_path}
+        progress("16 cases", second / 20)
+    progress("16 cases", 1.0)
+    # From the first chunk on; one that has no page yet is none, which a page would show as missing.
+    assert shown == [1.0, 7.0, 13.0, 19.0]
+    assert estimated == [float(second) for second in range(1, 20, 2)]
+    assert [said for said in told if "report" in said] == [{"report": True}] * 3
+    assert [said for said in told if "so_far" in said] == [{"so_far": []}] * 9
+
+
+def test_what_a_study_shows_so_far_is_counted_from_its_cases(tmp_path):
+    (tmp_path / "curve.toml").write_text('experiment = "stribeck"\nparameters = "dardanelli2010"\n')
+    (tmp_path / "study.toml").write_text(STUDY)
+    plan = read_study(tmp_path / "study.toml")
+    torques = np.append(np.linspace(0.2, 0.6, 63), np.nan)
+    columns = {"breakaway_apply": torques, "breakaway_release": np.full(64, np.nan),
+               CASE: np.arange(64), FAILURE: "", WARNINGS: "", "seal.T_pr": 1.0}  # fmt: skip
+    found = Findings(plan, pd.DataFrame(columns), ())
+    [row] = so_far(found)
+    met = int(np.sum(torques <= 0.5))
+    assert f"breakaway_apply <= 0.5 N*m with 90 %: {met} of 64 cases, probability 7" in row["text"]
+    assert sum(row["counts"]) == 63
+    assert max(row["counts"]) <= 3
+    assert row["ends"] == ["0.2 N·m", "0.6 N·m"]
+    [free] = so_far(Findings(replace(plan, demands=()), found.cases, ()))
+    assert free["text"].startswith("breakaway_apply: mean 0.4 N·m, standard deviation 0.1")
+    assert so_far(replace(found, cases=found.cases[:0])) == []
+    assert so_far(replace(found, plan=replace(plan, design="grid"))) == []
 
 
 def test_a_page_of_a_bench_simulates_nothing(monkeypatch):
@@ -159,6 +213,8 @@ def test_a_page_of_a_bench_simulates_nothing(monkeypatch):
 def test_a_folder_is_listed_by_what_its_files_are(place):
     (place.root / "study.toml").write_text('bench = "b.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n')
     (place.root / "map.toml").write_text("[columns]\n")
+    (place.root / "campaign.toml").write_text('bench = "b.toml"\n[vary]\n[[criteria]]\n')
+    (place.root / "life.toml").write_text('life = "wedge-pads"\n[vary]\n')
     (place.root / "broken.toml").write_text("[")
     result = place.root / "results" / "run-b-1"
     result.mkdir(parents=True)
@@ -168,6 +224,9 @@ def test_a_folder_is_listed_by_what_its_files_are(place):
     there = contents(place)
     assert there.benches == {"b.toml": "stribeck"}
     assert there.studies == {"study.toml": "b.toml"}
+    assert there.campaigns == {"campaign.toml": "b.toml"}
+    assert there.lives == {"life.toml": "wedge-pads"}
+    assert there.results == ["results/run-b-1"]
     assert there.maps == ["map.toml"]
     assert there.reports == ["results/run-b-1/report.html"]
     assert there.measurements == ["rig.nc", "x.csv"]

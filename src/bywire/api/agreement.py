@@ -165,7 +165,7 @@ def agreement(
     """
     case = loop_case(loop, parameters, at, overrides)
     unit = case.input_unit
-    small, large = _amplitudes(case, amplitudes, unit)
+    small, large = two_amplitudes(case, amplitudes)
     wanted = case.frequencies(frequencies, _POINTS)
     require_stable(case.loop.closed(case.par, case.value))
     compared = measuring.agreement(
@@ -174,11 +174,17 @@ def agreement(
     return LoopAgreement(case, compared, small, large, unit)
 
 
-def _amplitudes(case: LoopCase, text: str, unit: str) -> tuple[float, float]:
-    """Return the small and the large amplitude [SI]."""
+def two_amplitudes(case: LoopCase, text: str) -> tuple[float, float]:
+    """Return the small and the large amplitude [SI]; the loop's own where none are given.
+
+    Raises
+    ------
+    InputError
+        When these are not two, the small one first.
+    """
     if not text:
         return case.loop.amplitudes[0], case.loop.amplitudes[-1]
-    sizes = spread(text, unit, "amplitudes")
+    sizes = spread(text, case.input_unit, "amplitudes")
     if len(sizes) != 2 or not sizes[0] < sizes[1]:
         raise ParameterError(
             f"--amplitudes {text}: two are wanted, the small one first: everything off is "

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
+from typing import TypeVar
 
 from bywire.api.compared_run import ComparedRun, kept, ran
 from bywire.api.comparison import Comparison
@@ -20,6 +21,7 @@ from bywire.report.answer import use_case
 from bywire.report.wording import clean
 
 Comparable = Bench | Result | str | Path
+Run = TypeVar("Run", bound=Comparable)
 
 
 @use_case
@@ -63,16 +65,8 @@ def compare(
     KeyboardInterrupt
         When interrupted: half a run compares with nothing.
     """
-    if len(runs) < 2:
-        raise ParameterError(
-            f"{len(runs)} {'run is' if len(runs) == 1 else 'runs are'} nothing to compare: name "
-            "two at least, bench files, experiments or result folders"
-        )
+    require_comparable(runs, overrides)
     places = [k for k, each in enumerate(runs) if _is_folder(each)]
-    if overrides and all(isinstance(each, Result) or k in places for k, each in enumerate(runs)):
-        raise ParameterError(
-            f"{', '.join(overrides)} would have no effect: what is compared was run before"
-        )
     # Folders first: what they lack is said before anything is computed.
     read = {k: kept(Path(str(runs[k]))) for k in places}
     shown = [
@@ -80,6 +74,31 @@ def compare(
         for k, each in enumerate(runs)
     ]
     return Comparison(tuple(_told_apart(shown)), is_full)
+
+
+def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> list[Run]:
+    """Return those of some runs that are to be run yet, which changes have an effect on.
+
+    Raises
+    ------
+    ParameterError
+        For fewer than two runs, and changes without effect.
+    """
+    if len(runs) < 2:
+        raise ParameterError(
+            f"{len(runs)} {'run is' if len(runs) == 1 else 'runs are'} nothing to compare: name "
+            "two at least, bench files, experiments or result folders"
+        )
+    benches = [each for each in runs if not _was_run(each)]
+    if overrides and not benches:
+        raise ParameterError(
+            f"{', '.join(overrides)} would have no effect: what is compared was run before"
+        )
+    return benches
+
+
+def _was_run(source: Comparable) -> bool:
+    return isinstance(source, Result) or _is_folder(source)
 
 
 def _is_folder(source: Comparable) -> bool:

@@ -19,6 +19,7 @@ from bywire.core.typing import Array, silent
 from bywire.core.units import difference_unit
 from bywire.life.life_file import read_life
 from bywire.life.one_by_one import one_by_one
+from bywire.life.plan import LifePlan
 from bywire.life.projection import CONFIDENCE, Projection, projected
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
@@ -252,15 +253,26 @@ def project_life(
     """
     if not isinstance(source, (str, Path)):
         raise ParameterError(f"life = {quoted(source)}: name a life file, see docs/life.md")
-    if isinstance(check, bool) or not isinstance(check, int) or not 0 <= check <= _MOST:
-        raise ParameterError(f"check = {quoted(check)}: a whole number from 0 to {_MOST} is wanted")
     shown = progress or silent
     plan = read_life(source, overrides)
+    require_checkable(check, plan)
+    made = projected(plan, shown)
+    rounds = min(check, made.stops) // plan.count
+    return LifeResult(made, one_by_one(plan, rounds * plan.count, shown) if rounds else {})
+
+
+def require_checkable(check: int, plan: LifePlan) -> None:
+    """Refuse a number of stops, to be run one by one, that says nothing of a life.
+
+    Raises
+    ------
+    ParameterError
+        When it is none, too large, or below the stops that stand for the population.
+    """
+    if isinstance(check, bool) or not isinstance(check, int) or not 0 <= check <= _MOST:
+        raise ParameterError(f"check = {quoted(check)}: a whole number from 0 to {_MOST} is wanted")
     if 0 < check < plan.count:
         raise ParameterError(
             f"check = {check}: fewer than the {plan.count} stops that stand for the population say "
             "nothing of it; give as many at least"
         )
-    made = projected(plan, shown)
-    rounds = min(check, made.stops) // plan.count
-    return LifeResult(made, one_by_one(plan, rounds * plan.count, shown) if rounds else {})

@@ -20,7 +20,14 @@ from bywire.analysis.loop import LOOPS
 from bywire.analysis.periodic.averaged_map import PeriodicModel, dithered_loop
 from bywire.analysis.reduction.reduce import Reduced
 from bywire.api import linear_texts as texts
-from bywire.api.linearize_plant import LinearizedPlant, PlantLocus, linearize_plant, plant_locus
+from bywire.api.linearize_plant import (
+    LinearizedPlant,
+    PlantCase,
+    PlantLocus,
+    linearize_plant,
+    plant_case,
+    plant_locus,
+)
 from bywire.api.loop_case import LoopCase, loop_case, over_range
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, of_difference
 from bywire.core.catalog import main_set, parameters
@@ -239,15 +246,7 @@ def linearize(
         if locus:
             return plant_locus(name, parameters, at, overrides, friction, speed, locus)
         return linearize_plant(name, parameters, at, overrides, friction, speed, reduce)
-    if name not in LOOPS.all():
-        raise LOOPS.unknown(name, PLANTS)
-    for option, given in (("--friction", friction), ("--speed", speed)):
-        if given:
-            raise ParameterError(
-                f"{option} is for plants ({', '.join(PLANTS.all())}): controllers are linearized "
-                "without dry friction; leave it out"
-            )
-    case = loop_case(name, parameters, at, overrides)
+    case = _loop_case(name, parameters, at, overrides, friction, speed)
     model = case.loop.closed(case.par, case.value)
     dithered = _dithered(case) if dither else None
     return LinearizedLoop(
@@ -258,6 +257,40 @@ def linearize(
         dithered,
         math.nan if dithered is None else _gain_error(case, dithered),
     )
+
+
+def linear_case(
+    name: str, parameters: str, at: str, overrides: Mapping[str, Any], friction: str, speed: str
+) -> LoopCase | PlantCase:
+    """Return the loop or the plant that is linearized, with its parameters and operating point.
+
+    Parameters
+    ----------
+    name, parameters, at, overrides, friction, speed
+        As of `linearize`.
+
+    Raises
+    ------
+    InputError
+        As `linearize`.
+    """
+    if name in PLANTS.all():
+        return plant_case(name, parameters, at, overrides, friction, speed)
+    return _loop_case(name, parameters, at, overrides, friction, speed)
+
+
+def _loop_case(
+    name: str, parameters: str, at: str, overrides: Mapping[str, Any], friction: str, speed: str
+) -> LoopCase:
+    if name not in LOOPS.all():
+        raise LOOPS.unknown(name, PLANTS)
+    for option, given in (("--friction", friction), ("--speed", speed)):
+        if given:
+            raise ParameterError(
+                f"{option} is for plants ({', '.join(PLANTS.all())}): controllers are linearized "
+                "without dry friction; leave it out"
+            )
+    return loop_case(name, parameters, at, overrides)
 
 
 def closed_bandwidth(model: LinearModel) -> float:

@@ -261,8 +261,7 @@ def run(
         bench = bench_file.read(bench, overrides)
     elif overrides:
         bench = bench.with_overrides(overrides)
-    if faults:
-        bench = replace(bench, faults=(*bench.faults, *map(from_text, faults)))
+    bench = faulty(bench, faults)
     if animate:
         from bywire.api.animation import require_scene
 
@@ -274,6 +273,19 @@ def run(
     result = running.run(bench, progress, engine, estimate_error)
     given = {each.name: getattr(result, each.name) for each in fields(result)}
     return BenchResult(**given, animated=animate)
+
+
+def faulty(bench: Bench, faults: Sequence[str]) -> Bench:
+    """Return a bench with further faults, as ``--fault`` takes them.
+
+    Raises
+    ------
+    InputError
+        For a text that says none.
+    """
+    if not faults:
+        return bench
+    return replace(bench, faults=(*bench.faults, *map(from_text, faults)))
 
 
 def _remark(verdict: Verdict) -> str:

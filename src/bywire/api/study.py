@@ -179,11 +179,24 @@ def study(
     InputError
         For names that are unknown, values out of range, and changes without effect.
     """
+    definition, named, par, options = asked_study(name, parameters, overrides)
+    findings = definition.compute(par, options, progress or silent)
+    return StudyResult(definition, named, par, options, findings)
+
+
+def asked_study(
+    name: str, parameters: str, overrides: Mapping[str, Any]
+) -> tuple[Study, str, ParameterSet, ParameterSet]:
+    """Return a study, the name of its parameter set, and parameters and options as changed.
+
+    Raises
+    ------
+    InputError
+        As `study`.
+    """
     definition = STUDIES.find(name)
     cited = set_for(f"study {definition.name!r}", definition.assembly, parameters)
-    par, options = _changed(definition, cited.parameters(), overrides)
-    findings = definition.compute(par, options, progress or silent)
-    return StudyResult(definition, cited.name, par, options, findings)
+    return definition, cited.name, *_changed(definition, cited.parameters(), overrides)
 
 
 def _changed(

@@ -61,7 +61,7 @@ def read_result(folder: Path) -> FolderResult:
     FileError
         When it is no result folder, is not finished, or something in it is damaged or missing.
     """
-    record = _record(folder)
+    record = record_of(folder)
     try:
         status = str(record["status"])
         if status == "interrupted":
@@ -98,7 +98,14 @@ def verdict_record(verdict: Verdict) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _record(folder: Path) -> dict[str, Any]:
+def record_of(folder: Path) -> dict[str, Any]:
+    """Return what a result folder says it holds, without its recordings.
+
+    Raises
+    ------
+    FileError
+        When it is no result folder, is not finished, or its record is damaged.
+    """
     path = folder / RECORD
     if not folder.is_dir():
         raise FileError(f"{folder} is no folder: check the path")

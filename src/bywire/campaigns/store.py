@@ -63,6 +63,16 @@ class CampaignStore:
                 "folder with --out, or remove it"
             )
 
+    def holds(self, plan: CampaignPlan) -> bool:
+        """Return whether it is the folder of a campaign already."""
+        if self.folder is None:
+            return False
+        try:
+            known = json.loads((self.folder / RECORD).read_text(encoding="utf-8"))
+            return bool(known["digest"] == plan.digest)
+        except (OSError, ValueError, KeyError, TypeError):
+            return False
+
     def kept(self, number: int) -> dict[str, Any] | None:
         """Return the outcome of a fault; None where there is none, or its file is damaged."""
         if self.folder is None:

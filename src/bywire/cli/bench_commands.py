@@ -16,6 +16,7 @@ from bywire.cli.options import (
     changes,
 )
 from bywire.cli.show import show
+from bywire.core import option_texts as texts
 
 
 def list_command(
@@ -43,12 +44,10 @@ def list_command(
 def run(
     bench: BenchFile,
     set_: BenchChanges = None,
-    over: Annotated[
-        str, typer.Option(help="Run for each value, e.g. motor.R_m=0.2ohm:0.6ohm:9.")
-    ] = "",
+    over: Annotated[str, typer.Option(help=texts.RUN_OVER)] = "",
     fault: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME[=VALUE][@ONSET]", help="What fails, see 'bywire list faults'."),
+        typer.Option(metavar="NAME[=VALUE][@ONSET]", help=texts.RUN_FAULT),
     ] = None,
     engine: Annotated[
         str, typer.Option(help="What computes, e.g. sil: the ECU's compiled C in the loop.")
@@ -77,7 +76,7 @@ def run(
 
 
 def reproduce_command(
-    source: Annotated[str, typer.Argument(help="Published source, e.g. dardanelli2010.")],
+    source: Annotated[str, typer.Argument(help=texts.SOURCE)],
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:

@@ -10,6 +10,7 @@ import typer
 from bywire.cli import completion
 from bywire.cli.options import BenchChanges, ErrorEstimate, JsonFlag, OutFolder, changes
 from bywire.cli.show import show
+from bywire.core import option_texts as texts
 
 
 def compare(
@@ -17,15 +18,13 @@ def compare(
         list[Path],
         typer.Argument(
             metavar="RUN RUN...",
-            help="Result folders of run --out, bench files, or experiments.",
+            help=texts.COMPARE_RUNS,
             show_default=False,
             autocompletion=completion.BENCHES,
         ),
     ],
     set_: BenchChanges = None,
-    full: Annotated[
-        bool, typer.Option("--full", help="Show settings and key figures that are the same, too.")
-    ] = False,
+    full: Annotated[bool, typer.Option("--full", help=texts.COMPARE_FULL)] = False,
     error_estimate: ErrorEstimate = True,
     out: OutFolder = None,
     json: JsonFlag = False,

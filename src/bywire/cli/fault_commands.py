@@ -10,12 +10,13 @@ import typer
 from bywire.cli import completion
 from bywire.cli.options import BenchChanges, JsonFlag, OutFolder, changes
 from bywire.cli.show import show
+from bywire.core import option_texts as texts
 
 
 def faults_command(
     campaign: Annotated[
         str,
-        typer.Argument(help="Campaign file (TOML), or a campaign's name, e.g. motorcycle.",
+        typer.Argument(help=texts.CAMPAIGN,
                        show_default=False, autocompletion=completion.CAMPAIGNS),
     ],
     set_: BenchChanges = None,

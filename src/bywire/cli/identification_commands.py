@@ -22,6 +22,7 @@ from bywire.cli.options import (
     named,
 )
 from bywire.cli.show import show
+from bywire.core import option_texts as texts
 from bywire.core.errors import ParameterError
 
 # What methods of any bench take.
@@ -29,36 +30,36 @@ _ANY_BENCH = "Methods of any bench"
 TestBench = Annotated[
     Path | None,
     typer.Option(
-        "--bench", help="Bench file (TOML), or an experiment's name.", rich_help_panel=_ANY_BENCH
+        "--bench", help=texts.TEST_BENCH, rich_help_panel=_ANY_BENCH
     ),
 ]
 NoisyOutputs = Annotated[
     list[str] | None,
     typer.Option("--output", metavar="SIGNAL[=NOISE]", rich_help_panel=_ANY_BENCH,
-                 help="Output of the model that is measured, e.g. 'p_mc=0.02 bar'."),
+                 help=texts.NOISY_OUTPUT),
 ]  # fmt: skip
 Unknowns = Annotated[
     list[str] | None,
     typer.Option("--unknown", metavar="NAME[=LOW..HIGH]", rich_help_panel=_ANY_BENCH,
-                 help="What is searched, e.g. 'motor.R_m=0.1..1 ohm', offset.i_meas."),
+                 help=texts.UNKNOWN),
 ]  # fmt: skip
 Priors = Annotated[
     list[str] | None,
     typer.Option("--prior", metavar="NAME=VALUE+-DEV", rich_help_panel=_ANY_BENCH,
-                 help="What is known of it, e.g. 'motor.R_m=0.35 +- 0.02 ohm'."),
+                 help=texts.PRIOR),
 ]  # fmt: skip
 States = Annotated[
     list[str] | None,
     typer.Option("--estimate-start", metavar="STATE", rich_help_panel=_ANY_BENCH,
-                 help="State whose initial value is unknown, e.g. omega."),
+                 help=texts.START),
 ]  # fmt: skip
 Loss = Annotated[
     str,
-    typer.Option(rich_help_panel=_ANY_BENCH, help="linear, soft_l1, huber or cauchy."),
+    typer.Option(rich_help_panel=_ANY_BENCH, help=texts.LOSS),
 ]
 Holdout = Annotated[
     Path | None,
-    typer.Option(rich_help_panel=_ANY_BENCH, help="Measurement that is not fitted: validation."),
+    typer.Option(rich_help_panel=_ANY_BENCH, help=texts.HOLDOUT),
 ]
 
 
@@ -66,27 +67,25 @@ def identify(
     method: Annotated[
         str,
         typer.Argument(
-            help="Method, see 'bywire list'.", show_default=False, autocompletion=completion.METHODS
+            help=texts.METHOD, show_default=False, autocompletion=completion.METHODS
         ),
     ],
     measurements: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[MEASUREMENT]...", help="Measurement files.", show_default=False),
+        typer.Argument(metavar="[MEASUREMENT]...", help=texts.MEASUREMENTS, show_default=False),
     ] = None,
     map_: Map = None,
     parameters: Parameters = "",
     set_: Changes = None,
     option: Annotated[
         list[str] | None,
-        typer.Option("--option", metavar="KEY=VALUE", help="Its options: 'bywire list METHOD'."),
+        typer.Option("--option", metavar="KEY=VALUE", help=texts.METHOD_OPTION),
     ] = None,
-    starts: Annotated[
-        int | None, typer.Option(help="Starts of the search: 16; with --study 1.", min=1)
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the starts, or the study's first.", min=0)] = 1,
+    starts: Annotated[int | None, typer.Option(help=texts.STARTS, min=1)] = None,
+    seed: Annotated[int, typer.Option(help=texts.SEED, min=0)] = 1,
     synthetic: Annotated[
         int | None,
-        typer.Option(metavar="SEED", help="Identify a simulated measurement instead.", min=0),
+        typer.Option(metavar="SEED", help=texts.SYNTHETIC, min=0),
     ] = None,
     study: Annotated[
         int | None,
@@ -148,26 +147,26 @@ def _require_no_measurement(
 
 
 def replay(
-    measurement: Annotated[Path, typer.Argument(help="Measurement file.", show_default=False)],
-    bench: Annotated[Path, typer.Option(help="Bench file (TOML), or an experiment's name.")],
+    measurement: Annotated[Path, typer.Argument(help=texts.MEASUREMENT, show_default=False)],
+    bench: Annotated[Path, typer.Option(help=texts.TEST_BENCH)],
     map_: Map = None,
     set_: BenchChanges = None,
     input_: Inputs = None,
     output: Annotated[
         list[str] | None,
-        typer.Option("--output", metavar="SIGNAL", help="What is compared; by default all."),
+        typer.Option("--output", metavar="SIGNAL", help=texts.REPLAY_OUTPUT),
     ] = None,
     case: CaseName = "",
     tolerance: Annotated[
         list[str] | None,
-        typer.Option(help="Tolerance, e.g. 'nrmse <= 5 %', 'p_mc.max_error <= 2 bar'."),
+        typer.Option(help=texts.TOLERANCE),
     ] = None,
     segments: Annotated[
         str, typer.Option(help="Judge stretches: auto (steps and holds), or a TOML file.")
     ] = "",
     track: Annotated[
         list[str] | None,
-        typer.Option(help="Track a drifting parameter as well, e.g. mu_B."),
+        typer.Option(help=texts.TRACK),
     ] = None,
     error_estimate: ErrorEstimate = True,
     out: OutFolder = None,

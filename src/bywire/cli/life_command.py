@@ -10,18 +10,17 @@ import typer
 from bywire.cli import completion
 from bywire.cli.options import BenchChanges, JsonFlag, OutFolder, changes
 from bywire.cli.show import show
+from bywire.core import option_texts as texts
 
 
 def life_command(
     life: Annotated[
         Path,
-        typer.Argument(help="Life file (TOML), or the name of a life.", show_default=False,
+        typer.Argument(help=texts.LIFE, show_default=False,
                        autocompletion=completion.LIVES),
     ],
     set_: BenchChanges = None,
-    check: Annotated[
-        int, typer.Option(help="Stops to run one by one as well, to check the projection.", min=0)
-    ] = 0,
+    check: Annotated[int, typer.Option(help=texts.LIFE_CHECK, min=0)] = 0,
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:

@@ -19,11 +19,12 @@ from bywire.cli.options import (
     changes,
 )
 from bywire.cli.show import show
+from bywire.core import option_texts as texts
 
 LoopOrPlant = Annotated[
     str,
     typer.Argument(
-        help="Loop or plant, see 'bywire list'.", show_default=False,
+        help=texts.LOOP_OR_PLANT, show_default=False,
         autocompletion=completion.LOOPS_OR_PLANTS,
     ),
 ]  # fmt: skip
@@ -34,19 +35,11 @@ def linearize_command(
     parameters: Parameters = "",
     at: At = "",
     set_: Changes = None,
-    locus: Annotated[
-        str, typer.Option(help="Poles over a range, e.g. motor.R_m=0.1ohm:1ohm:71.")
-    ] = "",
-    reduce: Annotated[
-        str, typer.Option(help="Reduce it to an order, e.g. 4, or to a band, e.g. '150 Hz'.")
-    ] = "",
-    friction: Annotated[
-        str, typer.Option(help="Of a plant: removed (as of loops), sliding, or stuck.")
-    ] = "",
-    speed: Annotated[str, typer.Option(help="Motor speed of sliding, e.g. '5 rad/s'.")] = "",
-    dither: Annotated[
-        bool, typer.Option("--dither", help="Also about its motion under dither, friction on.")
-    ] = False,
+    locus: Annotated[str, typer.Option(help=texts.LOCUS)] = "",
+    reduce: Annotated[str, typer.Option(help=texts.REDUCE)] = "",
+    friction: Annotated[str, typer.Option(help=texts.FRICTION)] = "",
+    speed: Annotated[str, typer.Option(help=texts.SPEED)] = "",
+    dither: Annotated[bool, typer.Option("--dither", help=texts.DITHER)] = False,
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -68,13 +61,9 @@ def frequency_response_command(
     at: At = "",
     set_: Changes = None,
     frequencies: Frequencies = "",
-    amplitudes: Annotated[str, typer.Option(help="Amplitudes, e.g. '0.5 rad, 1 rad'.")] = "",
-    excitation: Annotated[
-        str, typer.Option(help="sine (one frequency at a time), multisine, or chirp.")
-    ] = "sine",
-    over: Annotated[
-        str, typer.Option(help="Range, for bandwidths, e.g. motor.R_m=0.2ohm:0.6ohm:5.")
-    ] = "",
+    amplitudes: Annotated[str, typer.Option(help=texts.AMPLITUDES)] = "",
+    excitation: Annotated[str, typer.Option(help=texts.EXCITATION)] = "sine",
+    over: Annotated[str, typer.Option(help=texts.BANDWIDTH_OVER)] = "",
     error_estimate: ErrorEstimate = True,
     out: OutFolder = None,
     json: JsonFlag = False,
@@ -97,9 +86,7 @@ def agreement_command(
     at: At = "",
     set_: Changes = None,
     frequencies: Frequencies = "",
-    amplitudes: Annotated[
-        str, typer.Option(help="A small and a large amplitude, e.g. '0.001 rad, 1 rad'.")
-    ] = "",
+    amplitudes: Annotated[str, typer.Option(help=texts.AGREEMENT_AMPLITUDES)] = "",
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -120,9 +107,7 @@ def margins_command(
     parameters: Parameters = "",
     at: At = "",
     set_: Changes = None,
-    over: Annotated[
-        str, typer.Option(help="Range, e.g. motor.R_m=0.2ohm:0.6ohm:9 or at=5bar:35bar:7.")
-    ] = "",
+    over: Annotated[str, typer.Option(help=texts.MARGINS_OVER)] = "",
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:

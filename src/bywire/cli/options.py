@@ -9,6 +9,7 @@ import typer
 
 from bywire.cli import completion
 from bywire.cli.output_folder import folder
+from bywire.core import option_texts as texts
 from bywire.core.pairs import changes as changes
 from bywire.core.pairs import named as named
 
@@ -32,36 +33,26 @@ BenchFile = Annotated[
 LoopName = Annotated[
     str,
     typer.Argument(
-        help="Loop, see 'bywire list'.", show_default=False, autocompletion=completion.LOOPS
+        help=texts.LOOP, show_default=False, autocompletion=completion.LOOPS
     ),
 ]
-Parameters = Annotated[
-    str, typer.Option(help="Parameter set, e.g. roberts2003.", autocompletion=completion.SETS)
-]
-At = Annotated[str, typer.Option("--at", help="Operating point, e.g. '20 bar'.")]
+Parameters = Annotated[str, typer.Option(help=texts.PARAMETERS, autocompletion=completion.SETS)]
+At = Annotated[str, typer.Option("--at", help=texts.AT)]
 Changes = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter, e.g. motor.R_m=0.4ohm.",
+    typer.Option("--set", metavar="KEY=VALUE", help=texts.CHANGES,
                  autocompletion=completion.changeable),
 ]
 BenchChanges = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change the bench, e.g. motor.R_m=0.4ohm.",
+    typer.Option("--set", metavar="KEY=VALUE", help=texts.BENCH_CHANGES,
                  autocompletion=completion.changeable),
 ]
-ErrorEstimate = Annotated[
-    bool, typer.Option(help="Run in other steps too, for the error of all figures.")
-]
-Frequencies = Annotated[
-    str, typer.Option(help="Frequencies, e.g. '1 Hz:150 Hz:20', or a list.")
-]
-Map = Annotated[
-    Path | None, typer.Option("--map", metavar="PATH", help="What the columns mean (TOML).")
-]
+ErrorEstimate = Annotated[bool, typer.Option(help=texts.ERROR_ESTIMATE)]
+Frequencies = Annotated[str, typer.Option(help=texts.FREQUENCIES)]
+Map = Annotated[Path | None, typer.Option("--map", metavar="PATH", help=texts.MAP)]
 Inputs = Annotated[
     list[str] | None,
-    typer.Option("--input", metavar="STIMULUS=SIGNAL", help="What drives the model."),
+    typer.Option("--input", metavar="STIMULUS=SIGNAL", help=texts.INPUTS),
 ]
-CaseName = Annotated[
-    str, typer.Option("--case", help="Run of the experiment; the first by default.")
-]
+CaseName = Annotated[str, typer.Option("--case", help=texts.CASE)]

@@ -18,19 +18,20 @@ from bywire.cli.options import (
     changes,
 )
 from bywire.cli.show import show
+from bywire.core import option_texts as texts
 
 
 def study_command(
     name: Annotated[
         str,
-        typer.Argument(help="Sizing study, see 'bywire list'.", show_default=False,
+        typer.Argument(help=texts.SIZING, show_default=False,
                        autocompletion=completion.SIZING),
     ],
     parameters: Parameters = "",
     set_: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="KEY=VALUE", help="Change an option or a parameter, e.g. t_90=120ms."
+            "--set", metavar="KEY=VALUE", help=texts.SIZING_CHANGES
         ),
     ] = None,
     out: OutFolder = None,
@@ -49,25 +50,21 @@ def design_command(
     set_: Changes = None,
     require: Annotated[
         list[str] | None,
-        typer.Option(help="Requirement, e.g. 'bandwidth >= 10 Hz'; as often as needed."),
+        typer.Option(help=texts.DESIGN_REQUIRE),
     ] = None,
     requirements: Annotated[
         Path | None, typer.Option(help="TOML file with a section 'requirements'.")
     ] = None,
     over: Annotated[
         list[str] | None,
-        typer.Option(help="Range to serve too, e.g. motor.R_m=0.2ohm:0.6ohm:5 or at=5bar:35bar:7."),
+        typer.Option(help=texts.DESIGN_OVER),
     ] = None,
-    amplitudes: Annotated[
-        str, typer.Option(help="Amplitudes of the sines on the bench, e.g. '1 bar, 3 bar'.")
-    ] = "",
+    amplitudes: Annotated[str, typer.Option(help=texts.DESIGN_AMPLITUDES)] = "",
     schedule: Annotated[
         bool,
-        typer.Option("--schedule", help="Gains by region; --at then lists points of all regions."),
+        typer.Option("--schedule", help=texts.DESIGN_SCHEDULE),
     ] = False,
-    linear_only: Annotated[
-        bool, typer.Option("--linear-only", help="Leave out the nonlinear bench.")
-    ] = False,
+    linear_only: Annotated[bool, typer.Option("--linear-only", help=texts.DESIGN_LINEAR)] = False,
     free_derivative: Annotated[
         bool,
         typer.Option(

@@ -11,6 +11,7 @@ from typer.core import TyperGroup
 from bywire.cli.options import BenchChanges, JsonFlag, changes
 from bywire.cli.output_folder import folder
 from bywire.cli.show import show
+from bywire.core import option_texts as texts
 from bywire.core.errors import ParameterError
 
 _SIZE = "size"
@@ -37,9 +38,7 @@ study_app = typer.Typer(
 StudyFolder = Annotated[
     Path, typer.Argument(help="Folder of the study.", metavar="FOLDER", show_default=False)
 ]
-Cases = Annotated[
-    int | None, typer.Option(help="Cases in place of the file's; more extend the study.", min=1)
-]
+Cases = Annotated[int | None, typer.Option(help=texts.STUDY_CASES, min=1)]
 Workers = Annotated[
     int | None, typer.Option(help="Processes; one a core by default, where it is worth it.", min=1)
 ]
@@ -52,7 +51,7 @@ EngineName = Annotated[str, typer.Option("--engine", help="What computes, e.g. c
 @study_app.command("run")
 def study_run_command(
     study: Annotated[
-        Path, typer.Argument(help="Study file (TOML).", metavar="FILE", show_default=False)
+        Path, typer.Argument(help=texts.STUDY_FILE, metavar="FILE", show_default=False)
     ],
     out: Annotated[
         Path | None,

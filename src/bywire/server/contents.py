@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from bywire.bench.result_folder import RECORD
 from bywire.core.errors import FileError
 from bywire.data.format_registry import FORMATS
 from bywire.data.toml_file import LARGEST, read_toml
@@ -15,6 +16,7 @@ from bywire.server.place import Place
 
 _DEEP, _MOST = 4, 5000  # folders in folders, and files, that are looked at
 _LEFT_OUT = ("node_modules", "__pycache__", "venv", "chunks")
+_OF_CAMPAIGNS = ("campaign", "criteria")  # what campaign files have and study files do not
 REPORT = ".html"
 
 
@@ -28,6 +30,12 @@ class Contents:
         Bench files, with their experiment.
     studies
         Study files, with their bench.
+    campaigns
+        Files of fault campaigns, with their bench.
+    lives
+        Life files, with their life.
+    results
+        Folders that runs of benches were written to, the latest first.
     reports
         Pages of results, the latest first.
     measurements
@@ -40,6 +48,9 @@ class Contents:
 
     benches: dict[str, str] = field(default_factory=dict)
     studies: dict[str, str] = field(default_factory=dict)
+    campaigns: dict[str, str] = field(default_factory=dict)
+    lives: dict[str, str] = field(default_factory=dict)
+    results: list[str] = field(default_factory=list)
     reports: list[str] = field(default_factory=list)
     measurements: list[str] = field(default_factory=list)
     maps: list[str] = field(default_factory=list)
@@ -55,7 +66,8 @@ def endings() -> tuple[str, ...]:
 
 def contents(place: Place) -> Contents:
     """Return what a folder has; hidden files and links that lead out are no part of it."""
-    there, ages, known = Contents(), dict[str, float](), endings()
+    there, known = Contents(), endings()
+    ages, results = dict[str, float](), dict[str, float]()
     for count, path in enumerate(_files(place.root, _DEEP)):
         if count >= _MOST:
             there.is_whole = False
@@ -65,9 +77,12 @@ def contents(place: Place) -> Contents:
             _note_toml(there, path, name)
         elif suffix == REPORT:
             ages[name] = path.stat().st_mtime
+        elif path.name == RECORD and path.parent != place.root:
+            results[place.named(path.parent)] = path.stat().st_mtime
         elif suffix in known and not _is_result(path):
             there.measurements.append(name)
     there.reports = sorted(ages, key=lambda name: -ages[name])
+    there.results = sorted(results, key=lambda name: -results[name])
     return there
 
 
@@ -99,9 +114,14 @@ def _note_toml(there: Contents, path: Path, name: str) -> None:
         content: dict[str, Any] = read_toml(path, "file")
     except (FileError, OSError):
         return
-    if isinstance(content.get("experiment"), str):
-        there.benches[name] = content["experiment"]
-    elif isinstance(content.get("vary"), dict) and isinstance(content.get("bench"), str):
-        there.studies[name] = content["bench"]
+    for key, kind in {"experiment": there.benches, "life": there.lives}.items():
+        if isinstance(content.get(key), str):
+            kind[name] = content[key]
+            return
+    varied, bench = content.get("vary"), content.get("bench")
+    if isinstance(bench, str) and any(key in content for key in _OF_CAMPAIGNS):
+        there.campaigns[name] = bench
+    elif isinstance(bench, str) and isinstance(varied, dict):
+        there.studies[name] = bench
     else:
         there.maps.append(name)

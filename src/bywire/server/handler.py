@@ -58,7 +58,7 @@ class Handler(BaseHTTPRequestHandler):
         try:
             return self._answered()
         except RefusedError as refused:
-            return self._refused(refused.status, refused.text)
+            return self._refused(refused.status, refused.text, refused.field)
         except BywireError as error:
             return self._refused(400, str(error))
         except (ConnectionError, TimeoutError):
@@ -113,9 +113,9 @@ class Handler(BaseHTTPRequestHandler):
     def _body(self) -> _Body:
         return _Body(self)
 
-    def _refused(self, status: int, text: str) -> Reply:
+    def _refused(self, status: int, text: str, field: str = "") -> Reply:
         if self.path.startswith("/api/"):
-            body = json.dumps({"error": text}).encode()
+            body = json.dumps({"error": text, **({"field": field} if field else {})}).encode()
             return Reply(body, "application/json", status, REFUSAL)
         return Reply(refusal_page(status, text).encode(), status=status, policy=REFUSAL)
 

@@ -1,9 +1,9 @@
 """What runs in the process of a job: one call of a public function, told line by line.
 
 The order comes as a line of JSON on standard input: ``{task, asked, folder, out, systems}``.
-Answers go as such lines to standard output: ``{progress: [label, share]}``, ``{report: true}``, and
-at last one of ``{done}``, ``{error}`` and ``{canceled}``. When the server is gone, its end of
-standard input is closed, and this process ends with all that it started.
+Answers go as such lines to standard output: ``{progress: [label, share]}``, ``{report: true}``,
+``{so_far}`` of a study, and at last one of ``{done}``, ``{error}`` and ``{canceled}``. When the
+server is gone, its end of standard input is closed, and this process ends with all that it started.
 """
 
 from __future__ import annotations

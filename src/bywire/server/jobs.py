@@ -50,6 +50,7 @@ class Job:
     progress: tuple[str, float] = ("", 0.0)
     message: str = ""
     reports: int = 0
+    so_far: list[dict[str, Any]] = field(default_factory=list)
     result: Mapping[str, Any] = field(default_factory=dict)
     ended: threading.Event = field(default_factory=threading.Event)
     process: subprocess.Popen[bytes] | None = None
@@ -63,8 +64,9 @@ class Job:
         label, share = self.progress
         return {
             "number": self.number, "task": self.task.name, "title": self.task.title,
-            "subject": str(self.asked[self.task.subject]), "state": self.state, "label": label,
+            "subject": self.task.said_of(self.asked), "state": self.state, "label": label,
             "share": share, "message": self.message, "reports": self.reports,
+            "so_far": self.so_far if self.state == "running" else [],
             "said": list(self.result.get("said", ())), "holds": self.result.get("holds"),
             "headline": self.result.get("headline", ""),
             "folder": place.named(self.out) if is_inside else "",
@@ -102,9 +104,12 @@ class Jobs:
                 raise RefusedError(503, "the server is ending")
             if len(active) >= MOST:
                 raise RefusedError(429, f"{MOST} jobs wait already: cancel some, or wait")
-            out = out or self._folder(task, asked)
+            same = [each.out for each in active if each.task is task and each.asked == asked]
+            out = out or (same[0] if task.begun and same else self._folder(task, asked))
             if any(each.out == out for each in active):
-                raise RefusedError(409, f"{task.stem(asked)} is being computed: wait, or cancel it")
+                raise RefusedError(
+                    409, f"{task.said_of(asked)} is being computed: wait, or cancel it"
+                )
             job = Job(max(self._jobs, default=0) + 1, task, asked, out)
             self._jobs[job.number] = job
             over = len(self._jobs) - _KEPT
@@ -112,6 +117,12 @@ class Jobs:
                 del self._jobs[old.number]
         threading.Thread(target=self._run, args=(job,), daemon=True).start()
         return job
+
+    def begun(self, task: Task, asked: Mapping[str, Any]) -> Path | None:
+        """Return the folder that holds what is asked already, to go on in it; None for none."""
+        if task.begun is None:
+            return None
+        return task.begun(asked, self._place, self._place.folders(_name(task, asked)))
 
     def all(self) -> list[Job]:
         """Return all jobs, the latest first."""
@@ -154,10 +165,9 @@ class Jobs:
             job.ended.wait(2.0 * _PATIENCE)
 
     def _folder(self, task: Task, asked: Mapping[str, Any]) -> Path:
-        stem = task.stem(asked)
         if task.is_kept:
-            return self._place.same_folder(stem)
-        return self._place.fresh_folder(f"{task.name}-{stem}")
+            return self._place.same_folder(task.stem(asked))
+        return self._place.fresh_folder(_name(task, asked))
 
     def _run(self, job: Job) -> None:
         # A page that somebody waits for is made at once: two studies would hold it up for hours.
@@ -202,10 +212,17 @@ class Jobs:
             label, share = said["progress"]
             job.progress = (str(label), float(share))
             return {}
+        if "so_far" in said:
+            job.so_far = said["so_far"]
+            return {}
         if "report" in said:
             job.reports += 1
             return {}
         return said
+
+
+def _name(task: Task, asked: Mapping[str, Any]) -> str:
+    return f"{task.name}-{task.stem(asked)}"
 
 
 def _end(job: Job, last: Mapping[str, Any], status: int) -> None:
@@ -220,6 +237,6 @@ def _end(job: Job, last: Mapping[str, Any], status: int) -> None:
         how = f"signal {signal.Signals(-status).name}" if status < 0 else f"status {status}"
         job.message, job.state = (
             f"its process ended by {how}, perhaps for want of memory: ask for less, or run the "
-            f"command 'bywire {job.task.name}' in a terminal",
+            f"command 'bywire {job.task.command or job.task.name}' in a terminal",
             "failed",
         )

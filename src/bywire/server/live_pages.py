@@ -10,10 +10,10 @@ from typing import Any
 
 from bywire.core.errors import FileError
 from bywire.data.toml_file import read_toml
+from bywire.server.field import is_file_name
 from bywire.server.jobs import Job, Jobs
 from bywire.server.place import Place
 from bywire.server.refusal import RefusedError
-from bywire.server.task import is_file_name
 from bywire.server.task_registry import tasks
 
 

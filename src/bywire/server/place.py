@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from glob import escape
 from pathlib import Path, PurePosixPath
 
 from bywire.core.errors import FileError
@@ -98,6 +99,15 @@ class Place:
         """Return the one folder of a result that is gone on with."""
         self._made(RESULTS)
         return self.inside(f"{RESULTS}/{stem}")
+
+    def folders(self, stem: str) -> list[Path]:
+        """Return the folders of results of a name, the latest first."""
+        found = {
+            int(path.name.removeprefix(f"{stem}-")): path
+            for path in self._made(RESULTS).glob(f"{escape(stem)}-*")
+            if path.name.removeprefix(f"{stem}-").isdecimal() and path.resolve() == path
+        }
+        return [found[number] for number in sorted(found, reverse=True)]
 
     def fresh_file(self, name: str) -> Path:
         """Return where a measurement of a name is kept; nothing that is there is replaced."""

@@ -12,8 +12,10 @@ class RefusedError(Exception):
         Of HTTP.
     text
         What is wrong, and what to do.
+    field
+        Of the form, beside which it is shown; none where it is no field's.
     """
 
-    def __init__(self, status: int, text: str) -> None:
+    def __init__(self, status: int, text: str, field: str = "") -> None:
         super().__init__(text)
-        self.status, self.text = status, text
+        self.status, self.text, self.field = status, text, field

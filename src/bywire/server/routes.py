@@ -10,17 +10,17 @@ from typing import Final
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.server.contents import contents
 from bywire.server.exchange import LIVE, SANDBOX, Reply, Request, page, plain
+from bywire.server.field import is_file_name
 from bywire.server.live_pages import experiments
 from bywire.server.pages.bench_page import bench_page
 from bywire.server.pages.index_page import index_page
 from bywire.server.pages.study_page import study_page
-from bywire.server.pages.task_page import PAGES, task_page
+from bywire.server.pages.task_page import task_page
 from bywire.server.place import RESULTS, Place
 from bywire.server.refusal import RefusedError
 from bywire.server.service import Service
 from bywire.server.shown_bench import shown_bench
 from bywire.server.studies import how_far
-from bywire.server.task import is_file_name
 from bywire.server.task_registry import tasks
 from bywire.server.uploads import uploaded
 
@@ -89,11 +89,12 @@ def _live(service: Service, request: Request, rest: str) -> Reply:
 
 
 def _task(service: Service, request: Request, rest: str) -> Reply:
-    del request
-    if rest not in PAGES:
-        raise RefusedError(404, f"there is no task {quoted(rest)}: known are {', '.join(PAGES)}")
+    known = [each.name for each in tasks().values() if each.summary]
+    if rest not in known:
+        raise RefusedError(404, f"there is no task {quoted(rest)}: known are {', '.join(known)}")
     with service.reading:
-        return page(task_page(tasks()[rest], contents(service.place), service.largest))
+        there = contents(service.place)
+        return page(task_page(tasks()[rest], there, request.query, service.largest))
 
 
 def _study(service: Service, request: Request, rest: str) -> Reply:
@@ -144,9 +145,8 @@ def _begin(service: Service, request: Request, rest: str) -> Reply:
     task = tasks()[name]
     with service.reading:
         asked = task.read(form, service.place)
-        if asked.get("bench"):
-            _path_of(service.place, asked["bench"])
-    return plain(service.jobs.start(task, asked).shown(service.place), 201)
+        begun = service.jobs.begun(task, asked)
+    return plain(service.jobs.start(task, asked, begun).shown(service.place), 201)
 
 
 def _job(service: Service, request: Request, rest: str) -> Reply:

@@ -13,11 +13,11 @@ from urllib.parse import quote
 
 from bywire.core.errors import FileError, ParameterError, unknown_name
 from bywire.server.address import HERE, PORT
+from bywire.server.field import is_file_name
 from bywire.server.handler import Handler, quiet_error
 from bywire.server.live_pages import experiments
 from bywire.server.place import Place, place_of
 from bywire.server.service import LARGEST_FILE, Service, service_of
-from bywire.server.task import is_file_name
 
 
 class _Server(ThreadingHTTPServer):
@@ -96,7 +96,7 @@ def serve(
     """Show a folder's benches, results and studies in a browser of this machine, until Ctrl-C.
 
     Pages compute in the browser as those of `bywire.page` do; what needs Python (reports,
-    measurement files beside the simulation, identification, design, studies) is computed in
+    measurement files beside the simulation, identification, design, campaigns) is computed in
     processes of its own. Only this machine is answered, only with the token of the link, and
     nothing is read or written outside of the folder.
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from bywire.bench import bench_file
 from bywire.core.errors import InputError
+from bywire.server.field import is_file_name
 from bywire.server.live_pages import experiments
-from bywire.server.task import is_file_name
 
 
 @dataclass(frozen=True)

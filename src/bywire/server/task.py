@@ -2,89 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from bywire.bench.bench_text import PATHS
-from bywire.core.errors import ParameterError, quoted, unknown_name
-from bywire.core.pairs import changes, named
+from bywire.core.errors import InputError, unknown_name
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.server.place import Place, require_inside
+from bywire.server.field import Field
+from bywire.server.place import Place
+from bywire.server.refusal import RefusedError
 
-_LONGEST = 20_000  # characters of a field
-
-
-Kind = Literal["text", "lines", "pairs", "changes", "names", "flag", "file", "files", "bench"]
-
-
-@dataclass(frozen=True)
-class Field:
-    """A field of a form.
-
-    Parameters
-    ----------
-    name, label
-        Of the field, and what stands beside it.
-    kind
-        A ``text``, ``lines`` of text, ``pairs`` (lines of ``KEY=VALUE``), ``changes`` (such pairs,
-        of which some name files), ``names`` (lines of ``NAME`` or ``NAME=TEXT``), a ``flag``, a
-        ``file`` or ``files`` of the folder, a ``bench`` (a file of it, or an experiment).
-    hint
-        An example, or what it is left out for.
-    choices
-        Returns what can be chosen.
-    is_required
-        Whether it must be filled in.
-    """
-
-    name: str
-    label: str
-    kind: Kind = "text"
-    hint: str = ""
-    choices: Callable[[], Sequence[str]] | None = None
-    is_required: bool = False
-
-    def read(self, given: Any, place: Place) -> Any:
-        """Return what a form gave, checked; paths as they stand in the folder.
-
-        Raises
-        ------
-        ParameterError
-            When it is of another kind, missing, or too long.
-        RefusedError
-            For a path that is not in the folder.
-        """
-        if self.kind == "flag":
-            if not isinstance(given, (bool, type(None))):
-                raise ParameterError(f"{self.name} = {quoted(given)}: true or false is wanted")
-            return bool(given)
-        text = "" if given is None else given
-        if not isinstance(text, str) or len(text) > _LONGEST or "\0" in text:
-            raise ParameterError(
-                f"{self.name} = {quoted(given)}: a text of at most {_LONGEST:,} characters is "
-                "wanted"
-            )
-        lines = [line.strip() for line in text.splitlines() if line.strip()]
-        if self.is_required and not lines:
-            raise ParameterError(f"{self.label} is missing: fill it in")
-        return self._checked(lines, text.strip(), place)
-
-    def _checked(self, lines: list[str], text: str, place: Place) -> Any:
-        if self.kind == "lines":
-            return lines
-        if self.kind == "names":
-            return named(lines, self.label)
-        if self.kind in ("pairs", "changes"):
-            values = changes(lines, self.label)
-            require_inside(place, values if self.kind == "changes" else {}, PATHS)
-            return values
-        if self.kind == "files":
-            return [place.named(place.file(line)) for line in lines]
-        is_path = self.kind == "file" or (self.kind == "bench" and is_file_name(text))
-        return place.named(place.file(text)) if is_path and text else text
+_LONGEST = 60  # characters of the name of a result's folder
 
 
 @dataclass(frozen=True)
@@ -94,7 +26,7 @@ class Task:
     Parameters
     ----------
     name
-        As its command.
+        By which forms and results call it.
     title, action
         Heading of its form, and what its button says.
     fields
@@ -104,8 +36,15 @@ class Task:
         which the result is written.
     subject
         Field whose value the result's folder is named after.
+    summary
+        What it does, in a line: with one, it has a page of its own that the start page leads to.
+    command
+        What the same is called in a terminal, behind ``bywire``; its name by default.
     is_kept
         Whether the same subject goes on in the same folder.
+    begun
+        ``begun(asked, place, folders)``: returns which of the folders of its subject holds what is
+        asked, unfinished perhaps: then it is gone on with; None for none.
     is_file
         Whether ``out`` is a file that the task itself writes.
     """
@@ -116,7 +55,10 @@ class Task:
     fields: tuple[Field, ...]
     compute: Callable[[Mapping[str, Any], Path, Progress], Answer]
     subject: str = "bench"
+    summary: str = ""
+    command: str = ""
     is_kept: bool = False
+    begun: Callable[[Mapping[str, Any], Place, Sequence[Path]], Path | None] | None = None
     is_file: bool = False
 
     def read(self, form: Mapping[str, Any], place: Place) -> dict[str, Any]:
@@ -124,22 +66,46 @@ class Task:
 
         Raises
         ------
-        InputError
-            For fields that there are not, and values that do not fit.
+        UnknownNameError
+            For fields that there are not.
         RefusedError
-            For paths that are not in the folder.
+            With the field: status 404 for a path that is not in the folder, 422 for any other
+            value that does not fit.
         """
         known = {field.name: field for field in self.fields}
         for name in form:
             if name not in known:
                 raise unknown_name(f"field of {self.name!r}", name, known)
-        return {name: field.read(form.get(name), place) for name, field in known.items()}
+        asked: dict[str, Any] = {}
+        for field in self.fields:
+            with _beside(field, place):
+                asked[field.name] = field.read(form.get(field.name), place)
+        for field in self.fields:
+            if field.fits is not None and asked[field.name]:
+                with _beside(field, place):
+                    field.fits(asked, place)
+        return asked
+
+    def said_of(self, asked: Mapping[str, Any]) -> str:
+        """Return what lists of jobs call it by."""
+        subject = asked[self.subject]
+        return ", ".join(subject) if isinstance(subject, list) else str(subject)
 
     def stem(self, asked: Mapping[str, Any]) -> str:
         """Return what the folder of its result is called by."""
-        return Path(str(asked[self.subject])).stem
+        subject = asked[self.subject]
+        if isinstance(subject, list):
+            return "-".join(Path(each).stem for each in subject)[:_LONGEST]
+        return Path(str(subject)).stem
 
 
-def is_file_name(bench: str) -> bool:
-    """Return whether the name of a bench is that of a file, and not of an experiment."""
-    return bench.endswith(".toml")
+@contextmanager
+def _beside(field: Field, place: Place) -> Iterator[None]:
+    """Have what is refused say which field it stands beside, with paths as the folder has them."""
+    try:
+        yield
+    except RefusedError as refused:
+        raise RefusedError(refused.status, refused.text, field.name) from None
+    except InputError as error:
+        said = str(error).replace(f"{place.root}{os.sep}", "")
+        raise RefusedError(422, said, field.name) from None

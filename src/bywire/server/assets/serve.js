@@ -3,7 +3,7 @@
 
 const place = (id) => document.getElementById(id);
 const states = new Map();
-let pause = 0, reports = 0;
+let pause = 0, reports = 0, shownSoFar = "[]";
 
 function complain(text) {
   place("message").textContent = text;
@@ -20,7 +20,7 @@ async function ask(address, method = "GET", body = undefined) {
     throw new Error("the server does not answer: was it ended? Start bywire serve again");
   }
   const said = await answer.json().catch(() => ({ error: `status ${answer.status}` }));
-  if (!answer.ok) throw new Error(said.error);
+  if (!answer.ok) throw Object.assign(new Error(said.error), { field: said.field });
   return said;
 }
 
@@ -35,22 +35,50 @@ function valueOf(field) {
   return field.value;
 }
 
+/* What does not fit is said beside its field, which gets the focus; of no field that is seen, on top. */
+function complainOf(form, { message, field: name }) {
+  const field = name && form.querySelector(`:is(input:not([type=hidden]), select, textarea)[name="${CSS.escape(name)}"]`);
+  if (!field) return complain(message);
+  const said = element("p", message, { className: "wrong", id: `${field.id}-wrong` });
+  field.closest(".field").append(said);
+  field.setAttribute("aria-invalid", "true");
+  field.setAttribute("aria-describedby", [field.dataset.hint, said.id].filter(Boolean).join(" "));
+  const folded = field.closest("details");
+  if (folded) folded.open = true;
+  field.focus();
+}
+
+function forgive(field) {
+  if (field.getAttribute("aria-invalid") !== "true") return;
+  place(`${field.id}-wrong`).remove();
+  field.removeAttribute("aria-invalid");
+  if (field.dataset.hint) field.setAttribute("aria-describedby", field.dataset.hint);
+  else field.removeAttribute("aria-describedby");
+}
+
 async function begin(event) {
   event.preventDefault();
-  const form = event.target;
-  const fields = [...form.elements].filter(({ name }) => name);
+  const form = event.target, fields = [...form.elements].filter(({ name }) => name);
+  if (form.getAttribute("aria-busy") === "true") return;
   const asked = Object.fromEntries(fields.map((field) => [field.name, valueOf(field)]));
-  const button = form.querySelector("button[type=submit]");
-  button.disabled = true;
+  form.setAttribute("aria-busy", "true"); // a button that is disabled would lose the focus
+  fields.forEach(forgive);
+  complain("");
   try {
     await ask("/api/jobs", "POST", { task: form.dataset.task, form: asked });
-    complain("");
     await refresh();
     place("jobs-title").scrollIntoView({ block: "nearest" });
   } catch (error) {
-    complain(error.message);
+    complainOf(form, error);
   }
-  button.disabled = false;
+  form.removeAttribute("aria-busy");
+}
+
+function armForm(form) {
+  form.addEventListener("submit", begin);
+  form.addEventListener("input", ({ target }) => forgive(target));
+  for (const field of form.elements) field.dataset.hint = field.getAttribute("aria-describedby") ?? "";
+  form.querySelector("button[type=submit]").disabled = false;
 }
 
 /* Measurement files */
@@ -152,7 +180,8 @@ function shown(job) {
 }
 
 async function cancel(job, button) {
-  button.disabled = true;
+  if (button.getAttribute("aria-disabled") === "true") return;
+  button.setAttribute("aria-disabled", "true"); // and not disabled, which would lose the focus
   try {
     await ask(`/api/jobs/${job.number}/cancel`, "POST", {});
   } catch (error) {
@@ -161,7 +190,17 @@ async function cancel(job, button) {
   await refresh();
 }
 
-/* An item is made anew only when it changes: a button that has the focus keeps it. */
+/* Whoever is in an item stays there when it is made anew: at what is called the same, or at the item itself. */
+function replace(old, item) {
+  const here = old.contains(document.activeElement) && document.activeElement;
+  const name = here && here.getAttribute("aria-label");
+  old.replaceWith(item);
+  if (!here) return;
+  const same = name && [...item.querySelectorAll("[aria-label]")].find((each) => each.getAttribute("aria-label") === name);
+  item.tabIndex = -1;
+  (same || item.querySelector("a") || item).focus({ preventScroll: true });
+}
+
 function update(job) {
   const said = JSON.stringify(job), old = place("jobs").querySelector(`[data-number="${job.number}"]`);
   if (states.get(job.number)?.said === said && old) return old;
@@ -175,14 +214,46 @@ function update(job) {
     place("spoken").textContent = `${job.title} of ${job.subject}: ${outcome(job)}`;
   }
   states.set(job.number, { said, state: job.state, report: job.report });
-  if (old && item !== old) old.replaceWith(item);
+  if (old && item !== old) replace(old, item);
   return item;
+}
+
+const NS = "http://www.w3.org/2000/svg";
+
+/* Bars of a histogram; what they say stands beside them. */
+function bars({ counts, ends }) {
+  const drawn = document.createElementNS(NS, "svg"), most = Math.max(...counts);
+  const set = (node, values) => Object.entries(values).forEach(([name, value]) => node.setAttribute(name, value));
+  set(drawn, { viewBox: `0 0 ${counts.length} 100`, preserveAspectRatio: "none", role: "img", "aria-label": `histogram from ${ends[0]} to ${ends[1]}` });
+  counts.forEach((count, k) => {
+    const bar = document.createElementNS(NS, "rect"), height = 100 * count / most;
+    set(bar, { x: k + 0.05, y: 100 - height, width: 0.9, height });
+    drawn.append(bar);
+  });
+  return drawn;
+}
+
+function showSoFar(rows) {
+  const said = JSON.stringify(rows);
+  if (said === shownSoFar) return;
+  shownSoFar = said;
+  place("study-so-far").replaceChildren(...rows.map((row) => {
+    const item = element("li");
+    item.append(element("p", row.text));
+    if (row.counts.length) {
+      const ends = element("p", "", { className: "ends" });
+      ends.append(...row.ends.map((end) => element("span", end)));
+      item.append(bars(row), ends);
+    }
+    return item;
+  }));
 }
 
 function showStudy(jobs) {
   const frame = place("study-report"), study = document.querySelector('[data-task="study"] [name="study"]');
   const job = jobs.find((each) => each.task === "study" && each.subject === study?.value);
   if (!frame || !job) return;
+  showSoFar(job.so_far);
   if (job.label) place("study-progress").textContent = `${job.label}: ${Math.round(100 * job.share)} %, ${job.state}`;
   const count = job.reports + (job.state === "done" && job.report ? 1 : 0);
   if (count !== reports) {
@@ -198,7 +269,9 @@ async function refresh() {
   try {
     jobs = (await ask("/api/jobs")).jobs;
     const items = jobs.map(update), list = place("jobs");
-    if (items.some((item, k) => list.children[k] !== item)) list.replaceChildren(...items);
+    // One by one: what is moved loses the focus. The latest come first, and the oldest go.
+    items.forEach((item, k) => { if (list.children[k] !== item) list.insertBefore(item, list.children[k] ?? null); });
+    while (list.children.length > items.length) list.lastElementChild.remove();
     place("no-jobs").hidden = jobs.length > 0;
     showStudy(jobs);
   } catch (error) {
@@ -207,7 +280,7 @@ async function refresh() {
   pause = setTimeout(refresh, jobs.some(isActive) ? 500 : 4000);
 }
 
-document.querySelectorAll("form.task").forEach((form) => form.addEventListener("submit", begin));
+document.querySelectorAll("form.task").forEach(armForm);
 document.querySelectorAll(".drop").forEach(arm);
 // A file that misses its place must not be opened instead of the page.
 for (const kind of ["dragover", "drop"]) addEventListener(kind, (event) => event.preventDefault());

@@ -5,7 +5,8 @@ from __future__ import annotations
 from urllib.parse import quote
 
 from bywire.server.contents import Contents
-from bywire.server.pages.frame import form, frame, link, section, text
+from bywire.server.pages.entries import text
+from bywire.server.pages.frame import form, frame, link, section
 from bywire.server.shown_bench import ShownBench
 from bywire.server.task_registry import tasks
 
@@ -28,8 +29,9 @@ def bench_page(bench: ShownBench, there: Contents, largest: int) -> str:
         section("Run with Python", "run", form(tasks()["run"], there, given)),
         section("Replay a measurement", "replay", form(tasks()["replay"], there, given)),
     ]
-    if bench.name in there.benches:
-        body.append(f"<p>{link(f'/file/{bench.name}', 'The bench file')}</p>")
+    compared = link("/task/compare", "Compare it with other runs", runs=bench.name)
+    file = link(f"/file/{bench.name}", "The bench file") if bench.name in there.benches else ""
+    body.append(f"<p>{compared}</p>\n<p>{file}</p>" if file else f"<p>{compared}</p>")
     return frame(bench.name, bench.summary, body, largest=largest)
 
 

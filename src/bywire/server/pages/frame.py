@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from html import escape
+from types import MappingProxyType
 from urllib.parse import quote
 
 from bywire.core.version import __version__
-from bywire.report.wording import clean
 from bywire.server.contents import Contents
-from bywire.server.task import Field, Task
-
-
-def text(shown: str) -> str:
-    """Return a text as HTML, harmless in content and attributes."""
-    return escape(clean(shown), quote=True)
+from bywire.server.pages.entries import row, text
+from bywire.server.task import Task
 
 
 def frame(title: str, summary: str, body: Iterable[str], *, largest: int) -> str:
@@ -88,7 +83,10 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     )
 
 
-def form(task: Task, there: Contents, given: Mapping[str, str], open_fields: int = 3) -> str:
+def form(
+    task: Task, there: Contents, given: Mapping[str, str], open_fields: int = 3,
+    chosen: Mapping[str, str] = MappingProxyType({}),
+) -> str:  # fmt: skip
     """Return the form of a task.
 
     Parameters
@@ -101,61 +99,21 @@ def form(task: Task, there: Contents, given: Mapping[str, str], open_fields: int
         Values that the page itself knows: their fields are not shown.
     open_fields
         Fields that are seen at once; the others are folded.
+    chosen
+        Values with which fields begin.
     """
     hidden = "".join(
         f'<input type="hidden" name="{text(name)}" value="{text(value)}">'
         for name, value in given.items()
     )
-    shown = [_row(task, field, there) for field in task.fields if field.name not in given]
+    shown = [
+        row(task, field, there, chosen.get(field.name, ""))
+        for field in task.fields if field.name not in given
+    ]  # fmt: skip
     first, others = "\n".join(shown[:open_fields]), "\n".join(shown[open_fields:])
     folded = f"<details>\n<summary>More</summary>\n{others}\n</details>\n" if others else ""
+    # The script makes the button work: pressed before it is there, it would send to nowhere.
     return (
         f'<form class="task" data-task="{text(task.name)}">\n{hidden}{first}\n{folded}'
-        f'<button type="submit">{text(task.action)}</button>\n</form>'
+        f'<button type="submit" disabled>{text(task.action)}</button>\n</form>'
     )
-
-
-def _row(task: Task, field: Field, there: Contents) -> str:
-    name, mark = f"{task.name}-{field.name}", f'name="{text(field.name)}"'
-    hint = f'<p class="hint" id="{name}-hint">{text(field.hint)}</p>' if field.hint else ""
-    told = f' aria-describedby="{name}-hint"' if hint else ""
-    wanted = " required" if field.is_required else ""
-    attributes = f'id="{name}" {mark}{told}{wanted}'
-    if field.kind == "flag":
-        return (
-            f'<p class="field flag"><input type="checkbox" {attributes}> '
-            f'<label for="{name}">{text(field.label)}</label></p>{hint}'
-        )
-    return (
-        f'<div class="field"><label for="{name}">{text(field.label)}</label>\n'
-        f"{_entry(field, there, attributes)}\n{hint}</div>"
-    )
-
-
-def _entry(field: Field, there: Contents, attributes: str) -> str:
-    if field.kind in ("lines", "pairs", "changes", "names"):
-        return f'<textarea rows="2" spellcheck="false" {attributes}></textarea>'
-    if field.choices is not None:
-        return f"<select {attributes}>{_options(field.choices())}</select>"
-    if field.kind in ("file", "files"):
-        is_map = field.name == "mapping"
-        names = there.maps if is_map else list(there.measurements)
-        many = ' multiple size="4"' if field.kind == "files" else ""
-        none = [] if many or field.is_required else [""]
-        chosen = f"<select {attributes}{many}>{_options([*none, *names])}</select>"
-        return chosen if is_map else _drop(chosen)
-    if field.kind == "bench":
-        return f"<select {attributes}>{_options(['', *there.benches])}</select>"
-    return f'<input type="text" spellcheck="false" autocomplete="off" {attributes}>'
-
-
-def _drop(chosen: str) -> str:
-    return (
-        f'<div class="drop">{chosen}\n<label class="pick">or drop a file here, or '
-        '<span>choose one</span><input type="file" class="upload"></label>\n'
-        '<progress class="sent" max="1" value="0" hidden></progress></div>'
-    )
-
-
-def _options(names: Sequence[str]) -> str:
-    return "".join(f'<option value="{text(n)}">{text(n) or "-"}</option>' for n in names)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bywire.server.contents import Contents
-from bywire.server.pages.frame import frame, link, section, table, text
+from bywire.server.pages.entries import text
+from bywire.server.pages.frame import frame, link, section, table
+from bywire.server.task_registry import tasks
 
 _SHOWN = 200  # reports, and measurements
 
@@ -30,15 +32,19 @@ def index_page(
     studies = [[link("/study", name, of=name), text(what)] for name, what in there.studies.items()]
     reports = [[link(f"/file/{name}", name)] for name in there.reports[:_SHOWN]]
     others = [[link("/bench", name, of=name), text(what)] for name, what in experiments.items()]
-    tools = (
-        f"<ul>\n<li>{link('/task/identify', 'Identify parameters')} from measurements, or from a "
-        f"simulated one</li>\n<li>{link('/task/design', 'Design a loop')} from requirements</li>\n"
-        "</ul>"
-    )
+    campaigns = [[link("/task/faults", name, campaign=name), text(what)]
+                 for name, what in there.campaigns.items()]  # fmt: skip
+    lives = [[link("/task/life", name, life=name), text(what)]
+             for name, what in there.lives.items()]  # fmt: skip
+    tools = [[link(f"/task/{each.name}", each.title), text(each.summary)]
+             for each in tasks().values() if each.summary]  # fmt: skip
     body = [
         section("Benches", "benches", _listed(["file", "experiment"], benches, "bench files")),
         section("Studies", "studies", _listed(["file", "bench"], studies, "study files")),
-        section("Further work", "tools", tools),
+        *([section("Fault campaigns", "campaigns", table(["file", "bench"], campaigns))]
+          if campaigns else []),
+        *([section("Lives", "lives", table(["file", "life"], lives))] if lives else []),
+        section("Further work", "tools", table(["task", "what it gives"], tools)),
         section("Reports", "reports", _listed(["page"], reports, "reports")),
         section(
             "Experiments", "experiments",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bywire.server.pages.frame import text
+from bywire.server.pages.entries import text
 
 
 def refusal_page(status: int, said: str) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from bywire.server.contents import Contents
-from bywire.server.pages.frame import form, frame, link, section, text
+from bywire.server.pages.entries import text
+from bywire.server.pages.frame import form, frame, link, section
 from bywire.server.task_registry import tasks
 
 
@@ -28,7 +29,8 @@ def study_page(
     is_there = report in there.reports
     source = f' src="/file/{text(report)}"' if is_there else " hidden"
     seen = (
-        f'<p id="study-progress">{text(progress)}</p>\n<iframe id="study-report" '
+        f'<p id="study-progress">{text(progress)}</p>\n<ul id="study-so-far"></ul>\n'
+        f'<iframe id="study-report" '
         f'title="Report of {text(study)}" data-address="/file/{text(report)}"{source}></iframe>'
     )
     body = [

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bywire.core import option_texts as texts
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.server.task import Field, Task
-
-
-def _loops() -> Sequence[str]:
-    from bywire.api.overview import overview
-
-    return sorted(overview().things["loops"])
+from bywire.server.common_fields import case_of, changes, loop, parameters
+from bywire.server.field import Field
+from bywire.server.task import Task
 
 
 def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
@@ -30,15 +27,16 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
 TASK = Task(
     "design", "Design a loop", "Design",
     (
-        Field("loop", "Loop", choices=_loops, is_required=True),
-        Field("require", "Requirements", "lines", "bandwidth >= 10 Hz, one in a line"),
-        Field("at", "Operating point", hint="20 bar"),
-        Field("over", "Ranges to serve too", "lines", "motor.R_m=0.2ohm:0.6ohm:5"),
-        Field("linear_only", "Leave out the nonlinear bench (quicker)", "flag"),
-        Field("schedule", "Gains by region (operating points then lists one of each)", "flag"),
-        Field("amplitudes", "Amplitudes of the sines on the bench", hint="1 bar, 3 bar"),
-        Field("parameters", "Parameter set", hint="the main one by default"),
-        Field("set", "Changes", "changes", "motor.R_m=0.4 ohm, one in a line"),
+        loop(),
+        Field("require", "Requirements", "lines", texts.DESIGN_REQUIRE),
+        Field("at", "Operating point", hint=texts.AT),
+        Field("over", "Ranges", "lines", texts.DESIGN_OVER),
+        Field("linear_only", "Linear only (quicker)", "flag", texts.DESIGN_LINEAR),
+        Field("schedule", "Gains by region", "flag", texts.DESIGN_SCHEDULE),
+        Field("amplitudes", "Amplitudes", hint=texts.DESIGN_AMPLITUDES),
+        parameters(lambda asked, _: case_of({**asked, "at": "", "set": {}})),
+        changes(lambda asked, _: case_of({**asked, "at": ""})),
     ),
     _compute, subject="loop",
+    summary="Gains of a control loop from requirements",
 )  # fmt: skip

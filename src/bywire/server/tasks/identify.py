@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bywire.core.errors import ParameterError, quoted
+from bywire.core import option_texts as texts
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.server.task import Field, Task
-
-
-def _methods() -> Sequence[str]:
-    from bywire.api.overview import overview
-
-    return sorted(overview().things["methods"])
-
-
-def _whole(text: str, name: str, default: int | None) -> int | None:
-    """Return a whole number that a field holds."""
-    if not text:
-        return default
-    if not text.isdecimal() or len(text) > 9:
-        raise ParameterError(f"{name} = {quoted(text)}: a whole number is wanted")
-    return int(text)
+from bywire.server.common_fields import bench, case, changes, mapping, names, parameters
+from bywire.server.field import Field
+from bywire.server.task import Task
 
 
 def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
@@ -35,38 +22,37 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
         asked["bench"] or None, asked["inputs"], asked["outputs"], asked["unknowns"],
         asked["priors"], asked["states"], asked["case"], asked["holdout"] or None, asked["loss"],
     )  # fmt: skip
-    starts, seed = _whole(asked["starts"], "starts", 16), _whole(asked["seed"], "seed", 1)
-    assert starts is not None
-    assert seed is not None
     return identify(
         asked["method"], asked["measurements"], asked["parameters"], asked["set"],
         question=question, mapping=asked["mapping"] or None,
-        options=asked["options"], starts=max(starts, 1), seed=seed,
-        synthetic=_whole(asked["synthetic"], "synthetic", None), folder=out, progress=progress,
+        options=asked["options"], starts=asked["starts"], seed=asked["seed"],
+        synthetic=asked["synthetic"], folder=out, progress=progress,
     )  # fmt: skip
 
 
 TASK = Task(
     "identify", "Identify parameters", "Identify",
     (
-        Field("method", "Method", choices=_methods, is_required=True),
-        Field("measurements", "Measurements", "files"),
-        Field("synthetic", "Simulated measurement instead", hint="its seed, for instance 1"),
-        Field("mapping", "What the columns mean", "file", "a TOML file"),
-        Field("bench", "Bench", "bench", "for methods of any bench"),
-        Field("inputs", "What drives the model", "pairs", "STIMULUS=SIGNAL, one in a line"),
-        Field("outputs", "What is measured", "names", "p_mc=0.02 bar, with its noise or without"),
-        Field("unknowns", "What is searched", "names", "motor.R_m=0.1..1 ohm, one in a line"),
-        Field("priors", "What is known of it", "pairs", "motor.R_m=0.35 +- 0.02 ohm"),
-        Field("states", "Unknown initial values", "lines", "omega, one in a line"),
-        Field("holdout", "Measurement for validation", "file"),
-        Field("loss", "Loss", choices=lambda: ("", "linear", "soft_l1", "huber", "cauchy")),
-        Field("case", "Run", hint="the first by default"),
-        Field("options", "Options of the method", "changes", "KEY=VALUE, one in a line"),
-        Field("starts", "Starts of the search", hint="16"),
-        Field("seed", "Seed of the starts", hint="1"),
-        Field("parameters", "Parameter set", hint="the method's own by default"),
-        Field("set", "Changes", "changes", "motor.R_m=0.4 ohm, one in a line"),
+        Field("method", "Method", "choice", texts.METHOD, names("methods"), is_required=True),
+        Field("measurements", "Measurements", "files", texts.MEASUREMENTS),
+        Field("synthetic", "Simulated measurement", "whole", texts.SYNTHETIC),
+        mapping(),
+        bench(is_required=False),
+        Field("inputs", "Inputs", "pairs", texts.INPUTS),
+        Field("outputs", "Outputs", "names", texts.NOISY_OUTPUT),
+        Field("unknowns", "Unknowns", "names", texts.UNKNOWN),
+        Field("priors", "Known before", "pairs", texts.PRIOR),
+        Field("states", "Unknown initial values", "lines", texts.START),
+        Field("holdout", "Measurement for validation", "file", texts.HOLDOUT),
+        Field("loss", "Loss", "choice", texts.LOSS,
+              lambda: ("linear", "soft_l1", "huber", "cauchy")),
+        case(),
+        Field("options", "Options of the method", "changes", texts.METHOD_OPTION),
+        Field("starts", "Starts of the search", "whole", texts.STARTS, default=16, least=1),
+        Field("seed", "Seed of the starts", "whole", texts.SEED, default=1),
+        parameters(),
+        changes(),
     ),
     _compute, subject="method",
+    summary="Parameters with their confidence from measured experiments, or a simulated one",
 )  # fmt: skip

@@ -8,7 +8,8 @@ from typing import Any
 
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.server.task import Field, Task
+from bywire.server.common_fields import bench, case
+from bywire.server.task import Task
 
 
 def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
@@ -19,6 +20,6 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
 
 TASK = Task(
     "page", "Live page", "Make the page",
-    (Field("bench", "Bench", "bench", is_required=True), Field("case", "Run")),
+    (bench(), case()),
     _compute, is_file=True,
 )  # fmt: skip

@@ -6,9 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bywire.core import option_texts as texts
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.server.task import Field, Task
+from bywire.server.common_fields import bench, bench_changes, case, mapping, read_bench
+from bywire.server.field import Field
+from bywire.server.task import Task
 
 
 def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
@@ -25,18 +28,16 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
 TASK = Task(
     "replay", "Replay a measurement", "Replay",
     (
-        Field("bench", "Bench", "bench", is_required=True),
-        Field("measurement", "Measurement", "file", is_required=True),
-        Field("inputs", "What drives the model", "pairs",
-              "STIMULUS=SIGNAL, one in a line; by default signals of the same name"),
-        Field("outputs", "What is compared", "lines", "p_mc, one in a line; by default all"),
-        Field("tolerances", "Tolerances", "lines", "nrmse <= 5 %, one in a line"),
-        Field("mapping", "What the columns mean", "file", "a TOML file; needed where names or "
-              "units are not those of the model"),
-        Field("case", "Run", hint="the first by default"),
+        bench(),
+        Field("measurement", "Measurement", "file", texts.MEASUREMENT, is_required=True),
+        Field("inputs", "Inputs", "pairs", texts.INPUTS),
+        Field("outputs", "Outputs", "lines", texts.REPLAY_OUTPUT),
+        Field("tolerances", "Tolerances", "lines", texts.TOLERANCE),
+        mapping(),
+        case(),
         Field("segments", "Judge steps and holds each for itself", "flag"),
-        Field("track", "Drifting parameters", "lines", "mu_B, one in a line"),
-        Field("set", "Changes", "changes", "motor.R_m=0.4 ohm, one in a line"),
+        Field("track", "Drifting parameters", "lines", texts.TRACK),
+        bench_changes(read_bench),
     ),
     _compute,
 )  # fmt: skip

@@ -6,9 +6,21 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bywire.core import option_texts as texts
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.server.task import Field, Task
+from bywire.server.common_fields import bench, bench_changes, changes_of, path_of, read_bench
+from bywire.server.field import Field
+from bywire.server.place import Place
+from bywire.server.task import Task
+
+
+def _fit(asked: Mapping[str, Any], place: Place) -> object:
+    from bywire.api.run import faulty
+    from bywire.bench import bench_file
+
+    given = bench_file.read(path_of(asked["bench"], place), changes_of(asked, place))
+    return faulty(given, asked["faults"]).injections
 
 
 def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
@@ -20,9 +32,9 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
 TASK = Task(
     "run", "Run with Python", "Run",
     (
-        Field("bench", "Bench", "bench", is_required=True),
-        Field("set", "Changes", "changes", "motor.R_m=0.4 ohm, one in a line"),
-        Field("faults", "Faults", "lines", "pressure.stuck=20 bar@1 s, one in a line"),
+        bench(),
+        bench_changes(read_bench),
+        Field("faults", "Faults", "lines", texts.RUN_FAULT, fits=_fit),
     ),
     _compute,
 )  # fmt: skip

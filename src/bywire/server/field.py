@@ -1,0 +1,144 @@
+"""A field of a form: what it takes, checked before anything is computed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from bywire.bench.bench_text import PATHS
+from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.core.pairs import changes, named
+from bywire.server.contents import Contents
+from bywire.server.place import Place, require_inside
+
+_LONGEST = 20_000  # characters of a field
+_DIGITS = 9
+
+Kind = Literal[
+    "text", "whole", "lines", "pairs", "changes", "names", "flag", "choice", "file", "files",
+    "thing", "things",
+]  # fmt: skip
+Fits = Callable[[Mapping[str, Any], Place], object]
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of a form.
+
+    Parameters
+    ----------
+    name, label
+        Of the field, and what stands beside it.
+    kind
+        A ``text``, a ``whole`` number, ``lines`` of text, ``pairs`` (lines of ``KEY=VALUE``),
+        ``changes`` (such pairs, of which some name files), ``names`` (lines of ``NAME`` or
+        ``NAME=TEXT``), a ``flag``, a ``choice``, a measurement ``file`` or ``files`` of the folder,
+        or a ``thing`` or ``things``: a name that is known, or what the folder has of it.
+    hint
+        What it means; of commands' options, their help.
+    choices
+        Returns what is known by name.
+    offered
+        Returns what the folder has of a thing.
+    is_required
+        Whether it must be filled in.
+    default
+        Of a whole number that is left out, and of a flag.
+    least
+        Of a whole number.
+    fits
+        Raises `InputError` where what was asked does not fit what is asked in fields before it.
+        Called where the field is filled in.
+    """
+
+    name: str
+    label: str
+    kind: Kind = "text"
+    hint: str = ""
+    choices: Callable[[], Sequence[str]] | None = None
+    offered: Callable[[Contents], Sequence[str]] | None = None
+    is_required: bool = False
+    default: int | None = None
+    least: int = 0
+    fits: Fits | None = None
+
+    def read(self, given: Any, place: Place) -> Any:
+        """Return what a form gave, checked; paths as they stand in the folder.
+
+        Raises
+        ------
+        InputError
+            When it is of another kind, unknown, missing, or too long.
+        RefusedError
+            For a path that is not in the folder.
+        """
+        if self.kind == "flag":
+            if not isinstance(given, (bool, type(None))):
+                raise ParameterError(f"{self.name} = {quoted(given)}: true or false is wanted")
+            return bool(self.default) if given is None else given
+        text = "" if given is None else given
+        if not isinstance(text, str) or len(text) > _LONGEST or "\0" in text:
+            raise ParameterError(
+                f"{self.name} = {quoted(given)}: a text of at most {_LONGEST:,} characters is "
+                "wanted"
+            )
+        lines = [line.strip() for line in text.splitlines() if line.strip()]
+        if self.is_required and not lines:
+            raise ParameterError(f"{self.label} is missing: fill it in")
+        return self._checked(lines, text.strip(), place)
+
+    def _checked(self, lines: list[str], text: str, place: Place) -> Any:
+        if self.kind == "lines":
+            return lines
+        if self.kind == "names":
+            return named(lines, self.label)
+        if self.kind in ("pairs", "changes"):
+            values = changes(lines, self.label)
+            require_inside(place, values if self.kind == "changes" else {}, PATHS)
+            return values
+        if self.kind == "files":
+            return [place.named(place.file(line)) for line in lines]
+        if self.kind == "things":
+            return [self._thing(line, place) for line in lines]
+        if self.kind == "whole":
+            return self._whole(text)
+        if self.kind == "file" and text:
+            return place.named(place.file(text))
+        if self.kind == "thing" and text:
+            return self._thing(text, place)
+        if self.kind == "choice" and text and text not in self._known():
+            raise unknown_name(self.label, text, self._known())
+        return text
+
+    def _known(self) -> Sequence[str]:
+        return () if self.choices is None else self.choices()
+
+    def _whole(self, text: str) -> int | None:
+        if not text:
+            return self.default
+        is_whole = text.isascii() and text.isdecimal() and len(text) <= _DIGITS
+        if not is_whole or int(text) < self.least:
+            raise ParameterError(
+                f"{self.label} = {quoted(text)}: a whole number from {self.least} on is wanted"
+            )
+        return int(text)
+
+    def _thing(self, text: str, place: Place) -> str:
+        """Return a thing that is known by its name, or lies in the folder."""
+        if text in self._known():
+            if os.path.lexists(place.root / text):  # functions may look there first
+                place.inside(text)
+            return text
+        path = place.inside(text)
+        if path.is_file() or (path.is_dir() and self.kind == "things"):
+            return place.named(path)
+        if self.choices is not None and not is_file_name(text):
+            raise unknown_name(self.label, text, self._known())
+        raise place.unknown(text)
+
+
+def is_file_name(bench: str) -> bool:
+    """Return whether the name of a bench is that of a file, and not of an experiment."""
+    return bench.endswith(".toml")
