@@ -87,8 +87,14 @@ def test_a_linear_axis_has_the_quantiles_of_its_closed_form(tmp_path, spring_axi
     assert study.worst("overshoot").par.d == study.cases["d"].min()
 
 
-def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(study, tmp_path):
+@pytest.mark.parametrize("is_copied", [False, True], ids=["begun", "copied"])
+def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(
+    study, tmp_path, monkeypatch, is_copied
+):
     """Processes end as after Ctrl-C: what they are at may take long."""
+    if is_copied and sys.platform != "linux":
+        pytest.skip("processes are copied on Linux alone")
+    monkeypatch.setattr("bywire.studies.executor.may_copy", lambda: is_copied)
     plan = read_study(study())
     alone, shared = (StudyStore(tmp_path / name) for name in ("alone", "shared"))
     for store in (alone, shared):

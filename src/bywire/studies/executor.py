@@ -7,16 +7,19 @@ import os
 import signal
 import threading
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
 from functools import partial
 from multiprocessing import active_children, get_context, parent_process
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 from bywire.core.brake import load_system, loaded_files
+from bywire.core.copies import deaf_to_interrupts, may_copy
 from bywire.core.errors import ParameterError, RunError
 from bywire.core.unneeded import allow_dask
 from bywire.data.file_format import library
@@ -45,10 +48,72 @@ _WHAT = ("studies on a cluster", "cluster")
 
 
 Chunks = Iterable[int | PlacedChunk]
-Compute = Callable[[Chunks], Iterator[tuple[int, Columns]]]
-"""yields the number and the columns of each chunk as soon as it is there, in any order"""
+T = TypeVar("T")
 _Task = tuple[float, list[tuple[int, Columns]]]
 """what a task of a cluster gives: time [s], and its chunks"""
+
+
+class Beside(Generic[T]):
+    """What is computed beside chunks.
+
+    ``future``: gives its value, and what was warned of meanwhile in another process.
+    """
+
+    def __init__(self, future: Future[tuple[T, list[Warning]]]) -> None:
+        self._future = future
+
+    def check(self) -> None:
+        """Raise what it raised, if it did so by now."""
+        if self._future.done():
+            self._future.result()
+
+    def result(self) -> T:
+        """Wait for its value, and warn of what was warned of."""
+        value, said = self._future.result()
+        for each in said:
+            warnings.warn(each, stacklevel=2)
+        return value
+
+
+class Compute(Protocol):
+    """What computes chunks batch by batch."""
+
+    def __call__(self, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
+        """Yield number and columns of each chunk as soon as it is there, in any order."""
+        ...
+
+    def beside(self, job: Callable[[], T]) -> Beside[T]:
+        """Begin something else: at once, or in a process that then goes on with chunks."""
+        ...
+
+
+@dataclass(frozen=True)
+class _Apart:
+    """Computes chunks by a function, and what stands beside them at once."""
+
+    chunks: Callable[[Chunks], Iterator[tuple[int, Columns]]]
+
+    def __call__(self, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
+        return self.chunks(chunks)
+
+    def beside(self, job: Callable[[], T]) -> Beside[T]:
+        done: Future[tuple[T, list[Warning]]] = Future()
+        done.set_result((job(), []))
+        return Beside(done)
+
+
+@dataclass(frozen=True)
+class _InPool:
+    """Computes chunks, and what stands beside them, in the processes of a pool."""
+
+    pool: ProcessPoolExecutor
+    ahead: int
+
+    def __call__(self, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
+        return _as_completed(self.pool, self.ahead, chunks)
+
+    def beside(self, job: Callable[[], T]) -> Beside[T]:
+        return Beside(self.pool.submit(_told, job))
 
 
 class Executor(Protocol):
@@ -80,7 +145,7 @@ class InProcess:
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
         """Return what computes; see `Executor`."""
-        yield partial(self.computed, plan)
+        yield _Apart(partial(self.computed, plan))
 
 
 class Pool:
@@ -103,12 +168,16 @@ class Pool:
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
         """Return what computes; see `Executor`."""
-        others = active_children()
+        others, is_copied = active_children(), may_copy()
+        # A copy has loaded what we have, all brakes among it; others load it anew, for a second.
         pool = ProcessPoolExecutor(
-            self.workers, get_context("spawn"), initializer=_begin, initargs=(loaded_files(), plan)
-        )
+            self.workers, get_context("fork" if is_copied else "spawn"), initializer=_begin,
+            initargs=(() if is_copied else loaded_files(), plan),
+        )  # fmt: skip
         try:
-            yield partial(_as_completed, pool, _AHEAD * self.workers)
+            with deaf_to_interrupts() if is_copied else nullcontext():
+                pool.submit(_nothing)  # which starts them
+            yield _InPool(pool, _AHEAD * self.workers)
         except BrokenProcessPool:
             raise RunError(
                 "a process of the study was killed, most likely for want of memory: resume it, "
@@ -145,7 +214,7 @@ class Cluster:
             if not workers:
                 raise RunError(f"the cluster at {self.address} has no workers: start some first")
             client.run(_load, loaded_files())
-            yield partial(_of_cluster, client, plan, workers)
+            yield _Apart(partial(_of_cluster, client, plan, workers))
 
 
 def executor_of(
@@ -198,6 +267,18 @@ def _end_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(1)
+
+
+def _nothing() -> None:
+    """Be a job that has a pool start its processes."""
+
+
+def _told(job: Callable[[], T]) -> tuple[T, list[Warning]]:
+    """Return what a job gives, and what it warns of: here nobody would hear it."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        value = job()
+    return value, [each.message for each in caught if isinstance(each.message, Warning)]
 
 
 def _computed(chunk: int | PlacedChunk) -> tuple[int, Columns]:
