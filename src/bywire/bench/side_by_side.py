@@ -18,6 +18,22 @@ from bywire.simulation.run_group import fit_lanes, simulate_group
 
 
 @dataclass(frozen=True)
+class Wanted:
+    """Outputs to record of runs side by side.
+
+    Parameters
+    ----------
+    signals
+        In all rows.
+    ends
+        In the first and the last one alone; in all of runs with changes.
+    """
+
+    signals: tuple[str, ...]
+    ends: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Round:
     """One run of each of several benches.
 
@@ -40,7 +56,7 @@ def rounds(
     progress: Progress | None = None,
     engine: str = "auto",
     threads: int | None = None,
-    signals: Callable[[Run], Sequence[str] | None] = lambda _: None,
+    signals: Callable[[Run], Wanted | None] = lambda _: None,
 ) -> Iterator[Round]:
     """Yield the first run of all benches, the second one, and so on.
 
@@ -71,7 +87,11 @@ def rounds(
         cases = [every[k][number] for k in places]
         runs = [run_of(benches[k], case, number) for k, case in zip(places, cases, strict=True)]
         wanted = signals(runs[0])
-        outputs = runs[0].model.Output._fields if wanted is None else wanted
+        outputs = runs[0].model.Output._fields if wanted is None else wanted.signals
+        ends = () if wanted is None else wanted.ends
+        if any(run.changes for run in runs):
+            every, ends = {*outputs, *ends}, ()
+            outputs = tuple(name for name in runs[0].model.Output._fields if name in every)
         check_memory(runs[0], len(runs) * len(outputs))
         report = None if progress is None else partial(progress, cases[0].label)
         kept = {(case.settle, case.keep) for case in cases}
@@ -80,7 +100,8 @@ def rounds(
         if is_free and len(runs) > 1 and len(kept) == 1 and fit_lanes(runs):
             times = runs[0].schedule().record_times - cases[0].settle
             first = int(np.searchsorted(times, -cases[0].keep - 1e-9))
-            yield Round(places, cases, runs, simulate_group(runs, wanted, threads, report, first))
+            group = simulate_group(runs, outputs, threads, report, first, ends)
+            yield Round(places, cases, runs, group)
         else:
             yield Round(places, cases, runs, _one_by_one(runs, report, kinds))
 

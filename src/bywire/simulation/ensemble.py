@@ -64,18 +64,37 @@ class Ensemble:
         return np.asarray(self.values[:, :, self.names.index(name)])
 
 
+@dataclass(frozen=True)
+class Ends:
+    """Where the signals recorded at both ends of the rows alone go.
+
+    Parameters
+    ----------
+    values
+        Shape (signals, cases, 2), those of a signal in one piece.
+    frames
+        Those of the first and the last row.
+    """
+
+    values: Array
+    frames: tuple[int, int]
+
+
 class LaneKernel:
     """Compiled kernel for a group of cases, of the signals that are wanted and nothing else.
 
-    ``signals``: how many outputs it records.
+    ``signals``: how many outputs it records; ``ends``: how many of them, the last ones, at both
+    ends of the rows alone.
     """
 
     ENTRY = "bw_run_lanes"
     """its function in the library"""
 
-    def __init__(self, layout: Layout, library: Path, compiler: Compiler, signals: int) -> None:
+    def __init__(
+        self, layout: Layout, library: Path, compiler: Compiler, signals: int, ends: int = 0
+    ) -> None:
         self.layout, self.library, self.compiler = layout, library, compiler
-        self._signals = signals
+        self._signals, self.ends = signals - ends, ends
         loaded = load(library, self.ENTRY)
         self.lanes = int(loaded.bw_lanes())
         self.label = f"compiled C in {self.lanes} lanes, {compiler.label}"
@@ -84,11 +103,13 @@ class LaneKernel:
 
     @classmethod
     def of(
-        cls, program: Program, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool
-    ) -> LaneKernel:
+        cls, program: Program, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool,
+        ends: int = 0,
+    ) -> LaneKernel:  # fmt: skip
         """Emit the kernel of a program, and compile it unless the cache has it.
 
-        ``in_pairs``: whether there are cases enough for two vectors, should they pay.
+        ``in_pairs``: whether there are cases enough for two vectors, should they pay; ``ends``: see
+        `LaneKernel`.
         """
         from bywire.simulation.emission import layout_of
         from bywire.simulation.emit_lanes import emit_lanes, takes_turns
@@ -97,8 +118,10 @@ class LaneKernel:
         stages = build_stages(program, outputs=selection)
         in_turn = in_pairs and takes_turns(stages)
         flags = IN_TURN if in_turn else VECTOR
-        _, library = load_library(emit_lanes(stages, in_turn), flags, compiler, cls.ENTRY)
-        return cls(layout_of(stages), library, compiler, len(selection))
+        _, library = load_library(
+            emit_lanes(stages, in_turn, ends), flags, compiler, cls.ENTRY
+        )
+        return cls(layout_of(stages), library, compiler, len(selection), ends)
 
     def advance(
         self,
@@ -109,6 +132,7 @@ class LaneKernel:
         rows: Array,
         end: int,
         begin: int = 0,
+        ends: Ends | None = None,
     ) -> None:
         """Run frames begin..end of one group; renews ``vector`` and fills ``rows``.
 
@@ -123,11 +147,15 @@ class LaneKernel:
         rows
             Shape (cases, recorded rows of these frames, signals), of any strides; lanes beyond
             the cases are not recorded.
+        ends
+            Where the signals recorded at both ends alone go; None of a kernel without any, and
+            where no row is an end.
         """
         own = stimulus.ndim == 3
         apart = [stride // rows.itemsize for stride in rows.strides]
+        at = (-1, -1, 0) if ends is None else (*ends.frames, ends.values.strides[0] // 8)
         plan = np.concatenate(
-            (plan_array(schedule, begin, end, self._signals), [int(own), len(rows), *apart])
+            (plan_array(schedule, begin, end, self._signals), [int(own), len(rows), *apart, *at])
         ).astype(np.int64)
         self._run(
             pointer(parameters),
@@ -136,6 +164,7 @@ class LaneKernel:
             pointer(vector),
             pointer(plan),
             ctypes.c_void_p(rows.ctypes.data),
+            ctypes.c_void_p(None if ends is None else ends.values.ctypes.data),
         )
 
 
@@ -216,17 +245,18 @@ def simulate_ensemble(
 
 @built_once
 def lane_kernel(
-    prepared: Prepared, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool = False
-) -> LaneKernel:
+    prepared: Prepared, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool = False,
+    ends: int = 0,
+) -> LaneKernel:  # fmt: skip
     """Return the kernel that records some outputs, by index; built once.
 
-    What an earlier command kept is taken as it is. ``in_pairs``: see `LaneKernel.of`.
+    What an earlier command kept is taken as it is. ``in_pairs``, ``ends``: see `LaneKernel.of`.
     """
-    place = None if prepared.place is None else prepared.place.in_lanes(selection, in_pairs)
+    place = None if prepared.place is None else prepared.place.in_lanes(selection, in_pairs, ends)
     kept = None if place is None else place.kept()
     if kept is not None and kept.library is not None and kept.compiler == compiler.label:
-        return LaneKernel(kept.layout, kept.library, compiler, len(selection))
-    kernel = LaneKernel.of(prepared.program, compiler, selection, in_pairs)
+        return LaneKernel(kept.layout, kept.library, compiler, len(selection), ends)
+    kernel = LaneKernel.of(prepared.program, compiler, selection, in_pairs, ends)
     if place is not None:
         place.keep(kernel)
         prepared.keep_model()

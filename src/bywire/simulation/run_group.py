@@ -24,7 +24,7 @@ from bywire.simulation.advance import require_finite
 from bywire.simulation.changes import energies, pieces, put_in_signals
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.engine import prepare, structure_of
-from bywire.simulation.ensemble import PAIRED, LaneKernel, lane_kernel
+from bywire.simulation.ensemble import PAIRED, Ends, LaneKernel, lane_kernel
 from bywire.simulation.run import (
     Run,
     Trajectory,
@@ -72,6 +72,8 @@ class RunGroup(Sequence[Trajectory]):
         State vectors at the end, shape (entries, runs).
     kernel
         What computed them.
+    ends, end_names
+        Signals of which the first and the last row alone were recorded, shape (signals, runs, 2).
     """
 
     runs: tuple[Run, ...]
@@ -80,6 +82,8 @@ class RunGroup(Sequence[Trajectory]):
     names: tuple[str, ...]
     vectors: Array
     kernel: LaneKernel
+    ends: Array
+    end_names: tuple[str, ...] = ()
 
     @property
     def unsettled(self) -> NDArray[np.int64]:
@@ -120,6 +124,7 @@ def simulate_group(
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
     first: int = 0,
+    ends: Sequence[str] = (),
 ) -> RunGroup:
     """Compute runs that `fit_lanes`, each with its parameters, initial values and stimulus.
 
@@ -135,6 +140,9 @@ def simulate_group(
         Called with the finished share, 0 to 1, now and then.
     first
         Rows at the beginning that are not recorded, for instance those of a settling time.
+    ends
+        Further outputs, of which the first and the last of the rows recorded are wanted alone; of
+        runs without changes.
 
     Raises
     ------
@@ -157,8 +165,10 @@ def simulate_group(
     prepared = prepare(runs[0].model, runs[0].par)
     names = tuple(prepared.outputs)
     wanted = names if signals is None else tuple(signals)
-    selection = tuple(selected(names, wanted).tolist())
-    kernel = lane_kernel(prepared, compiler, selection, len(runs) >= PAIRED)
+    if ends and any(run.changes for run in runs):
+        raise ParameterError("runs with changes are recorded in all rows: leave ends out")
+    selection = tuple(selected(names, (*wanted, *ends)).tolist())
+    kernel = lane_kernel(prepared, compiler, selection, len(runs) >= PAIRED, len(ends))
     schedule = runs[0].schedule()
     edges = _edges(schedule, first, runs)
     output = runs[0].model.Output
@@ -166,11 +176,14 @@ def simulate_group(
     watch = _Watch(-(-len(runs) // kernel.lanes) * (len(edges) - 1), progress)
     recorded = (*wanted, *put_in_signals(output)) if jumping.any() else wanted
     values = np.zeros((len(recorded), len(runs), schedule.rows - first))
+    at_ends = np.zeros((len(ends), len(runs), 2))
+    frames = (first * schedule.record_frames, (schedule.rows - 1) * schedule.record_frames)
 
     def computed(begin: int) -> Array:
         cases = slice(begin, begin + kernel.lanes)
         carried = _Carried(kernel, schedule, runs[cases], jumping)
-        return carried.to_the_end(values[:, cases], edges, first, watch)
+        apart = Ends(at_ends[:, cases], frames) if ends else None
+        return carried.to_the_end(values[:, cases], edges, first, watch, apart)
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         try:
@@ -179,7 +192,10 @@ def simulate_group(
             watch.stop.set()
             raise
     vector = np.concatenate(vectors, axis=1)[:, : len(runs)]
-    return RunGroup(tuple(runs), schedule.record_times[first:], values, recorded, vector, kernel)
+    return RunGroup(
+        tuple(runs), schedule.record_times[first:], values, recorded, vector, kernel, at_ends,
+        tuple(ends),
+    )  # fmt: skip
 
 
 def _edges(schedule: Schedule, first: int, runs: Sequence[Run]) -> list[int]:
@@ -248,7 +264,7 @@ class _Carried:
         self._stimulus = _stimuli(group, schedule, width)
 
     def to_the_end(
-        self, values: Array, edges: Sequence[int], skipped: int, watch: _Watch
+        self, values: Array, edges: Sequence[int], skipped: int, watch: _Watch, ends: Ends | None
     ) -> Array:
         """Carry the runs on to their end; fill ``values``, return the state vectors."""
         schedule, every = self._schedule, self._schedule.record_frames
@@ -262,7 +278,7 @@ class _Carried:
             signals = values.shape[0] - self._books
             if first >= 0:
                 rows = values[:signals, :, first : max(last, first + 1)].transpose(1, 2, 0)
-                self._advance(schedule, rows, begin, end)
+                self._advance(schedule, rows, begin, end, ends)
             else:
                 rows = np.empty((self._count, 1, signals))
                 self._advance(silent, rows, begin, end)
@@ -293,7 +309,9 @@ class _Carried:
         self._vector = kept
         return np.array([row[:, 0, book > 0].sum(axis=-1) for book in self._jumping])
 
-    def _advance(self, plan: Schedule, rows: Array, begin: int, end: int) -> None:
+    def _advance(
+        self, plan: Schedule, rows: Array, begin: int, end: int, ends: Ends | None = None
+    ) -> None:
         self._kernel.advance(
-            plan, self._parameters, self._stimulus, self._vector, rows, end, begin
+            plan, self._parameters, self._stimulus, self._vector, rows, end, begin, ends
         )

@@ -53,3 +53,13 @@ def test_static_gains_of_many_cases_are_those_of_each():
     assert pressure_step.gains(rows, apart) is None
     p[3, 5] = np.nan
     assert pressure_step.gains(Rows(t, {"p_mc": p}, {"p_mc": {"units": "Pa"}}), options) is None
+
+
+def test_books_are_those_of_single_runs_though_rows_tell_their_ends_alone():
+    """A pipeline nearly without friction opens them; see the test of a single run."""
+    bench = bywire.Bench("hard-braking", SET)
+    benches = [changed(bench, {"pipeline.k_lf": k}) for k in (32.0, 3.2e-19, 3.2e-15)]
+    said = key_figures_of(benches).warnings
+    assert [list(each) for each in said] == [list(run_once(each).warnings) for each in benches]
+    opened = [any("energy balance is open" in text for text in each) for each in said]
+    assert opened == [False, True, True]
