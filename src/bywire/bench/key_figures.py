@@ -21,13 +21,13 @@ from bywire.bench.recording import (
     rows_of_group,
     watch_cases,
 )
+from bywire.bench.rows import Rows
 from bywire.bench.running import (
     inputs_recorded,
     rows_of_case,
     rows_recorded,
     static_recordings,
 )
-from bywire.bench.rows import Rows
 from bywire.bench.side_by_side import Round, Wanted, rounds
 from bywire.simulation.run import Run
 from bywire.simulation.run_group import RunGroup, simulate_group

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import logging
 import os
-import signal
-import threading
 import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import active_children, get_context, parent_process
 from typing import Any, Generic, Protocol, TypeVar
 
 from bywire.core.brake import load_system, loaded_files
-from bywire.core.copies import deaf_to_interrupts, may_copy
+from bywire.core.copies import may_copy, processes
 from bywire.core.errors import ParameterError, RunError
 from bywire.core.unneeded import allow_dask
 from bywire.data.file_format import library
@@ -168,25 +165,16 @@ class Pool:
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
         """Return what computes; see `Executor`."""
-        others, is_copied = active_children(), may_copy()
-        # A copy has loaded what we have, all brakes among it; others load it anew, for a second.
-        pool = ProcessPoolExecutor(
-            self.workers, get_context("fork" if is_copied else "spawn"), initializer=_begin,
-            initargs=(() if is_copied else loaded_files(), plan),
-        )  # fmt: skip
+        is_copied = may_copy()
+        files = () if is_copied else loaded_files()  # a copy has them
         try:
-            with deaf_to_interrupts() if is_copied else nullcontext():
-                pool.submit(_nothing)  # which starts them
-            yield _InPool(pool, _AHEAD * self.workers)
+            with processes(self.workers, _begin, files, plan, is_copied=is_copied) as pool:
+                yield _InPool(pool, _AHEAD * self.workers)
         except BrokenProcessPool:
             raise RunError(
                 "a process of the study was killed, most likely for want of memory: resume it, "
                 "with fewer --workers"
             ) from None
-        finally:  # at once, also after Ctrl-C: nobody waits for what they are at
-            for process in set(active_children()).difference(others):
-                process.terminate()
-            pool.shutdown(wait=False, cancel_futures=True)
 
 
 class Cluster:
@@ -254,23 +242,9 @@ _given: list[StudyPlan] = []
 
 
 def _begin(files: tuple[str, ...], plan: StudyPlan) -> None:
-    """Prepare a process of a pool: Ctrl-C is for the one that asked, with which it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    """Prepare a process of a pool."""
     _load(files)
     _given[:] = [plan]
-
-
-def _end_with_parent() -> None:
-    """End this process when the one that asked is killed: a pool's would wait for jobs forever."""
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
-
-
-def _nothing() -> None:
-    """Be a job that has a pool start its processes."""
 
 
 def _told(job: Callable[[], T]) -> tuple[T, list[Warning]]:
