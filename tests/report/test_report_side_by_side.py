@@ -12,7 +12,8 @@ from bywire.report import side_by_side
 from bywire.report.document import FigureBlock
 from bywire.report.files import figure_bytes
 from bywire.report.inline_figure import inline_figures
-from bywire.report.side_by_side import FEW, Picture, drawn_side_by_side
+from bywire.report.picture import Picture
+from bywire.report.side_by_side import FEW, drawn_side_by_side
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="copies are of Linux alone")
 

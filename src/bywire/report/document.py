@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from bywire.report.side_by_side import Picture
+    from bywire.report.picture import Picture
 
 
 @dataclass(frozen=True)

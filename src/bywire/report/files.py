@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from bywire.core.errors import FileError
 from bywire.core.scratch import replacing
 from bywire.report.drawing import drawn
-from bywire.report.side_by_side import Picture
+from bywire.report.picture import Picture
 
 PNG_DPI = 160
 """pixels per inch of a PNG"""

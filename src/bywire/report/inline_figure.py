@@ -12,7 +12,7 @@ from html import escape
 from matplotlib.figure import Figure
 
 from bywire.report.files import figure_bytes
-from bywire.report.side_by_side import Picture
+from bywire.report.picture import Picture
 from bywire.report.wording import clean
 
 BUDGET = 2_000_000

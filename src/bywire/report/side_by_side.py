@@ -6,33 +6,16 @@ import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bywire.core.copies import may_copy, processes
+from bywire.report.picture import Picture
 
 if TYPE_CHECKING:
     from bywire.report.document import FigureBlock
 
 FEW = 4
 """figures up to which copies are not worth their start"""
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A figure that was drawn elsewhere.
-
-    Parameters
-    ----------
-    png, svg
-        Its files.
-    axes
-        Where its axes lie; see `bywire.report.inline_figure.axes_of`.
-    """
-
-    png: bytes
-    svg: bytes
-    axes: str
 
 
 # What a copy draws: it has them from the process that it was copied from.

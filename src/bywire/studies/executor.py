@@ -2,101 +2,35 @@
 
 from __future__ import annotations
 
-import logging
 import os
-import time
 import warnings
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any
 
-from bywire.core.brake import load_system, loaded_files
+from bywire.core.brake import loaded_files
 from bywire.core.copies import may_copy, processes
 from bywire.core.errors import ParameterError, RunError
-from bywire.core.unneeded import allow_dask
-from bywire.data.file_format import library
 from bywire.studies.chunk import Columns, PlacedChunk, computed_chunk, number_of
+from bywire.studies.cluster import Cluster
+from bywire.studies.computing import (
+    Apart,
+    Beside,
+    Chunks,
+    Compute,
+    Executor,
+    T,
+    load_brakes,
+    single,
+)
 from bywire.studies.plan import StudyPlan
 
-_AHEAD = 2  # chunks, or tasks of a cluster, in flight for each worker, so that none waits for us
-_SECONDS = 10.0  # to reach a cluster
-_TASK = 0.5  # s that a task of a cluster is to take
+_AHEAD = 2  # chunks in flight for each worker, so that none waits for us
 _WORTH = 8  # chunks from which on processes are worth their start
-# What Dask does by the clock: stacks sampled every 10 ms, ticks of 20 ms, memory looked at every
-# 100 ms. A core's worker, scheduler and client take 8 % of a core with it, and 1.4 % with these.
-CLUSTER_SETTINGS = {
-    "distributed.worker.profile.enabled": False,
-    "distributed.admin.tick.interval": "1s",
-    "distributed.worker.memory.monitor-interval": "1s",
-}
-"""configuration of Dask with which scheduler and workers are best started"""
-# Dask has its workers give memory back at once, which the next chunk takes again page by page: an
-# eighth of its time.
-CLUSTER_MEMORY = {"MALLOC_TRIM_THRESHOLD_": 1 << 28, "MALLOC_MMAP_THRESHOLD_": 1 << 25}
-"""environment with which workers are best started where the C library is glibc [byte]"""
-
-_LOST = "the cluster lost its workers ({}): resume the study when some are there"
-_WHAT = ("studies on a cluster", "cluster")
-
-
-Chunks = Iterable[int | PlacedChunk]
-T = TypeVar("T")
-_Task = tuple[float, list[tuple[int, Columns]]]
-"""what a task of a cluster gives: time [s], and its chunks"""
-
-
-class Beside(Generic[T]):
-    """What is computed beside chunks.
-
-    ``future``: gives its value, and what was warned of meanwhile in another process.
-    """
-
-    def __init__(self, future: Future[tuple[T, list[Warning]]]) -> None:
-        self._future = future
-
-    def check(self) -> None:
-        """Raise what it raised, if it did so by now."""
-        if self._future.done():
-            self._future.result()
-
-    def result(self) -> T:
-        """Wait for its value, and warn of what was warned of."""
-        value, said = self._future.result()
-        for each in said:
-            warnings.warn(each, stacklevel=2)
-        return value
-
-
-class Compute(Protocol):
-    """What computes chunks batch by batch."""
-
-    def __call__(self, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        """Yield number and columns of each chunk as soon as it is there, in any order."""
-        ...
-
-    def beside(self, job: Callable[[], T]) -> Beside[T]:
-        """Begin something else: at once, or in a process that then goes on with chunks."""
-        ...
-
-
-@dataclass(frozen=True)
-class _Apart:
-    """Computes chunks by a function, and what stands beside them at once."""
-
-    chunks: Callable[[Chunks], Iterator[tuple[int, Columns]]]
-
-    def __call__(self, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        return self.chunks(chunks)
-
-    def beside(self, job: Callable[[], T]) -> Beside[T]:
-        done: Future[tuple[T, list[Warning]]] = Future()
-        done.set_result((job(), []))
-        return Beside(done)
 
 
 @dataclass(frozen=True)
@@ -113,24 +47,6 @@ class _InPool:
         return Beside(self.pool.submit(_told, job))
 
 
-class Executor(Protocol):
-    """Computes chunks, in any order."""
-
-    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        """Yield the number and the columns of each chunk as soon as it is there.
-
-        Raises
-        ------
-        RunError
-            When workers are lost and none is left.
-        """
-        ...
-
-    def opened(self, plan: StudyPlan) -> AbstractContextManager[Compute]:
-        """Return what computes chunks batch by batch, each one whole before the next."""
-        ...
-
-
 class InProcess:
     """The process itself, with lanes on all cores."""
 
@@ -142,7 +58,7 @@ class InProcess:
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
         """Return what computes; see `Executor`."""
-        yield _Apart(partial(self.computed, plan))
+        yield Apart(partial(self.computed, plan))
 
 
 class Pool:
@@ -175,34 +91,6 @@ class Pool:
                 "a process of the study was killed, most likely for want of memory: resume it, "
                 "with fewer --workers"
             ) from None
-
-
-class Cluster:
-    """A cluster of dask.distributed.
-
-    Parameters
-    ----------
-    address
-        Of its scheduler, for instance ``tcp://host:8786``.
-    """
-
-    def __init__(self, address: str) -> None:
-        self.address = address
-
-    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        """Yield each chunk; see `Executor`."""
-        with self.opened(plan) as compute:
-            yield from compute(chunks)
-
-    @contextmanager
-    def opened(self, plan: StudyPlan) -> Iterator[Compute]:
-        """Return what computes; see `Executor`."""
-        with _client(self.address) as client:
-            workers = len(client.scheduler_info()["workers"])
-            if not workers:
-                raise RunError(f"the cluster at {self.address} has no workers: start some first")
-            client.run(_load, loaded_files())
-            yield _Apart(partial(_of_cluster, client, plan, workers))
 
 
 def executor_of(
@@ -243,7 +131,7 @@ _given: list[StudyPlan] = []
 
 def _begin(files: tuple[str, ...], plan: StudyPlan) -> None:
     """Prepare a process of a pool."""
-    _load(files)
+    load_brakes(files)
     _given[:] = [plan]
 
 
@@ -256,17 +144,7 @@ def _told(job: Callable[[], T]) -> tuple[T, list[Warning]]:
 
 
 def _computed(chunk: int | PlacedChunk) -> tuple[int, Columns]:
-    return _single(chunk, _given[0])
-
-
-def _load(files: tuple[str, ...]) -> None:
-    """Load the brakes that were loaded by path."""
-    for file in files:
-        load_system(file)
-
-
-def _single(chunk: int | PlacedChunk, plan: StudyPlan) -> tuple[int, Columns]:
-    return number_of(chunk), computed_chunk(plan, chunk, threads=1)
+    return single(chunk, _given[0])
 
 
 def _as_completed(
@@ -285,66 +163,3 @@ def _as_completed(
         done, running = wait(running, return_when=FIRST_COMPLETED)
         for each in done:
             yield each.result()
-
-
-@contextmanager
-def _client(address: str) -> Iterator[Any]:
-    allow_dask()
-    distributed = library("distributed", *_WHAT)
-    try:
-        client = distributed.Client(address, timeout=_SECONDS, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
-        raise RunError(
-            f"no cluster answers at {address!r} ({error}): start one with 'dask scheduler' and "
-            "'dask worker', and give the address that the scheduler says"
-        ) from None
-    log = logging.getLogger("distributed.client")  # it would print how a connection is lost
-    before = log.level
-    log.setLevel(logging.CRITICAL)
-    try:
-        yield client
-    finally:
-        client.close()
-        log.setLevel(before)
-
-
-def _timed(chunks: Sequence[int | PlacedChunk], plan: StudyPlan) -> _Task:
-    """Return chunks one after the other, and the time that they took."""
-    begin = time.perf_counter()
-    given = [_single(chunk, plan) for chunk in chunks]
-    return time.perf_counter() - begin, given
-
-
-def _of_cluster(
-    client: Any, plan: StudyPlan, workers: int, chunks: Chunks
-) -> Iterator[tuple[int, Columns]]:
-    """Yield what a cluster has finished, with few tasks in flight.
-
-    A task goes through scheduler and network, which takes as long as some cases: it is as many
-    chunks as take about `_TASK`, but near the end no more than each worker's share.
-    """
-    distributed = library("distributed", *_WHAT)
-    # Once to every worker, where it stays: with each task its bench would be made anew.
-    kept = client.scatter(plan, broadcast=True, hash=False)
-    left, size = deque(chunks), 1
-    with client.as_current():
-        tasks = distributed.as_completed(with_results=True)
-
-    def submit() -> None:
-        share = -(-len(left) // (_AHEAD * workers))
-        task = [left.popleft() for _ in range(min(size, share))]
-        if task:
-            tasks.add(client.submit(_timed, task, plan=kept, pure=False))
-
-    try:
-        for _ in range(_AHEAD * workers):
-            submit()
-        for _, answer in tasks:
-            if isinstance(answer, BaseException):  # a task that was cancelled gives why
-                raise RunError(_LOST.format(getattr(answer, "reason", answer)))
-            seconds, given = answer
-            size = max(1, round(_TASK * len(given) / seconds))
-            submit()
-            yield from given
-    except distributed.KilledWorker as error:
-        raise RunError(_LOST.format(error)) from None

@@ -1,6 +1,4 @@
-"""Studies of many cases: what a million hard brakings take, how much of it is simulation, and the
-whole command of a study with ten thousand.
-"""
+"""Studies of many cases: what hard brakings take, how much of it is simulation, and commands."""
 
 from __future__ import annotations
 
@@ -19,13 +17,9 @@ from bywire.benchmark.suite import Part
 from bywire.core.unneeded import allow_dask
 from bywire.data.file_format import library
 from bywire.studies.chunk import computed_chunk
-from bywire.studies.executor import (
-    CLUSTER_MEMORY,
-    CLUSTER_SETTINGS,
-    Cluster,
-    Executor,
-    Pool,
-)
+from bywire.studies.cluster import CLUSTER_MEMORY, CLUSTER_SETTINGS, Cluster
+from bywire.studies.computing import Executor
+from bywire.studies.executor import Pool
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.study_file import read_study
 
