@@ -151,8 +151,13 @@ def test_a_cluster_that_is_not_there_is_named(study, monkeypatch):
         next(iter(Cluster("tcp://192.0.2.1:9").computed(read_study(study()), [0])))
 
 
-def test_who_computes_is_chosen_by_the_work():
+def test_who_computes_is_chosen_by_the_work(monkeypatch):
     assert isinstance(executor_of(None, "", 2), InProcess)
+    with monkeypatch.context() as copied:
+        copied.setattr("bywire.studies.executor.os.cpu_count", lambda: 2)
+        copied.setattr("bywire.studies.executor.may_copy", lambda: True)
+        assert isinstance(executor_of(None, "", 1), InProcess)
+        assert isinstance(executor_of(None, "", 2), Pool)
     assert isinstance(executor_of(1, "", 100), InProcess)
     assert isinstance(executor_of(3, "", 100), Pool)
     with pytest.raises(ParameterError, match="workers = 0"):

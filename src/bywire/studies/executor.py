@@ -30,7 +30,8 @@ from bywire.studies.computing import (
 from bywire.studies.plan import StudyPlan
 
 _AHEAD = 2  # chunks in flight for each worker, so that none waits for us
-_WORTH = 8  # chunks from which on processes are worth their start
+# Chunks from which on processes are worth their start; those that load all anew take a second.
+_WORTH_COPIES, _WORTH = 2, 8
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def executor_of(
             raise ParameterError("workers of a cluster are the cluster's own: leave one out")
         return Cluster(cluster)
     count = min(workers or os.cpu_count() or 1, together or chunks)
-    is_worth = workers is not None or chunks >= _WORTH
+    is_worth = workers is not None or chunks >= (_WORTH_COPIES if may_copy() else _WORTH)
     return Pool(count) if count > 1 and is_worth else InProcess()
 
 

@@ -72,7 +72,7 @@ class Normal:
 
     def ppf(self, q: Array) -> Array:
         """Return quantiles."""
-        return normal_quantile(q) * self.sd + self.mean
+        return np.asarray(normal_quantile(q) * self.sd + self.mean)
 
     def cdf(self, x: float) -> float:
         """Return the probability below."""
