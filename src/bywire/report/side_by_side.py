@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 FEW = 4
 """figures up to which copies are not worth their start"""
 
-
 # What a copy draws: it has them from the process that it was copied from.
 _blocks: list[FigureBlock] = []
 
@@ -43,6 +42,7 @@ def drawn_side_by_side(blocks: Sequence[FigureBlock]) -> Iterator[None]:
                 block.__dict__["figure"] = each.result()
         except BrokenProcessPool:  # killed, most likely for want of memory: the rest is drawn here
             pass
+    _blocks.clear()
 
 
 def _picture(k: int) -> Picture:
