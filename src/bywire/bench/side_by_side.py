@@ -89,9 +89,9 @@ def rounds(
         wanted = signals(runs[0])
         outputs = runs[0].model.Output._fields if wanted is None else wanted.signals
         ends = () if wanted is None else wanted.ends
-        if any(run.changes for run in runs):
-            every, ends = {*outputs, *ends}, ()
-            outputs = tuple(name for name in runs[0].model.Output._fields if name in every)
+        if ends and any(run.changes for run in runs):
+            both, ends = {*outputs, *ends}, ()
+            outputs = tuple(name for name in runs[0].model.Output._fields if name in both)
         check_memory(runs[0], len(runs) * len(outputs))
         report = None if progress is None else partial(progress, cases[0].label)
         kept = {(case.settle, case.keep) for case in cases}
