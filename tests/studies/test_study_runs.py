@@ -8,6 +8,8 @@ import re
 import signal
 import sys
 import time
+import warnings
+from functools import partial
 from multiprocessing import active_children
 from pathlib import Path
 
@@ -108,6 +110,22 @@ def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(
     while any(each.exitcode is None for each in workers) and time.monotonic() < until:
         time.sleep(0.01)
     assert {each.exitcode for each in workers} == {-signal.SIGTERM}
+
+
+@pytest.mark.parametrize("kind", ["pool", "alone"])
+def test_what_stands_beside_chunks_warns_and_fails_where_it_was_asked(study, monkeypatch, kind):
+    if kind == "pool" and sys.platform != "linux":
+        pytest.skip("processes are copied on Linux alone")
+    monkeypatch.setattr("bywire.studies.executor.may_copy", lambda: True)
+    plan = read_study(study())
+    with (Pool(1) if kind == "pool" else InProcess()).opened(plan) as compute:
+        with pytest.warns(UserWarning, match="coarse"):
+            assert compute.beside(partial(warnings.warn, "coarse")).result() is None
+        if kind == "pool":  # the other fails at once
+            failing = compute.beside(partial(read_study, "nowhere.toml"))
+            assert [chunk for chunk, _ in compute([0])] == [0]
+            with pytest.raises(FileError, match="nowhere"):
+                failing.check()
 
 
 def test_the_page_says_how_a_cluster_is_best_started():
