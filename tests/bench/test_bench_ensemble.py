@@ -146,3 +146,15 @@ def test_a_varied_bench_is_the_one_that_is_made_anew(bench):
     assert run(varied).kpis == run(anew).kpis
     with pytest.raises(ParameterError, match=r"motor\.R_m"):
         bench.varied({"motor.R_m": -1.0}, {})
+
+
+def test_key_figures_of_faulty_cases_are_those_of_each():
+    """What fails changes parameters during a run: energies are then recorded in all rows."""
+    fault = {"set": {"motor.K_e": "-30%"}, "onset": "30 ms"}
+    options = {"duration": "60 ms", "settle": "10 ms"}
+    bench = bywire.Bench("hard-braking", "dardanelli2010", options=options, faults=(fault,))
+    benches = [bench.varied({"motor.R_m": value}, {}) for value in (0.3, 0.4)]
+    figures = key_figures_of(benches)
+    for k, result in enumerate(ensemble.run_benches(benches)):
+        assert figures.kpis(k) == result.kpis
+        assert list(figures.warnings[k]) == result.warnings

@@ -57,6 +57,11 @@ def test_a_change_between_two_frames_waits_for_the_next():
     np.testing.assert_array_equal(late.values, on_time.values)
 
 
+def test_lanes_with_changes_have_no_signals_of_both_ends_alone():
+    with pytest.raises(ParameterError, match="leave ends out"):
+        simulate_group([CHANGED], ["y"], ends=["seen"])
+
+
 def test_lanes_change_each_at_its_time():
     runs = [RUN, CHANGED, replace(RUN, changes=(Change(0.35, SLOW),))]
     for run, lane in zip(runs, simulate_group(runs), strict=True):

@@ -55,6 +55,21 @@ def test_some_signals_on_one_thread(runs):
     np.testing.assert_allclose(few[1]["p_mc"], everything[1]["p_mc"], rtol=1e-9)
 
 
+@pytest.mark.parametrize("is_paired", [False, True])
+@pytest.mark.parametrize("record", [1e-3, 3e-3])
+def test_signals_of_both_ends_have_the_bits_of_all_rows(runs, monkeypatch, is_paired, record):
+    monkeypatch.setattr(case_kernels, "PAIRED", len(runs) if is_paired else 1000)
+    each = [replace(run, record=record) for run in runs]  # 3 ms: the run ends after its last row
+    names, apart, first = ("p_mc", "E_seal", "i"), ("E_stored", "E_source"), 3
+    every = simulate_group(each, (*names, *apart), first=first)
+    few = simulate_group(each, names, first=first, ends=apart)
+    assert (few.names, few.end_names) == (names, apart)
+    np.testing.assert_array_equal(few.values, every.values[:3])
+    np.testing.assert_array_equal(few.ends, every.values[3:][:, :, [0, -1]])
+    np.testing.assert_array_equal(few.vectors, every.vectors)
+    assert np.all(few.ends[:, :, 0] != few.ends[:, :, 1])
+
+
 def test_vectors_that_take_turns_change_no_bit(runs, monkeypatch):
     stopping = braking("12 bar", p_from="5 bar", duration="0.2 s")
     longer = [replace(run, duration=stopping.duration) for run in runs]

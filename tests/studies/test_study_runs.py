@@ -8,6 +8,8 @@ import re
 import signal
 import sys
 import time
+import warnings
+from functools import partial
 from multiprocessing import active_children
 from pathlib import Path
 
@@ -18,14 +20,8 @@ from scipy import stats
 
 import bywire
 from bywire.core.errors import FileError, InputError, ParameterError, RunError
-from bywire.studies.executor import (
-    CLUSTER_MEMORY,
-    CLUSTER_SETTINGS,
-    Cluster,
-    InProcess,
-    Pool,
-    executor_of,
-)
+from bywire.studies.cluster import CLUSTER_MEMORY, CLUSTER_SETTINGS, Cluster
+from bywire.studies.executor import InProcess, Pool, executor_of
 from bywire.studies.store import Origin, StudyStore
 from bywire.studies.study_file import read_study
 from undrawn import undrawn
@@ -87,8 +83,14 @@ def test_a_linear_axis_has_the_quantiles_of_its_closed_form(tmp_path, spring_axi
     assert study.worst("overshoot").par.d == study.cases["d"].min()
 
 
-def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(study, tmp_path):
+@pytest.mark.parametrize("is_copied", [False, True], ids=["begun", "copied"])
+def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(
+    study, tmp_path, monkeypatch, is_copied
+):
     """Processes end as after Ctrl-C: what they are at may take long."""
+    if is_copied and sys.platform != "linux":
+        pytest.skip("processes are copied on Linux alone")
+    monkeypatch.setattr("bywire.studies.executor.may_copy", lambda: is_copied)
     plan = read_study(study())
     alone, shared = (StudyStore(tmp_path / name) for name in ("alone", "shared"))
     for store in (alone, shared):
@@ -108,6 +110,22 @@ def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(
     while any(each.exitcode is None for each in workers) and time.monotonic() < until:
         time.sleep(0.01)
     assert {each.exitcode for each in workers} == {-signal.SIGTERM}
+
+
+@pytest.mark.parametrize("kind", ["pool", "alone"])
+def test_what_stands_beside_chunks_warns_and_fails_where_it_was_asked(study, monkeypatch, kind):
+    if kind == "pool" and sys.platform != "linux":
+        pytest.skip("processes are copied on Linux alone")
+    monkeypatch.setattr("bywire.studies.executor.may_copy", lambda: True)
+    plan = read_study(study())
+    with (Pool(1) if kind == "pool" else InProcess()).opened(plan) as compute:
+        with pytest.warns(UserWarning, match="coarse"):
+            assert compute.beside(partial(warnings.warn, "coarse")).result() is None
+        if kind == "pool":  # the other fails at once
+            failing = compute.beside(partial(read_study, "nowhere.toml"))
+            assert [chunk for chunk, _ in compute([0])] == [0]
+            with pytest.raises(FileError, match="nowhere"):
+                failing.check()
 
 
 def test_the_page_says_how_a_cluster_is_best_started():
@@ -146,13 +164,18 @@ def test_a_cluster_computes_the_same_until_its_workers_are_gone(study):
 
 def test_a_cluster_that_is_not_there_is_named(study, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("bywire.studies.executor._SECONDS", 0.5)
+    monkeypatch.setattr("bywire.studies.cluster._SECONDS", 0.5)
     with pytest.raises(RunError, match=r"no cluster answers at 'tcp://192\.0\.2\.1:9'"):
         next(iter(Cluster("tcp://192.0.2.1:9").computed(read_study(study()), [0])))
 
 
-def test_who_computes_is_chosen_by_the_work():
+def test_who_computes_is_chosen_by_the_work(monkeypatch):
     assert isinstance(executor_of(None, "", 2), InProcess)
+    with monkeypatch.context() as copied:
+        copied.setattr("bywire.studies.executor.os.cpu_count", lambda: 2)
+        copied.setattr("bywire.studies.executor.may_copy", lambda: True)
+        assert isinstance(executor_of(None, "", 1), InProcess)
+        assert isinstance(executor_of(None, "", 2), Pool)
     assert isinstance(executor_of(1, "", 100), InProcess)
     assert isinstance(executor_of(3, "", 100), Pool)
     with pytest.raises(ParameterError, match="workers = 0"):

@@ -93,9 +93,8 @@ def _completed(
     progress: Progress | None,
 ) -> StudyRun:  # fmt: skip
     """Return a study with all of its cases, those that were missing computed."""
-    nominal = running.run(plan.bench, estimate_error=True)
     try:
-        damaged = complete(
+        completed = complete(
             plan, store, origin, workers=workers, cluster=cluster, progress=progress or silent
         )
     except KeyboardInterrupt:
@@ -103,7 +102,7 @@ def _completed(
         raise KeyboardInterrupt(
             f"{len(store.finished())}{of} chunks are kept: bywire study resume {store.folder}"
         ) from None
-    return replace(_run_of(plan, store, nominal), damaged=damaged)
+    return replace(_run_of(plan, store, completed.nominal), damaged=completed.damaged)
 
 
 @use_case

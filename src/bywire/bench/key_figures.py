@@ -5,22 +5,32 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, cast
+
+import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.bench.kpis.cases import FamilyJudge, of_cases
 from bywire.bench.kpis.kpi import Kpi, KpiOfCases
-from bywire.bench.recording import energy_signals, rows_of_group, watch_cases
+from bywire.bench.recording import (
+    are_surely_closed,
+    ends_of_group,
+    energy_signals,
+    open_books_of_cases,
+    rows_of_group,
+    watch_cases,
+)
+from bywire.bench.rows import Rows
 from bywire.bench.running import (
     inputs_recorded,
     rows_of_case,
     rows_recorded,
     static_recordings,
 )
-from bywire.bench.side_by_side import Round, rounds
+from bywire.bench.side_by_side import Round, Wanted, rounds
 from bywire.simulation.run import Run
-from bywire.simulation.run_group import RunGroup
+from bywire.simulation.run_group import RunGroup, simulate_group
 
 
 @dataclass(frozen=True)
@@ -75,7 +85,9 @@ def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyF
             _recorded(benches, made, recordings, warnings)
             continue
         rows = rows_of_group(group, made.cases[0].settle)
-        said = watch_cases(rows, group.runs, group.unsettled.tolist())
+        said = watch_cases(
+            rows, group.runs, group.unsettled.tolist(), _books(made, group, rows, threads)
+        )
         for k, case, texts in zip(made.places, made.cases, said, strict=True):
             warnings[k] += _labeled(benches[k], case, texts)
         if families is not None:
@@ -96,13 +108,30 @@ def _is_plain(bench: Bench) -> bool:
     return definition.static is None and definition.finish is None and len(bench.cases()) == 1
 
 
-def needed(wanted: set[str], run: Run) -> tuple[str, ...] | None:
+def needed(wanted: set[str], run: Run) -> Wanted | None:
     """Return the outputs that key figures, warnings and books of energy look at; None for all."""
-    watched = run.model.watched(run.par)
+    watched, names = run.model.watched(run.par), run.model.Output._fields
     if watched is None:
         return None
-    every = {*wanted, *watched, *energy_signals(run)}
-    return tuple(name for name in run.model.Output._fields if name in every)
+    rows, booked = {*wanted, *watched}, set(energy_signals(run))
+    return Wanted(
+        tuple(name for name in names if name in rows),
+        tuple(name for name in names if name in booked - rows),
+    )
+
+
+def _books(made: Round, group: RunGroup, rows: Rows, threads: int | None) -> list[list[str]]:
+    """Return what every run warns of because its books do not close.
+
+    Their ends tell of most runs that they do; where they do not, all rows of a group are computed.
+    """
+    if group.end_names:
+        if are_surely_closed(cast(xr.Dataset, ends_of_group(group))):
+            return [[] for _ in made.runs]
+        every, first = energy_signals(made.runs[0]), group.runs[0].schedule().rows
+        group = simulate_group(made.runs, every, threads, first=first - group.time.size)
+        rows = rows_of_group(group, made.cases[0].settle)
+    return open_books_of_cases(cast(xr.Dataset, rows), len(made.runs))
 
 
 def _recorded(

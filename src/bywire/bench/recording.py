@@ -102,6 +102,15 @@ def rows_of_group(group: RunGroup, settle: float) -> Rows:
     )
 
 
+def ends_of_group(group: RunGroup) -> Rows:
+    """Return the first and the last row of several runs, with what these alone recorded."""
+    values = {name: each[:, [0, -1]] for name, each in zip(group.names, group.values, strict=True)}
+    values |= zip(group.end_names, group.ends, strict=True)
+    attributes = _attributes_of(group.runs[0].model.Output)
+    signals = {name: values[name] for name in attributes if name in values}
+    return Rows(group.time[[0, -1]], signals, {name: attributes[name] for name in signals})
+
+
 @cache
 def _attributes_of(output: type) -> Mapping[str, Mapping[str, str]]:
     every = {**signals_of(output), **put_in_signals(output)}
@@ -122,16 +131,18 @@ def watch(recording: xr.Dataset, run: Run, trajectory: Trajectory) -> list[str]:
     return [*doubts, *open_books(recording), *run.model.watch(recording, run.par)]
 
 
-def watch_cases(rows: Rows, runs: Sequence[Run], unsettled: Sequence[int]) -> list[list[str]]:
+def watch_cases(
+    rows: Rows, runs: Sequence[Run], unsettled: Sequence[int], books: Sequence[Sequence[str]]
+) -> list[list[str]]:
     """Return what `watch` says of each of several runs of one structure and plan.
 
-    ``rows``: of all of them; ``unsettled``: substeps of each that hit the cap of the contacts.
+    ``rows``: of all of them; ``unsettled``: substeps of each that hit the cap of the contacts;
+    ``books``: what `open_books` says of each.
     """
     solver = map(_solver_doubts, doubts_of(runs), unsettled)
     model, pars = runs[0].model, [run.par for run in runs]
     rows.silent = model.silent(rows, pars)
     asked = set(model.may_warn(rows, pars))
-    books = open_books_of_cases(cast(xr.Dataset, rows), len(runs))
     return [
         [*doubts, *book, *(model.watch(rows.case(k), pars[k]) if k in asked else ())]
         for k, (doubts, book) in enumerate(zip(solver, books, strict=True))
@@ -158,11 +169,7 @@ def open_books(recording: xr.Dataset) -> list[str]:
 
 def open_books_of_cases(recording: xr.Dataset, cases: int) -> list[list[str]]:
     """Return what `open_books` says of each of several runs, of the rows of all."""
-    books = actuator_ledger(recording, is_split=False)
-    if not (books.sources and books.sinks):
-        return [[] for _ in range(cases)]
-    # What is split turns over no less: where the whole is far from open, so are its parts.
-    if np.all(2.0 * np.abs(books.closing_error) <= _OPEN * books.turnover + _NOTHING):
+    if are_surely_closed(recording):
         return [[] for _ in range(cases)]
     books = actuator_ledger(recording)
     error, turned = (
@@ -178,6 +185,15 @@ def open_books_of_cases(recording: xr.Dataset, cases: int) -> list[list[str]]:
         ]
         for left, total in zip(error.tolist(), turned.tolist(), strict=True)
     ]
+
+
+def are_surely_closed(recording: xr.Dataset) -> bool:
+    """Return whether the ends of a recording, or of several runs', tell that no books are open."""
+    books = actuator_ledger(recording, is_split=False)
+    if not (books.sources and books.sinks):
+        return True
+    # What is split turns over no less: where the whole is far from open, so are its parts.
+    return bool(np.all(2.0 * np.abs(books.closing_error) <= _OPEN * books.turnover + _NOTHING))
 
 
 def energy_signals(run: Run) -> tuple[str, ...]:

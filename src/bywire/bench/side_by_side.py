@@ -13,8 +13,26 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.bench.extent import check_memory
 from bywire.bench.running import Progress, run_of
+from bywire.simulation.engine import CUDA
 from bywire.simulation.run import Run, Trajectory, simulate
 from bywire.simulation.run_group import fit_lanes, simulate_group
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Outputs to record of runs side by side.
+
+    Parameters
+    ----------
+    signals
+        In all rows.
+    ends
+        In the first and the last one alone; in all of runs with changes, and of a graphics
+        processor.
+    """
+
+    signals: tuple[str, ...]
+    ends: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -40,7 +58,7 @@ def rounds(
     progress: Progress | None = None,
     engine: str = "auto",
     threads: int | None = None,
-    signals: Callable[[Run], Sequence[str] | None] = lambda _: None,
+    signals: Callable[[Run], Wanted | None] = lambda _: None,
 ) -> Iterator[Round]:
     """Yield the first run of all benches, the second one, and so on.
 
@@ -71,17 +89,21 @@ def rounds(
         cases = [every[k][number] for k in places]
         runs = [run_of(benches[k], case, number) for k, case in zip(places, cases, strict=True)]
         wanted = signals(runs[0])
-        outputs = runs[0].model.Output._fields if wanted is None else wanted
+        outputs = runs[0].model.Output._fields if wanted is None else wanted.signals
+        ends = () if wanted is None else wanted.ends
+        kinds = [benches[k].engine if engine == "auto" else engine for k in places]
+        if ends and (kinds[0] == CUDA or any(run.changes for run in runs)):
+            both, ends = {*outputs, *ends}, ()
+            outputs = tuple(name for name in runs[0].model.Output._fields if name in both)
         check_memory(runs[0], len(runs) * len(outputs))
         report = None if progress is None else partial(progress, cases[0].label)
         kept = {(case.settle, case.keep) for case in cases}
-        kinds = [benches[k].engine if engine == "auto" else engine for k in places]
         computing = {"auto" if kind == "compiled" else kind for kind in kinds}
         is_alike = len(computing) == 1 and len(kept) == 1
         if is_alike and len(runs) > 1 and fit_lanes(runs, kinds[0]):
             times = runs[0].schedule().record_times - cases[0].settle
             first = int(np.searchsorted(times, -cases[0].keep - 1e-9))
-            group = simulate_group(runs, wanted, threads, report, first, kinds[0])
+            group = simulate_group(runs, outputs, threads, report, first, kinds[0], ends)
             yield Round(places, cases, runs, group)
         else:
             yield Round(places, cases, runs, _one_by_one(runs, report, kinds))

@@ -36,6 +36,11 @@ def command_line() -> Iterator[None]:
         _commands.pop()
 
 
+def is_command_line() -> bool:
+    """Return whether a person typed a command, and no program called."""
+    return bool(_commands)
+
+
 def in_callers_words(text: str) -> str:
     """Return a message with the arguments of Python's functions in place of flags, in a program.
 

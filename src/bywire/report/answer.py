@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 from bywire.core.callers import in_callers_words
 from bywire.report.document import Document, FigureBlock, TableBlock
 from bywire.report.result_folder import ResultFolder, result_folder
+from bywire.report.side_by_side import drawn_side_by_side
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -134,19 +135,21 @@ def write_document(document: Document, folder: Path) -> list[Path]:
 
 def _written(document: Document, place: ResultFolder) -> list[str]:
     """Write the files of a document and return their names."""
-    figures = []
+    shown = []
     if document.is_paged:
-        figures = [b for b in document.flat() if isinstance(b, FigureBlock) and b.name]
+        shown = [block for block in document.flat() if isinstance(block, FigureBlock)]
+    figures = [block for block in shown if block.name]
     names = [
         *(each.name for each in document.attachments),
         *(f"{block.name}.png" for block in figures),
         *([document.page_name] if document.is_paged else []),
         *([document.record] if document.record else []),
     ]
-    for each in document.attachments:
-        if each.after_record and document.record:
-            _record(document, place, names)
-        each.write(place.scratch / each.name)
+    with drawn_side_by_side(shown):
+        for each in document.attachments:
+            if each.after_record and document.record:
+                _record(document, place, names)
+            each.write(place.scratch / each.name)
     if document.is_paged:
         from bywire.report.files import save_figure
         from bywire.report.page import write_page

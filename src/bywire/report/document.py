@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from bywire.report.picture import Picture
+
 
 @dataclass(frozen=True)
 class Paragraph:
@@ -52,8 +54,8 @@ class FigureBlock:
     name: str = ""
 
     @cached_property
-    def figure(self) -> Figure:
-        """The figure, drawn on first use."""
+    def figure(self) -> Figure | Picture:
+        """The figure, made on first use, or what was drawn of it elsewhere."""
         return self.source() if callable(self.source) else self.source
 
 

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from bywire.core.errors import FileError
 from bywire.core.scratch import replacing
 from bywire.report.drawing import drawn
+from bywire.report.picture import Picture
 
 PNG_DPI = 160
 """pixels per inch of a PNG"""
@@ -19,7 +20,7 @@ _KINDS = ("png", "svg")
 _drawn: WeakKeyDictionary[Figure, tuple[bytes, bytes]] = WeakKeyDictionary()
 
 
-def figure_bytes(figure: Figure, kind: str = "png") -> bytes:
+def figure_bytes(figure: Figure | Picture, kind: str = "png") -> bytes:
     """Return a figure as a PNG or SVG file; it is drawn as both, and again only when changed.
 
     ``figure``: figure to draw; ``kind``: ``"png"`` or ``"svg"``.
@@ -31,12 +32,14 @@ def figure_bytes(figure: Figure, kind: str = "png") -> bytes:
     """
     if kind not in _KINDS:
         raise FileError(f"figures are written as .png or .svg, not as {kind!r}: change the ending")
+    if isinstance(figure, Picture):
+        return figure.png if kind == "png" else figure.svg
     if figure.stale or figure not in _drawn:
         _drawn[figure] = drawn(figure, PNG_DPI)
     return _drawn[figure][_KINDS.index(kind)]
 
 
-def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
+def save_figure(figure: Figure | Picture, path: str | os.PathLike[str]) -> Path:
     """Write a figure as PNG or SVG, whichever the ending of the path says.
 
     Raises

@@ -12,13 +12,16 @@ from html import escape
 from matplotlib.figure import Figure
 
 from bywire.report.files import figure_bytes
+from bywire.report.picture import Picture
 from bywire.report.wording import clean
 
 BUDGET = 2_000_000
 """bytes that the figures of a page may take together while they are vector graphics"""
 
 
-def inline_figures(figures: Sequence[tuple[Figure, str]], budget: int = BUDGET) -> list[str]:
+def inline_figures(
+    figures: Sequence[tuple[Figure | Picture, str]], budget: int = BUDGET
+) -> list[str]:
     """Return the HTML of figures with their captions as descriptions.
 
     All are SVG at first; while they exceed the budget, the largest becomes a PNG if that is
@@ -36,7 +39,7 @@ def inline_figures(figures: Sequence[tuple[Figure, str]], budget: int = BUDGET) 
     return markup
 
 
-def _svg(figure: Figure, text: str, prefix: str) -> str:
+def _svg(figure: Figure | Picture, text: str, prefix: str) -> str:
     """Return a figure as SVG element whose ids no other figure of the page has."""
     whole = figure_bytes(figure, "svg").decode("utf-8")
     svg = whole[whole.index("<svg") :].strip()
@@ -45,11 +48,13 @@ def _svg(figure: Figure, text: str, prefix: str) -> str:
     kept = " ".join(re.findall(r'(?:viewBox|font-family)="[^"]*"', head))
     body = re.sub(r"<[^>]*>", lambda tag: _tag(tag[0], prefix), body)
     body = re.sub(r"\s*\n\s*", "\n", body)
-    return f'<svg {kept} role="img" aria-label="{_attribute(text)}"{_axes(figure)}>{body}'
+    return f'<svg {kept} role="img" aria-label="{_attribute(text)}"{axes_of(figure)}>{body}'
 
 
-def _axes(figure: Figure) -> str:
+def axes_of(figure: Figure | Picture) -> str:
     """Return an attribute that says where axes lie, as shares of the figure, and what they span."""
+    if isinstance(figure, Picture):
+        return figure.axes
     known = [
         {
             "box": [round(float(each), 5) for each in axes.get_position().extents],
@@ -75,13 +80,13 @@ def _tag(tag: str, prefix: str) -> str:
     return re.sub(r'\bd="[^"]*"', lambda m: re.sub(r"(\.\d)\d+", r"\1", m[0]), tag)
 
 
-def _png(figure: Figure, text: str) -> str:
+def _png(figure: Figure | Picture, text: str) -> str:
     content = figure_bytes(figure, "png")
     width, height = struct.unpack(">II", content[16:24])  # of the header
     data = base64.b64encode(content).decode("ascii")
     return (
         f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{_attribute(text)}"'
-        f"{_axes(figure)}>"
+        f"{axes_of(figure)}>"
         f'<image width="{width}" height="{height}" href="data:image/png;base64,{data}"/></svg>'
     )
 

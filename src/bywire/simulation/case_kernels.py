@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -28,6 +29,22 @@ if TYPE_CHECKING:
 
 PAIRED = 32
 """cases from which on kernels may carry on two vectors in turn: with fewer, lanes would be idle"""
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Where the signals recorded at both ends of the rows alone go.
+
+    Parameters
+    ----------
+    values
+        Shape (signals, cases, 2), those of a signal in one piece.
+    frames
+        Those of the first and the last row.
+    """
+
+    values: Array
+    frames: tuple[int, int]
 
 
 class CaseKernel(Protocol):
@@ -59,6 +76,7 @@ class CaseKernel(Protocol):
         rows: Array,
         end: int,
         begin: int = 0,
+        ends: Ends | None = None,
     ) -> None:
         """Run frames begin..end of one group; see `LaneKernel.advance`."""
         ...
@@ -67,15 +85,18 @@ class CaseKernel(Protocol):
 class LaneKernel:
     """Compiled kernel for a group of cases, of the signals that are wanted and nothing else.
 
-    ``signals``: how many outputs it records.
+    ``signals``: how many outputs it records; ``ends``: how many of them, the last ones, at both
+    ends of the rows alone.
     """
 
     ENTRY = "bw_run_lanes"
     """its function in the library"""
 
-    def __init__(self, layout: Layout, library: Path, compiler: Compiler, signals: int) -> None:
+    def __init__(
+        self, layout: Layout, library: Path, compiler: Compiler, signals: int, ends: int = 0
+    ) -> None:
         self.layout, self.library, self.compiler = layout, library, compiler
-        self._signals = signals
+        self._signals, self.ends = signals - ends, ends
         loaded = load(library, self.ENTRY)
         self.lanes, self.at_once = int(loaded.bw_lanes()), os.cpu_count() or 1
         self.label = f"compiled C in {self.lanes} lanes, {compiler.label}"
@@ -84,11 +105,13 @@ class LaneKernel:
 
     @classmethod
     def of(
-        cls, program: Program, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool
-    ) -> LaneKernel:
+        cls, program: Program, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool,
+        ends: int = 0,
+    ) -> LaneKernel:  # fmt: skip
         """Emit the kernel of a program, and compile it unless the cache has it.
 
-        ``in_pairs``: whether there are cases enough for two vectors, should they pay.
+        ``in_pairs``: whether there are cases enough for two vectors, should they pay; ``ends``: see
+        `LaneKernel`.
         """
         from bywire.simulation.emission import layout_of
         from bywire.simulation.emit_lanes import emit_lanes, takes_turns
@@ -97,8 +120,10 @@ class LaneKernel:
         stages = build_stages(program, outputs=selection)
         in_turn = in_pairs and takes_turns(stages)
         flags = IN_TURN if in_turn else VECTOR
-        _, library = load_library(emit_lanes(stages, in_turn), flags, compiler, cls.ENTRY)
-        return cls(layout_of(stages), library, compiler, len(selection))
+        _, library = load_library(
+            emit_lanes(stages, in_turn, ends), flags, compiler, cls.ENTRY
+        )
+        return cls(layout_of(stages), library, compiler, len(selection), ends)
 
     def rows(self, cases: int, rows: int) -> Array:
         """Return room for what cases record; see `CaseKernel`."""
@@ -113,6 +138,7 @@ class LaneKernel:
         rows: Array,
         end: int,
         begin: int = 0,
+        ends: Ends | None = None,
     ) -> None:
         """Run frames begin..end of one group; renews ``vector`` and fills ``rows``.
 
@@ -127,11 +153,15 @@ class LaneKernel:
         rows
             Shape (cases, recorded rows of these frames, signals), of any strides; lanes beyond
             the cases are not recorded.
+        ends
+            Where the signals recorded at both ends alone go; None of a kernel without any, and
+            where no row is an end.
         """
         own = stimulus.ndim == 3
         apart = [stride // rows.itemsize for stride in rows.strides]
+        at = (-1, -1, 0) if ends is None else (*ends.frames, ends.values.strides[0] // 8)
         plan = np.concatenate(
-            (plan_array(schedule, begin, end, self._signals), [int(own), len(rows), *apart])
+            (plan_array(schedule, begin, end, self._signals), [int(own), len(rows), *apart, *at])
         ).astype(np.int64)
         self._run(
             pointer(parameters),
@@ -140,6 +170,7 @@ class LaneKernel:
             pointer(vector),
             pointer(plan),
             ctypes.c_void_p(rows.ctypes.data),
+            ctypes.c_void_p(None if ends is None else ends.values.ctypes.data),
         )
 
 
@@ -157,9 +188,12 @@ def is_side_by_side(engine: str) -> bool:
 
 
 def case_kernel(
-    prepared: Prepared, engine: str, selection: tuple[int, ...], count: int, schedule: Schedule
-) -> CaseKernel:
+    prepared: Prepared, engine: str, selection: tuple[int, ...], count: int, schedule: Schedule,
+    ends: int = 0,
+) -> CaseKernel:  # fmt: skip
     """Return the kernel of so many cases that records some outputs, by index.
+
+    ``ends``: see `LaneKernel`; a graphics processor has none.
 
     Raises
     ------
@@ -172,7 +206,7 @@ def case_kernel(
         return cuda_kernel(prepared, find_device(), selection).for_cases(count, schedule)
     compiler = find_compiler()
     assert compiler is not None
-    return lane_kernel(prepared, compiler, selection, count >= PAIRED)
+    return lane_kernel(prepared, compiler, selection, count >= PAIRED, ends)
 
 
 @built_once
@@ -186,17 +220,18 @@ def cuda_kernel(prepared: Prepared, device: CudaDevice, selection: tuple[int, ..
 
 @built_once
 def lane_kernel(
-    prepared: Prepared, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool = False
-) -> LaneKernel:
+    prepared: Prepared, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool = False,
+    ends: int = 0,
+) -> LaneKernel:  # fmt: skip
     """Return the kernel that records some outputs, by index; built once.
 
-    What an earlier command kept is taken as it is. ``in_pairs``: see `LaneKernel.of`.
+    What an earlier command kept is taken as it is. ``in_pairs``, ``ends``: see `LaneKernel.of`.
     """
-    place = None if prepared.place is None else prepared.place.in_lanes(selection, in_pairs)
+    place = None if prepared.place is None else prepared.place.in_lanes(selection, in_pairs, ends)
     kept = None if place is None else place.kept()
     if kept is not None and kept.library is not None and kept.compiler == compiler.label:
-        return LaneKernel(kept.layout, kept.library, compiler, len(selection))
-    kernel = LaneKernel.of(prepared.program, compiler, selection, in_pairs)
+        return LaneKernel(kept.layout, kept.library, compiler, len(selection), ends)
+    kernel = LaneKernel.of(prepared.program, compiler, selection, in_pairs, ends)
     if place is not None:
         place.keep(kernel)
         prepared.keep_model()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import math
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from bywire.simulation.native import Request, plan_array
 from bywire.simulation.program import Program
 from bywire.simulation.schedule import Schedule
 from bywire.simulation.stages import Stages, build_stages
+
+if TYPE_CHECKING:
+    from bywire.simulation.case_kernels import Ends
 
 MOST = 2**15
 """cases of a batch: as many threads as the largest processors hold at once"""
@@ -86,8 +90,11 @@ class CudaKernel:
         rows: Array,
         end: int,
         begin: int = 0,
+        ends: Ends | None = None,
     ) -> None:
         """Run frames begin..end of one batch; see ``case_kernels.LaneKernel.advance``.
+
+        ``ends`` are none: all outputs are recorded in all rows.
 
         Raises
         ------

@@ -14,19 +14,37 @@ from bywire.simulation.emit_rare import rare_roots, rare_substep
 from bywire.simulation.expressions import VECTOR_C, condition
 from bywire.simulation.lane_statements import Lanes
 from bywire.simulation.layout import Layout
+from bywire.simulation.operation import Node
 from bywire.simulation.stages import STATE, Stages
 
 SIGNATURE = """int bw_lanes(void) { return TURNS * W; }
 
 void bw_run_lanes(const double *restrict p, double h_, const double *restrict u,
-    double *restrict state, const int64_t *restrict plan, double *restrict rec)"""
+    double *restrict state, const int64_t *restrict plan, double *restrict rec,
+    double *restrict ends)"""
 
 # As `emission.PLAN`; then whether each lane has a stimulus of its own, how many lanes are recorded,
-# and the distances between the entries of two lanes, rows and signals.
+# the distances between the entries of two lanes, rows and signals, the frames at which the signals
+# recorded at both ends alone are, and the distance between two of these.
 PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
-  const int64_t stim = plan[4], every = plan[5], row0 = plan[6];
+  const int64_t stim = plan[4], every = plan[5];
   const int64_t own = plan[{at}], used = plan[{at} + 1], by_lane = plan[{at} + 2];
-  const int64_t by_row = plan[{at} + 3], by_signal = plan[{at} + 4];"""
+  const int64_t by_row = plan[{at} + 3], by_signal = plan[{at} + 4];
+  const int64_t end0 = plan[{at} + 5], end1 = plan[{at} + 6], by_end = plan[{at} + 7];"""
+
+
+# Rows are put down eight at a time: a signal of a lane is a line of memory then, and one page of
+# a hundred or more that are touched in turn.
+_PUT = """#define HELD 8
+
+static __attribute__((noinline)) void put_rows(const V *held, int64_t signals, int64_t rows,
+    int64_t lanes, double *to, int64_t by_lane, int64_t by_row, int64_t by_signal) {
+  for (int64_t j = 0; j < signals; ++j)
+    for (int64_t l = 0; l < lanes; ++l)
+      for (int64_t r = 0; r < rows; ++r)
+        to[j * by_signal + l * by_lane + r * by_row] = held[j * HELD + r][l];
+}
+"""
 
 
 # Operations of a substep up to which two vectors take turns: more do not fit into registers.
@@ -39,8 +57,11 @@ def takes_turns(stages: Stages) -> bool:
     return not t.mode.atoms and len(t.substep()) <= _SHORT
 
 
-def emit_lanes(stages: Stages, in_turn: bool = False) -> str:
-    """Return the C source of the kernel for one vector of cases, or for two that take turns."""
+def emit_lanes(stages: Stages, in_turn: bool = False, ends: int = 0) -> str:
+    """Return the C source of the kernel for one vector of cases, or for two that take turns.
+
+    ``ends``: how many of the signals, the last ones, are recorded at both ends alone.
+    """
     t = Lanes(stages)
     turns = [Lanes(stages, at, 2) for at in (0, 1)] if in_turn else [t]
 
@@ -53,11 +74,13 @@ def emit_lanes(stages: Stages, in_turn: bool = False) -> str:
 #define TURNS {len(turns)}
 {rare_substep(stages)}
 {_settle_lanes(t)}
+{_PUT}
 {SIGNATURE} {{
   {PLAN.format(at=8 + len(stages.ticks))}
   const M *restrict P = (const M *)p;
   M *restrict vectors = (M *)state;
   const V h = SET(h_);
+  int64_t held = 0, put = 0;
   double ps[{max(leaf_count(stages, "p"), 1)}];
   {each(_begin, 2)}
   {each(Lanes.once, 2)}
@@ -68,7 +91,12 @@ def emit_lanes(stages: Stages, in_turn: bool = False) -> str:
     {each(_stimulus, 4)}
     {each(_ticks, 4)}
     if (f % every == 0) {{
-      {each(_record, 6)}
+      {each(lambda t: _record(t, ends), 6)}
+      ++held;
+    }}
+    if (held == HELD) {{
+      {each(lambda t: _put(t, ends), 6)}
+      put += held, held = 0;
     }}
     if (f == end) break;
     {each(Lanes.framed, 4)}
@@ -81,8 +109,9 @@ def emit_lanes(stages: Stages, in_turn: bool = False) -> str:
     }}
     {each(_integrals, 4)}
   }}
+  {each(lambda t: _put(t, ends), 2)}
   {each(_stores, 2)}
-  (void)P; (void)h; (void)own; (void){counters};
+  (void)P; (void)h; (void)own; (void){counters}; (void)end0; (void)end1; (void)by_end; (void)ends;
 }}
 """
 
@@ -93,6 +122,9 @@ def _begin(t: Lanes) -> list[str]:
     return [
         f"V U{m}[{max(leaf_count(t.stages, 'u'), 1)}];",
         f"double c{m}[W * (CONSTANTS + 1)];",
+        f"V o{m}[{max(len(t.stages.output), 1)} * HELD];",
+        f"int64_t lanes{m} = used - {t.at} * W;",
+        f"lanes{m} = lanes{m} < 0 ? 0 : lanes{m} > W ? W : lanes{m};",
         "for (int l = 0; l < W; ++l) {\n"
         f"    for (int k = 0; k < {parameters}; ++k) ps[k] = P[k * TURNS + {t.at}][l];\n"
         f"    constants(ps, c{m} + l * (CONSTANTS + 1));\n"
@@ -165,17 +197,38 @@ def _ticks(t: Lanes) -> list[str]:
     return texts
 
 
-def _record(t: Lanes) -> list[str]:
-    roots, first = t.stages.output, f"{t.at} * W"
+def _record(t: Lanes, ends: int) -> list[str]:
+    every = t.stages.output
+    roots = every[: len(every) - ends]
     return [
         *t.block(roots, 1),
-        f"V o{t.mark}[{max(len(roots), 1)}];",
-        *(f"o{t.mark}[{j}] = {t.number(n)};" for j, n in enumerate(roots)),
-        f"double *place{t.mark} = rec + (f / every - row0) * by_row + {first} * by_lane;",
-        f"for (int j = 0; j < {len(roots)}; ++j)\n"
-        f"        for (int l = 0; l < W && l + {first} < used; ++l)\n"
-        f"          place{t.mark}[j * by_signal + l * by_lane] = o{t.mark}[j][l];",
+        *(f"o{t.mark}[{j} * HELD + held] = {t.number(n)};" for j, n in enumerate(roots)),
+        *(_record_ends(t, every[len(every) - ends :]) if ends else ()),
     ]
+
+
+def _put(t: Lanes, ends: int) -> list[str]:
+    return [
+        f"put_rows(o{t.mark}, {len(t.stages.output) - ends}, held, lanes{t.mark},\n"
+        f"        rec + put * by_row + {t.at} * W * by_lane, by_lane, by_row, by_signal);"
+    ]
+
+
+def _record_ends(t: Lanes, roots: Sequence[Node]) -> list[str]:
+    """Return, in one piece, what records the signals of both ends alone where a row is one."""
+    first, numbers = f"{t.at} * W", [f"e[{j}] = {t.number(n)};" for j, n in enumerate(roots)]
+    lines = [
+        *t.block(roots, 1),
+        f"V e[{len(roots)}];",
+        *numbers,
+        f"for (int j = 0; j < {len(roots)}; ++j)\n"
+        f"          for (int l = 0; l < W && l + {first} < used; ++l) {{\n"
+        f"            double *at = ends + j * by_end + (l + {first}) * 2;\n"
+        "            if (f == end0) at[0] = e[j][l];\n"
+        "            if (f == end1) at[1] = e[j][l];\n"
+        "          }",
+    ]
+    return [f"if (f == end0 || f == end1) {{\n        {indented(lines, 8)}\n      }}"]
 
 
 def _settle_lanes(t: Lanes) -> str:

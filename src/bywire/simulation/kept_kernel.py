@@ -84,9 +84,9 @@ class Place:
     file: Path
     state: str
 
-    def in_lanes(self, selection: tuple[int, ...], in_pairs: bool) -> Place:
+    def in_lanes(self, selection: tuple[int, ...], in_pairs: bool, ends: int) -> Place:
         """Return where the kernel in lanes is kept that records some outputs, by index."""
-        name = _digest(repr((self.file.name, selection, in_pairs)))[:32]
+        name = _digest(repr((self.file.name, selection, in_pairs, ends)))[:32]
         return Place(self.file.with_name(f"lanes-{name}.json"), self.state)
 
     def kept(self) -> KeptKernel | None:

@@ -20,9 +20,9 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
-from bywire.simulation.case_kernels import CaseKernel, case_kernel, is_side_by_side
+from bywire.simulation.case_kernels import CaseKernel, Ends, case_kernel, is_side_by_side
 from bywire.simulation.changes import energies, pieces, put_in_signals
-from bywire.simulation.engine import prepare, structure_of
+from bywire.simulation.engine import CUDA, prepare, structure_of
 from bywire.simulation.run import (
     Run,
     Trajectory,
@@ -73,6 +73,8 @@ class RunGroup(Sequence[Trajectory]):
         State vectors at the end, shape (entries, runs).
     kernel
         What computed them.
+    ends, end_names
+        Signals of which the first and the last row alone were recorded, shape (signals, runs, 2).
     """
 
     runs: tuple[Run, ...]
@@ -81,6 +83,8 @@ class RunGroup(Sequence[Trajectory]):
     names: tuple[str, ...]
     vectors: Array
     kernel: CaseKernel
+    ends: Array
+    end_names: tuple[str, ...] = ()
 
     @property
     def unsettled(self) -> NDArray[np.int64]:
@@ -122,6 +126,7 @@ def simulate_group(
     progress: Callable[[float], None] | None = None,
     first: int = 0,
     engine: str = "auto",
+    ends: Sequence[str] = (),
 ) -> RunGroup:
     """Compute runs that `fit_lanes`, each with its parameters, initial values and stimulus.
 
@@ -139,6 +144,9 @@ def simulate_group(
         Rows at the beginning that are not recorded, for instance those of a settling time.
     engine
         ``auto`` and ``compiled``: in lanes, ``cuda``: on a graphics processor.
+    ends
+        Further outputs, of which the first and the last of the rows recorded are wanted alone; of
+        runs without changes, in lanes.
 
     Raises
     ------
@@ -161,20 +169,27 @@ def simulate_group(
     prepared = prepare(runs[0].model, runs[0].par)
     names = tuple(prepared.outputs)
     wanted = names if signals is None else tuple(signals)
-    selection = tuple(selected(names, wanted).tolist())
+    if ends and (engine == CUDA or any(run.changes for run in runs)):
+        raise ParameterError(
+            "runs with changes or on a graphics processor record all rows: leave ends out"
+        )
+    selection = tuple(selected(names, (*wanted, *ends)).tolist())
     schedule = runs[0].schedule()
-    kernel = case_kernel(prepared, engine, selection, len(runs), schedule)
+    kernel = case_kernel(prepared, engine, selection, len(runs), schedule, len(ends))
     edges = _edges(schedule, first, runs)
     output = runs[0].model.Output
     jumping = energies(output, wanted) if any(run.changes for run in runs) else np.empty((0, 0))
     watch = _Watch(-(-len(runs) // kernel.lanes) * (len(edges) - 1), progress)
     recorded = (*wanted, *put_in_signals(output)) if jumping.any() else wanted
     values = np.zeros((len(recorded), len(runs), schedule.rows - first))
+    at_ends = np.zeros((len(ends), len(runs), 2))
+    frames = (first * schedule.record_frames, (schedule.rows - 1) * schedule.record_frames)
 
     def computed(begin: int) -> Array:
         cases = slice(begin, begin + kernel.lanes)
         carried = _Carried(kernel, schedule, runs[cases], jumping)
-        return carried.to_the_end(values[:, cases], edges, first, watch)
+        apart = Ends(at_ends[:, cases], frames) if ends else None
+        return carried.to_the_end(values[:, cases], edges, first, watch, apart)
 
     with ThreadPoolExecutor(threads or kernel.at_once) as pool:
         try:
@@ -183,7 +198,10 @@ def simulate_group(
             watch.stop.set()
             raise
     vector = np.concatenate(vectors, axis=1)[:, : len(runs)]
-    return RunGroup(tuple(runs), schedule.record_times[first:], values, recorded, vector, kernel)
+    return RunGroup(
+        tuple(runs), schedule.record_times[first:], values, recorded, vector, kernel, at_ends,
+        tuple(ends),
+    )  # fmt: skip
 
 
 def _edges(schedule: Schedule, first: int, runs: Sequence[Run]) -> list[int]:
@@ -252,7 +270,7 @@ class _Carried:
         self._stimulus = _stimuli(group, schedule, width)
 
     def to_the_end(
-        self, values: Array, edges: Sequence[int], skipped: int, watch: _Watch
+        self, values: Array, edges: Sequence[int], skipped: int, watch: _Watch, ends: Ends | None
     ) -> Array:
         """Carry the runs on to their end; fill ``values``, return the state vectors."""
         schedule, every = self._schedule, self._schedule.record_frames
@@ -266,7 +284,7 @@ class _Carried:
             signals = values.shape[0] - self._books
             if first >= 0:
                 rows = values[:signals, :, first : max(last, first + 1)].transpose(1, 2, 0)
-                self._advance(schedule, rows, begin, end)
+                self._advance(schedule, rows, begin, end, ends)
             else:
                 rows = np.empty((self._count, 1, signals))
                 self._advance(silent, rows, begin, end)
@@ -297,7 +315,9 @@ class _Carried:
         self._vector = kept
         return np.array([row[:, 0, book > 0].sum(axis=-1) for book in self._jumping])
 
-    def _advance(self, plan: Schedule, rows: Array, begin: int, end: int) -> None:
+    def _advance(
+        self, plan: Schedule, rows: Array, begin: int, end: int, ends: Ends | None = None
+    ) -> None:
         self._kernel.advance(
-            plan, self._parameters, self._stimulus, self._vector, rows, end, begin
+            plan, self._parameters, self._stimulus, self._vector, rows, end, begin, ends
         )

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from bywire.bench.relative_changes import share_of
 from bywire.bench.values import number
@@ -22,6 +21,7 @@ from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, parse, shown
+from bywire.studies.laws import Law, LogNormal, Normal, Triangular, Uniform, truncated_normal
 
 NEVER = 1e-9
 """probability that counts as none: of values that the model would not admit"""
@@ -198,7 +198,7 @@ class _Entry:
         return ParameterError(f"[vary] {self.name} (kind {self.section['kind']}): {why}")
 
 
-def _frozen(entry: _Entry, law: Any, text: str) -> Distribution:
+def _frozen(entry: _Entry, law: Law, text: str) -> Distribution:
     low, high = map(float, law.support())
     return Distribution(
         str(entry.section["kind"]), text, law.ppf, low, high, law.cdf, law.sf
@@ -213,7 +213,7 @@ def _uniform(entry: _Entry) -> Distribution:
 def _between(entry: _Entry, low: float, high: float, text: str) -> Distribution:
     if not low < high:
         raise entry.refused(f"low = {entry.amount(low)} must be below high = {entry.amount(high)}")
-    return _frozen(entry, stats.uniform(low, high - low), text)
+    return _frozen(entry, Uniform(low, high - low), text)
 
 
 def _tolerance(entry: _Entry) -> Distribution:
@@ -224,7 +224,7 @@ def _tolerance(entry: _Entry) -> Distribution:
         return _between(entry, entry.nominal - width, entry.nominal + width, f"{text}, uniform")
     if shape != "normal":
         raise unknown_name(f"shape of [vary] {entry.name}", str(shape), ("uniform", "normal"))
-    law = stats.truncnorm(-3.0, 3.0, entry.nominal, width / 3.0)
+    law = truncated_normal(-3.0, 3.0, entry.nominal, width / 3.0)
     return _frozen(entry, law, f"{text}, normal with 3 sd at the ends")
 
 
@@ -235,10 +235,10 @@ def _normal(entry: _Entry) -> Distribution:
     low = entry.level("low", -math.inf)
     high = entry.level("high", math.inf)
     if math.isinf(low) and math.isinf(high):
-        return _frozen(entry, stats.norm(mean, sd), text)
+        return _frozen(entry, Normal(mean, sd), text)
     if not low < high:
         raise entry.refused(f"low = {entry.amount(low)} must be below high = {entry.amount(high)}")
-    law = stats.truncnorm((low - mean) / sd, (high - mean) / sd, mean, sd)
+    law = truncated_normal((low - mean) / sd, (high - mean) / sd, mean, sd)
     ends = " to ".join("any" if math.isinf(x) else entry.amount(x) for x in (low, high))
     return _frozen(entry, law, f"{text}, truncated: {ends}")
 
@@ -251,7 +251,7 @@ def _lognormal(entry: _Entry) -> Distribution:
     sigma = math.sqrt(math.log1p(variation**2))
     text = f"log-normal, median {entry.amount(median)}, sd {100.0 * variation:.3g} %"
     # It ends at zero, but as it ends where it has no end: not within any standard deviation.
-    return replace(_frozen(entry, stats.lognorm(sigma, scale=median), text), low=-math.inf)
+    return replace(_frozen(entry, LogNormal(sigma, median), text), low=-math.inf)
 
 
 def _triangular(entry: _Entry) -> Distribution:
@@ -260,7 +260,7 @@ def _triangular(entry: _Entry) -> Distribution:
     ends = f"{entry.amount(low)}, {entry.amount(mode)}, {entry.amount(high)}"
     if not low <= mode <= high or not low < high:
         raise entry.refused(f"low, mode and high must rise, got {ends}")
-    law = stats.triang((mode - low) / (high - low), low, high - low)
+    law = Triangular((mode - low) / (high - low), low, high - low)
     return _frozen(entry, law, f"triangular, {ends}")
 
 

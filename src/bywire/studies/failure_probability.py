@@ -7,9 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from scipy import stats
-
 from bywire.core.typing import Array
+from bywire.studies.laws import normal_quantile
 from bywire.studies.statistics import Outcome, share
 
 State = Literal["done", "negligible", "budget spent", "unfinished", "level", "no design point"]
@@ -48,7 +47,7 @@ def interval(value: float, variation: float, confidence: float) -> Interval:
     """
     if not value > 0.0:
         return UNKNOWN
-    reach = float(stats.norm.ppf(0.5 + 0.5 * confidence)) * math.sqrt(math.log1p(variation**2))
+    reach = float(normal_quantile(0.5 + 0.5 * confidence)) * math.sqrt(math.log1p(variation**2))
     return Interval(value, variation, value * math.exp(-reach), min(value * math.exp(reach), 1.0))
 
 

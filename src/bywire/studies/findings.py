@@ -159,11 +159,14 @@ class Findings:
 
     def influences(self, name: str) -> Sequence[Influence]:
         """Return how a key figure goes with what varies, the strongest first; choices apart."""
-        varied = [v.name for v in self.plan.varied if v.unit]
-        columns = [np.asarray(self.cases[each], dtype=float) for each in varied]
-        return influences(
-            varied, columns, self.figure(name), self.plan.confidence, bool(self.plan.correlations)
-        )
+        known, plan = self._influences, self.plan
+        if name not in known:
+            varied = [v.name for v in plan.varied if v.unit]
+            columns = [np.asarray(self.cases[each], dtype=float) for each in varied]
+            known[name] = influences(
+                varied, columns, self.figure(name), plan.confidence, bool(plan.correlations)
+            )
+        return known[name]
 
     def sensitivity(self, name: str) -> Sensitivity:
         """Return the indices of a key figure, in a study whose design is made for them."""
@@ -232,6 +235,11 @@ class Findings:
     @cached_property
     def _sensitivities(self) -> dict[str, Sensitivity]:
         """Indices by key figure, as they were asked for: those of many cases take a second."""
+        return {}
+
+    @cached_property
+    def _influences(self) -> dict[str, Sequence[Influence]]:
+        """Influences by key figure, likewise."""
         return {}
 
     def _rare_judgment(self, rare: RareFailure) -> Judgment:

@@ -12,12 +12,12 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
-from scipy.stats import qmc
+from scipy import special
 
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.studies.distribution import Distribution
+from bywire.studies.laws import normal_quantile
 
 SAMPLED = ("monte-carlo", "latin-hypercube", "sobol")
 """designs that draw from the distributions: what they count are probabilities"""
@@ -55,7 +55,7 @@ class Sampled:
         """Return the values of each quantity in a chunk of points, shape (size,) each."""
         u = np.clip(self._probabilities(chunk, size), *_INSIDE)
         if self.factor is not None:
-            return self.values_at(stats.norm.ppf(u))
+            return self.values_at(normal_quantile(u))
         return self._quantiles(u)
 
     def values_at(self, scores: Array) -> list[NDArray[np.generic]]:
@@ -66,7 +66,7 @@ class Sampled:
         scores
             Shape (cases, quantities).
         """
-        return self._quantiles(np.clip(stats.norm.cdf(self.correlated(scores)), *_INSIDE))
+        return self._quantiles(np.clip(special.ndtr(self.correlated(scores)), *_INSIDE))
 
     def correlated(self, scores: Array) -> Array:
         """Return the normal scores of the quantities by independent ones."""
@@ -79,12 +79,16 @@ class Sampled:
         """Return points of the unit cube, shape (size, quantities)."""
         count = len(self.distributions)
         if self.kind == "sobol":
+            from scipy.stats import qmc  # slow to load
+
             sequence = qmc.Sobol(count, scramble=True, rng=np.random.default_rng(self.seed))
             if chunk:
                 sequence.fast_forward(chunk * size)
             return np.asarray(sequence.random(size))
         rng = np.random.default_rng((self.seed, chunk))
         if self.kind == "latin-hypercube":
+            from scipy.stats import qmc
+
             return np.asarray(qmc.LatinHypercube(count, rng=rng).random(size))
         return rng.random((size, count))
 

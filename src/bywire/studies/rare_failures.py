@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bywire.core.typing import Progress, silent
-from bywire.studies.executor import Executor
+from bywire.studies.computing import Executor
 from bywire.studies.failure_probability import FailureProbability
 from bywire.studies.importance_sampling import importance_sampling
 from bywire.studies.plan import CHUNK, Demand, StudyPlan

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
+from functools import partial
 
+from bywire.bench import running
+from bywire.bench.result import Result
 from bywire.core.typing import Progress
 from bywire.studies.executor import executor_of
 from bywire.studies.plan import CHUNK, StudyPlan
@@ -11,6 +15,22 @@ from bywire.studies.rare_failures import rare_failures
 from bywire.studies.sought_design import WORST
 from bywire.studies.store import Origin, StudyStore
 from bywire.studies.worst_cases import worst_cases
+
+
+@dataclass(frozen=True)
+class Completed:
+    """What a study that was run has beside its folder.
+
+    Parameters
+    ----------
+    nominal
+        What the bench itself gave, with the error of its figures from the step.
+    damaged
+        How many chunks were damaged, and are computed again.
+    """
+
+    nominal: Result
+    damaged: int
 
 
 def complete(
@@ -21,8 +41,8 @@ def complete(
     workers: int | None = None,
     cluster: str = "",
     progress: Progress,
-) -> int:
-    """Compute the chunks of a study that its folder lacks.
+) -> Completed:
+    """Compute the bench of a study itself, and the chunks that its folder lacks.
 
     Parameters
     ----------
@@ -35,39 +55,43 @@ def complete(
 
     Returns
     -------
-    int
-        How many chunks were damaged, and are computed again.
+    Completed
+        What the bench itself gave, and how many chunks were damaged.
 
     Raises
     ------
     FileError
         When the folder is another study's, or cannot be written.
     RunError
-        When the workers are lost.
+        When the bench itself fails, or the workers are lost.
     KeyboardInterrupt
         When interrupted; what is finished stays.
     """
     until = time.monotonic() + plan.time
     store.open(plan, origin)
     damaged = store.drop_damaged()
+    itself = partial(running.run, plan.bench, estimate_error=True)
     if plan.sought is not None:
+        nominal = itself()
         together = plan.sought.together // CHUNK
         chunks = -(-plan.cases // CHUNK)
         executor = executor_of(workers, cluster, chunks, together, plan.bench.engine)
         seek = worst_cases if plan.design == WORST else rare_failures
         seek(plan, store, executor, progress)
-        return damaged
+        return Completed(nominal, damaged)
     missing = sorted(set(range(plan.chunks)) - store.finished())
     if not missing:
-        return damaged
+        return Completed(itself(), damaged)
     done = plan.chunks - len(missing)
     label = f"{plan.total} cases"
     progress(label, done / plan.chunks)
     executor = executor_of(workers, cluster, len(missing), engine=plan.bench.engine)
     with executor.opened(plan) as compute:
+        nominal_run = compute.beside(itself)
         for count, (chunk, columns) in enumerate(compute(missing), 1):
             store.write(chunk, columns, plan.column_units)
             progress(label, (done + count) / plan.chunks)
+            nominal_run.check()
             if time.monotonic() > until:
                 break
-    return damaged
+        return Completed(nominal_run.result(), damaged)

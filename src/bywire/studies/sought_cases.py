@@ -18,7 +18,7 @@ from bywire.bench.requirements import limit_of
 from bywire.core.errors import FileError
 from bywire.core.typing import Array, Progress
 from bywire.studies.chunk import CASE, Columns, PlacedChunk
-from bywire.studies.executor import Compute, Executor
+from bywire.studies.computing import Compute, Executor
 from bywire.studies.limit_state import BudgetSpentError, UnfinishedError, margins_of
 from bywire.studies.plan import CHUNK, Demand, StudyPlan
 from bywire.studies.sought_design import SoughtDesign

@@ -14,9 +14,10 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special, stats
+from scipy import special
 
 from bywire.core.typing import Array
+from bywire.studies.laws import binomial_ranks, normal_quantile, ranked
 
 Outcome = Literal["met", "missed", "undecided"]
 
@@ -116,8 +117,8 @@ def quantile(values: Array, probability: float, confidence: float) -> Quantile:
     if not values.size:
         return Quantile(probability, math.nan, math.nan, math.nan)
     beyond = 0.5 * (1.0 - confidence)
-    below = int(stats.binom.ppf(beyond, values.size, probability)) - 1
-    above = int(stats.binom.isf(beyond, values.size, probability))
+    low, above = binomial_ranks(values.size, probability, beyond)
+    below = low - 1
     ordered = np.sort(values)
     return Quantile(
         probability, float(np.quantile(values, probability)),
@@ -181,17 +182,17 @@ def influences(
     count = int(known.sum())
     if count < 8 or np.ptp(figure[known]) == 0.0:
         return []
-    reach = float(stats.norm.ppf(0.5 + 0.5 * confidence))
+    reach = float(normal_quantile(0.5 + 0.5 * confidence))
     each = {name: column[known] for name, column in zip(names, columns, strict=True)}
-    moving = {name: stats.rankdata(x) for name, x in each.items() if np.ptp(x) > 0.0}
+    moving = {name: ranked(x) for name, x in each.items() if np.ptp(x) > 0.0}
     fewer = len(moving) - 1 if is_partial else 0
     if count - 3 - fewer < 1:
         return []
-    y = stats.rankdata(figure[known])
+    y = ranked(figure[known])
     found = []
     for name, x in moving.items():
         others = [each for other, each in moving.items() if other != name] if is_partial else []
-        r = _correlation(_rest(x, others), _rest(y, others))
+        r = _correlation(*_rests(x, y, others))
         z = math.atanh(min(max(r, -1.0 + 1e-12), 1.0 - 1e-12))
         width = reach * math.sqrt((1.0 + 0.5 * r * r) / (count - 3 - fewer))
         low, high = math.tanh(z - width), math.tanh(z + width)
@@ -199,16 +200,21 @@ def influences(
     return sorted(found, key=lambda each: -abs(each.correlation))
 
 
-def _rest(ranks: Array, others: Sequence[Array]) -> Array:
-    """Return what other ranks, by a straight line, do not tell of some."""
-    known = np.column_stack([np.ones(ranks.size), *others])
-    return np.asarray(ranks - known @ np.linalg.lstsq(known, ranks, rcond=None)[0])
+def _rests(x: Array, y: Array, others: Sequence[Array]) -> tuple[Array, Array]:
+    """Return what other ranks, by a straight line, do not tell of ranks of two."""
+    if not others:
+        return x - x.mean(), y - y.mean()
+    known, both = np.column_stack([np.ones(x.size), *others]), np.column_stack([x, y])
+    rest = both - known @ np.linalg.lstsq(known, both, rcond=None)[0]
+    return rest[:, 0], rest[:, 1]
 
 
 def _correlation(x: Array, y: Array) -> float:
     """Return the correlation of centered values; 0 where one of them is rounding alone."""
-    size = math.sqrt(float(x @ x) * float(y @ y))
-    return float(x @ y) / size if size > 1e-9 * x.size**3 else 0.0
+    # Sums, and no products of vectors: of 10,000 numbers BLAS wakes all cores, and waits for them.
+    xx, yy, xy = (float(np.sum(a * b)) for a, b in ((x, x), (y, y), (x, y)))
+    size = math.sqrt(xx * yy)
+    return xy / size if size > 1e-9 * x.size**3 else 0.0
 
 
 def running_share(met: NDArray[np.bool_], confidence: float, count: int = 60) -> list[Share]:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from scipy import optimize
-from scipy.stats import qmc
 
 from bywire.core.typing import Array
 from bywire.studies.limit_state import BudgetSpentError, Margins, UnfinishedError
 from bywire.studies.sought_design import population
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 _BEYOND_ENDS = 0.1  # of a range: worst cases lie at ends, which then have a share of their own
 _WORST = -1e12  # margin of a case without a figure: the worst, and one that has a mean
@@ -55,6 +56,9 @@ def worst_case(margins: Margins, quantities: int, seed: int) -> WorstCase:
     ----------
     R. Storn and K. Price, Differential evolution, Journal of Global Optimization 11, 1997.
     """
+    from scipy import optimize  # slow to load, both
+    from scipy.stats import qmc
+
     tried: list[Array] = []
 
     def batch(columns: Array) -> Array:
@@ -63,7 +67,7 @@ def worst_case(margins: Margins, quantities: int, seed: int) -> WorstCase:
         tried.append(np.maximum(margins(points), _WORST))
         return tried[-1]
 
-    def is_over(intermediate_result: optimize.OptimizeResult) -> bool:
+    def is_over(intermediate_result: OptimizeResult) -> bool:
         energies: Array = intermediate_result.population_energies
         return bool(np.ptp(energies) <= _TOGETHER * np.ptp(tried[0]))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bywire.core.typing import Progress, silent
-from bywire.studies.executor import Executor
+from bywire.studies.computing import Executor
 from bywire.studies.plan import StudyPlan
 from bywire.studies.sought_cases import RequirementCases, SoughtCases
 from bywire.studies.store import StudyStore

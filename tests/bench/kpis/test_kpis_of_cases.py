@@ -17,6 +17,7 @@ from bywire.bench.kpis import (
     hysteresis,
     occupation,
     release,
+    static_gain,
     step_response,
     vehicle_stop,
 )
@@ -40,6 +41,7 @@ SETTINGS = {
     "samples of the mode": ("occupation", occupation.Setting("mode", "", "y")),
     "extremes": ("extremes", extremes.Setting("y")),
     "release": ("release", release.Setting("y", 0.02)),
+    "gain": ("static_gain", static_gain.Setting("y", 0.01, 0.35, "A", smoothing=0.03)),
 }
 
 
@@ -75,7 +77,8 @@ def test_each_case_is_as_if_it_were_alone_for_every_family(rows):
 
 @needs_compiler
 @pytest.mark.parametrize(
-    "family", ["step_response", "effort", "occupation", "extremes", "vehicle_stop"]
+    "family",
+    ["step_response", "static_gain", "effort", "occupation", "extremes", "vehicle_stop"],
 )
 def test_c_gives_the_bits_of_python_on_any_samples(family, monkeypatch):
     random, compiled = np.random.default_rng(5), 0
@@ -93,8 +96,9 @@ def test_c_gives_the_bits_of_python_on_any_samples(family, monkeypatch):
             notes = [figure.told(k) for k in range(len(settings))]
             assert [by_c[name].told(k) for k in range(len(settings))] == notes
             every |= {note.split()[0] for note in notes if note}
-    # the others have samples that define nothing, or a single case that has no row of its stop
-    assert compiled > (15 if family == "vehicle_stop" else 30)
+    # the others have samples that define nothing (without a set point also an empty window), or a
+    # single case that has no row of its stop
+    assert compiled > {"vehicle_stop": 15, "static_gain": 20}.get(family, 30)
     assert len(every) >= {"step_response": 6, "vehicle_stop": 4, "extremes": 1}.get(family, 2)
 
 
@@ -111,18 +115,19 @@ def _drawn(random: np.random.Generator, family: str) -> tuple[Rows, object]:
     mode = (random.uniform(size=y.shape) < 0.5).astype(float)
     mode[4, 0] += random.choice([0.0, 0.5])
     rows = Rows(t, {"y": y, "mode": mode}, {"y": {"units": "m"}, "mode": {"units": "1"}})
-    if family != "step_response":
+    if family not in ("step_response", "static_gain"):
         names = {"effort": ("y", "mode", "nothing"), "extremes": ("y",),
                  "occupation": ("mode", random.choice(["mode", "none"]), "y", "none")}  # fmt: skip
         names["effort"] = tuple(name if random.random() < 0.7 else "nothing" for name in "yyy")
         return rows, FAMILIES.find(family).setting_class(*map(str, names[family]))
     levels = random.choice([None, 0.0, 1.0], 2, p=[0.2, 0.4, 0.4])
     window = sorted(random.uniform(t[0], t[-1], 2)) if random.random() < 0.3 else None
-    return rows, step_response.Setting(
-        "y", float(random.choice([*t[:-1], random.uniform(t[0], t[-1])])), *levels,
-        window=window and tuple(map(float, window)),
-        smoothing=float(random.choice([0.0, 0.03, 0.5])),
-    )  # fmt: skip
+    at = float(random.choice([*t[:-1], random.uniform(t[0], t[-1])]))
+    seen = {"window": window and tuple(map(float, window)),
+            "smoothing": float(random.choice([0.0, 0.03, 0.5]))}  # fmt: skip
+    if family == "static_gain":
+        return rows, static_gain.Setting("y", at, float(random.choice([0.0, 0.35])), "A", **seen)
+    return rows, step_response.Setting("y", at, *levels, **seen)
 
 
 def _drawn_stop(random: np.random.Generator, t: np.ndarray, y: np.ndarray) -> tuple[Rows, object]:
@@ -152,9 +157,13 @@ def test_levels_may_differ_between_cases(rows):
     settings = [replace(STEP, end=end, start=0.1 * end) for end in ends]
     together = evaluate_cases("step_response", rows, settings)
     emptied = evaluate_cases("release", rows, [release.Setting("y", end) for end in ends])
+    steps = [static_gain.Setting("y", 0.0, end, "A") for end in ends]
+    gains = evaluate_cases("static_gain", rows, steps)["static_gain"]
     for k in range(0, CASES, 7):
         for name, alone in evaluate("step_response", rows.case(k), settings[k]).items():
             assert together[name].case(k) == alone
+        alone = evaluate("static_gain", rows.case(k), steps[k])["static_gain"]
+        assert (gains.case(k), alone.unit) == (alone, "m/A")
         one = evaluate("release", rows.case(k), release.Setting("y", ends[k]))
         assert emptied["time_to_empty"].case(k) == one["time_to_empty"]
 

@@ -113,7 +113,7 @@ def test_every_figure_is_declared_for_listings():
     found = registry.definitions()
     assert set(registry.FAMILIES.all()) == {
         "effort", "extremes", "hysteresis", "occupation", "release", "sine_sweep",
-        "step_response", "tracking", "vehicle_stop", "warming",
+        "static_gain", "step_response", "tracking", "vehicle_stop", "warming",
     }  # fmt: skip
     assert {"rise_time", "energy", "share_stuck", "loop_area"} <= set(found)
     for figure in found.values():

@@ -36,9 +36,6 @@ class FamilyJudge:
         family's name and the setting's field; None where nothing does.
     further
         ``further(run, options)``: figures of the experiment's own, which come first.
-    further_together
-        ``further_together(rows, options)``: the same figures of many cases at once, of signals of
-        shape (cases, time); None of cases that have to be judged each for itself.
     further_signals
         Names of all signals that these look at.
     """
@@ -47,7 +44,6 @@ class FamilyJudge:
     left_out: Collection[str] = ()
     levels: Callable[[xr.Dataset, Any], Mapping[str, Mapping[str, Any]]] | None = None
     further: Callable[[xr.Dataset, Any], tuple[Kpi, ...]] | None = None
-    further_together: Callable[[Rows, Sequence[Any]], tuple[KpiOfCases, ...] | None] | None = None
     further_signals: tuple[str, ...] = ()
 
     def __call__(self, recordings: Mapping[str, xr.Dataset], options: Any) -> tuple[Kpi, ...]:
@@ -69,17 +65,15 @@ class FamilyJudge:
         distinct = {id(chosen): chosen for chosen in options}  # mostly one
         known = {number: self.settings(chosen) for number, chosen in distinct.items()}
         each = [known[id(chosen)] for chosen in options]
-        own: Iterable[KpiOfCases] | None = () if self.further is None else None
-        if self.further_together is not None:
-            own = self.further_together(rows, options)
-        if self.levels is not None or own is None:
+        own: Iterable[KpiOfCases] = ()
+        if self.levels is not None or self.further is not None:
             runs = [cast(xr.Dataset, rows.case(k, par=par)) for k, par in enumerate(pars)]
             each = list(map(self._of_run, each, runs, options))
-            if own is None and self.further is not None:
+            if self.further is not None:
                 own = of_cases(list(map(self.further, runs, options)))
         given = [evaluate_cases(name, rows, [s[name] for s in each]) for name in each[0]]
         wanted = (kpi for kpis in given for kpi in kpis.values() if self._wants(kpi.name))
-        return (*(own or ()), *wanted)
+        return (*own, *wanted)
 
     def signals(self, options: Sequence[Any]) -> set[str]:
         """Return the names of all signals that it may look at, of cases with these options."""
@@ -201,7 +195,7 @@ def _in_c(
     )  # fmt: skip
     if given is None:
         return None
-    level = "1" if each[0] is None else each[0][1]
+    units = how.units("1" if each[0] is None else each[0][1], joined)
 
     def told(figure: Measure[Any], why: NDArray[np.int32], k: Any) -> str:
         if not why[k]:
@@ -210,8 +204,8 @@ def _in_c(
 
     return {
         figure.name: KpiOfCases(
-            figure.name, values, level if figure.unit == "level" else figure.unit,
-            figure.definition, partial(told, figure, why),
+            figure.name, values, units.get(figure.unit, figure.unit), figure.definition,
+            partial(told, figure, why),
         )
         for figure, values, why in zip(figures, *given, strict=True)
     }  # fmt: skip

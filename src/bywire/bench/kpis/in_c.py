@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -45,6 +45,9 @@ class InC:
         case.
     note
         ``note(setting)``: how the samples were treated.
+    units
+        ``units(level, setting)``: unit of every placeholder that the figures declare, by the SI
+        unit of the first signal.
     room
         Numbers that it needs for each sample beside the signals.
     is_alone_in_python
@@ -56,6 +59,7 @@ class InC:
     failures: tuple[str, ...] = (UNSOUND,)
     packed: Callable[[Any, int], Array] = lambda setting, cases: np.zeros(1)
     note: Callable[[Any], str] = lambda setting: ""
+    units: Callable[[str, Any], Mapping[str, str]] = lambda level, setting: {"level": level}
     room: int = 0
     is_alone_in_python: bool = False
 

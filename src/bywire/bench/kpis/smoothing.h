@@ -34,8 +34,9 @@ static inline bw_average bw_averaging(int64_t n, const double *t, double period,
   return a;
 }
 
-static inline void bw_smoothed(const bw_average *a, int64_t n, const double *restrict t,
-    const double *restrict y, double *restrict out) {
+/* Integrate a signal up to every sample. */
+static inline void bw_primitive(const bw_average *a, int64_t n, const double *restrict t,
+    const double *restrict y) {
   double *restrict total = a->total, *restrict slope = a->slope;
   total[0] = 0.0;
   for (int64_t k = 1; k < n; ++k) { /* in vectors, for all that need not wait for the sum */
@@ -43,12 +44,24 @@ static inline void bw_smoothed(const bw_average *a, int64_t n, const double *res
     total[k] = 0.5 * (y[k] + y[k - 1]) * (t[k] - t[k - 1]);
   }
   for (int64_t k = 1; k < n; ++k) total[k] += total[k - 1];
-  for (int64_t k = 0; k < n; ++k) {
+}
+
+/* Give the averages of some samples of a signal, once its primitive is there. */
+static inline void bw_means(const bw_average *a, int64_t begin, int64_t end,
+    const double *restrict y, double *restrict out) {
+  const double *restrict total = a->total, *restrict slope = a->slope;
+  for (int64_t k = begin; k < end; ++k) {
     const int32_t i = a->at_from[k], j = a->at_to[k];
     const double d = a->from[k], e = a->to[k];
     const double before = total[i] + y[i] * d + 0.5 * slope[i] * (d * d);
     const double until = total[j] + y[j] * e + 0.5 * slope[j] * (e * e);
     out[k] = (until - before) / a->width;
   }
+}
+
+static inline void bw_smoothed(const bw_average *a, int64_t n, const double *t, const double *y,
+    double *out) {
+  bw_primitive(a, n, t, y);
+  bw_means(a, 0, n, y, out);
 }
 #endif

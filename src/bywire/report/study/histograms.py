@@ -68,7 +68,8 @@ def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
         style.dress(axes)
         scale = scale_of(spread.values, spread.unit)
         values = scale.factor * spread.values[np.isfinite(spread.values)]
-        axes.hist(values, bins=_bins(values), color=style.BLUE, alpha=0.75)
+        axes.hist(values, bins=_bins(values), color=style.BLUE, alpha=0.75,
+                  histtype="stepfilled")  # fmt: skip
         if has_band:
             axes.axvspan(*np.quantile(values, (0.05, 0.95)), color=style.SHADE, zorder=0)
         for at, look in ((spread.nominal, own), (spread.limit, bound)):

@@ -1,4 +1,4 @@
-"""Studies of many cases: what a million hard brakings take, and how much of it is simulation."""
+"""Studies of many cases: what hard brakings take, how much of it is simulation, and commands."""
 
 from __future__ import annotations
 
@@ -17,13 +17,9 @@ from bywire.benchmark.suite import Part
 from bywire.core.unneeded import allow_dask
 from bywire.data.file_format import library
 from bywire.studies.chunk import computed_chunk
-from bywire.studies.executor import (
-    CLUSTER_MEMORY,
-    CLUSTER_SETTINGS,
-    Cluster,
-    Executor,
-    Pool,
-)
+from bywire.studies.cluster import CLUSTER_MEMORY, CLUSTER_SETTINGS, Cluster
+from bywire.studies.computing import Executor
+from bywire.studies.executor import Pool
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.study_file import read_study
 
@@ -36,6 +32,26 @@ bench = "hard-braking"
 [requirements]
 overshoot = "<= 15 % with 90 %"
 """
+# As studies/tolerances.toml: five quantities, three figures judged.
+_MANY = """
+bench = "hard-braking"
+[vary]
+"motor.R_m" = { kind = "normal", sd = "4 %" }
+"motor.K_e" = "+-5 %"
+"seal.T_pr" = { kind = "log-normal", sd = "20 %" }
+"caliper.K_pd" = { kind = "triangular", low = "-15 %", high = "+15 %" }
+"supply.V_bat" = { kind = "uniform", low = "11 V", high = "14.4 V" }
+[[correlation]]
+of = ["motor.R_m", "motor.K_e"]
+value = -0.6
+[design]
+cases = 10_000
+[requirements]
+overshoot = "<= 15 % with 99 %"
+steady_state_error = "<= 0.1 bar"
+rise_time = "<= 100 ms with 95 %"
+"""
+_COMMANDS = 2  # of which the quicker one counts
 _CHUNKS = 4
 _ROUNDS = 3
 _WARM, _STEADY = 4, 192  # chunks of each process beforehand, and those that are timed
@@ -74,11 +90,13 @@ def studies() -> list[Result]:
                 f"key figures, {1e6 * judged:.3g} us a case, over its simulation with noise, "
                 f"{1e3 * simulated:.3g} ms",
             ),
+            _of_steps(Path(folder)),
             Result(
                 "study.beside_share", (whole - simulated - judged) / simulated, "1",
                 note="cases made and checked, warnings and books over the simulation",
             ),
         ]  # fmt: skip
+        results.append(_command(Path(folder)))
         if Path("/proc/self/status").exists():
             results.append(_memory(path, Path(folder) / "out"))
         if find_spec("distributed") is not None:
@@ -91,6 +109,42 @@ def _seconds(plan: StudyPlan) -> float:
     for chunk in range(_CHUNKS):
         computed_chunk(plan, chunk, threads=1)
     return time.process_time() - begin
+
+
+def _of_steps(folder: Path) -> Result:
+    """Measure the same of steps of the current, which have a static gain as well."""
+    path = folder / "steps.toml"
+    path.write_text(_STUDY.replace("hard-braking", "pressure-step"), encoding="utf-8")
+    simulated, judged = simulated_and_judged(read_study(path), _ROUNDS)
+    return at_most(
+        "study.step_kpi_share", judged / simulated, 0.05, "1",
+        f"the same of pressure steps: {1e6 * judged:.3g} us over {1e3 * simulated:.3g} ms",
+    )  # fmt: skip
+
+
+def _command(folder: Path) -> Result:
+    """Measure the command of a study from its beginning to its report, kernels built before."""
+    study, seconds, spent = folder / "many.toml", [], []
+    study.write_text(_MANY, encoding="utf-8")
+    for k in range(_COMMANDS + 1):
+        before, begin = _of_children(), time.perf_counter()
+        line = [sys.executable, "-m", "bywire", "study", "run", str(study),
+                "--out", str(folder / f"many-{k}"), *(() if k else ("--cases", "512"))]  # fmt: skip
+        subprocess.run(line, env=environment(), capture_output=True, check=True)
+        seconds.append(time.perf_counter() - begin)
+        spent.append(_of_children() - before)
+    cores = os.cpu_count() or 1
+    return at_most(
+        "study.command_seconds", min(seconds[1:]), 8.0, "s",
+        f"a study of 10,000 stops from the command line to its report on {cores} cores, warm, by "
+        f"the clock; {min(spent[1:]):.3g} s of processor time in all of its processes",
+    )  # fmt: skip
+
+
+def _of_children() -> float:
+    """Return the processor time of all processes that have ended and were waited for [s]."""
+    ended = os.times()
+    return ended.children_user + ended.children_system
 
 
 def _memory(study: Path, out: Path) -> Result:

@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Literal, cast
-
-import numpy as np
-import xarray as xr
+from typing import Any, Literal
 
 from bywire.bench.experiment import Case, Experiment
-from bywire.bench.kpis import effort, occupation, step_response
+from bywire.bench.kpis import effort, occupation, static_gain, step_response
 from bywire.bench.kpis.cases import FamilyJudge
-from bywire.bench.kpis.kpi import Figures, Kpi, KpiOfCases
 from bywire.bench.kpis.registry import units_of
-from bywire.bench.rows import Rows
 from bywire.brakes.motorcycle.case import case_from_rest, smoothing, step_at_zero
 from bywire.brakes.motorcycle.operating_point import settled_start
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Pressure, TimeConstant
-
-GAIN = Figures(
-    static_gain=("Pa/A", "Change of the mean pressure per change of the current demand."),
-)
 
 
 class Options(ParameterSet):
@@ -75,29 +65,13 @@ def step(options: Options) -> step_response.Setting:
 def settings(options: Options) -> dict[str, Any]:
     """Return what the step is judged by."""
     return {
+        "static_gain": static_gain.Setting(
+            "p_mc", 0.0, options.i_step, "A", smoothing=options.smoothing
+        ),
         "step_response": step(options),
         "effort": effort.Setting(),
         "occupation": occupation.Setting(),
     }
-
-
-def gain(run: xr.Dataset, options: Options) -> tuple[Kpi, ...]:
-    """Return the static gain."""
-    data = step_response.select(run, step(options))
-    return GAIN(static_gain=((data.end - data.start) / options.i_step, data.note))
-
-
-def gains(rows: Rows, options: Sequence[Options]) -> tuple[KpiOfCases, ...] | None:
-    """Return the static gains of many cases; None where their steps are not looked at alike."""
-    alike = step(options[0])
-    if any(step(each) != alike for each in {id(each): each for each in options}.values()):
-        return None
-    data = step_response.select(cast(xr.Dataset, rows), alike)
-    if data.problem:
-        return None
-    values = (data.end - data.start) / np.array([each.i_step for each in options])
-    unit, definition = GAIN.declared["static_gain"]
-    return (KpiOfCases("static_gain", values, unit, definition, lambda _: data.note),)
 
 
 EXPERIMENT = Experiment(
@@ -109,13 +83,11 @@ EXPERIMENT = Experiment(
         p_start=25e5, start="settled", i_step=0.35, duration=4.0, settle=3.0, smoothing=0.02
     ),
     cases=cases,
-    judge=FamilyJudge(
-        settings, further=gain, further_together=gains, further_signals=("p_mc",)
+    judge=FamilyJudge(settings),
+    kpis=units_of(
+        "step_response", "effort", "occupation", "static_gain",
+        resolved={"level": "Pa", "gain": "Pa/A"},
     ),
-    kpis={
-        **units_of("step_response", "effort", "occupation", resolved={"level": "Pa"}),
-        **GAIN.units,
-    },
     figures=("step-response", "time-traces"),
     step=step,
     following=smoothing,

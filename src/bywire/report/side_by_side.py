@@ -1,0 +1,54 @@
+"""Figures of a document drawn side by side, in copies of this process."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from bywire.core.copies import may_copy, processes
+from bywire.report.picture import Picture
+
+if TYPE_CHECKING:
+    from bywire.report.document import FigureBlock
+
+FEW = 4
+"""figures up to which copies are not worth their start"""
+
+# What a copy draws: it has them from the process that it was copied from.
+_blocks: list[FigureBlock] = []
+
+
+@contextmanager
+def drawn_side_by_side(blocks: Sequence[FigureBlock]) -> Iterator[None]:
+    """Draw figures while the block runs, where they are many and this process may be copied.
+
+    When it ends their place is taken by what was drawn. Others are drawn when they are asked for.
+    """
+    cores = os.cpu_count() or 1
+    if len(blocks) <= FEW or cores == 1 or not may_copy():
+        yield
+        return
+    from bywire.report import files, inline_figure  # noqa: F401 - loaded once, for all copies
+
+    _blocks[:] = blocks
+    with processes(min(cores, len(blocks)), list, is_copied=True) as pool:
+        drawn = [pool.submit(_picture, k) for k in range(len(blocks))]
+        yield
+        try:
+            for block, each in zip(blocks, drawn, strict=True):
+                block.__dict__["figure"] = each.result()
+        except BrokenProcessPool:  # killed, most likely for want of memory: the rest is drawn here
+            pass
+    _blocks.clear()
+
+
+def _picture(k: int) -> Picture:
+    from bywire.report.files import figure_bytes
+    from bywire.report.inline_figure import axes_of
+
+    figure = _blocks[k].figure
+    png, svg = (figure_bytes(figure, kind) for kind in ("png", "svg"))
+    return Picture(png, svg, axes_of(figure))

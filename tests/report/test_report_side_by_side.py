@@ -1,0 +1,80 @@
+"""Figures drawn in copies of a process: the same files, wherever each was drawn."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+
+import pytest
+from matplotlib.figure import Figure
+
+from bywire.report import side_by_side
+from bywire.report.document import FigureBlock
+from bywire.report.files import figure_bytes
+from bywire.report.inline_figure import inline_figures
+from bywire.report.picture import Picture
+from bywire.report.side_by_side import FEW, drawn_side_by_side
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="copies are of Linux alone")
+
+
+def line(k: int) -> Figure:
+    figure = Figure((1.5, 1.0))
+    figure.subplots().plot([0.0, 1.0], [k, 2.0])
+    return figure
+
+
+def blocks(count: int) -> list[FigureBlock]:
+    return [FigureBlock(partial(line, k), f"figure {k}") for k in range(count)]
+
+
+@pytest.fixture(autouse=True)
+def copied(monkeypatch):
+    monkeypatch.setattr(side_by_side, "may_copy", lambda: True)
+    monkeypatch.setattr(side_by_side.os, "cpu_count", lambda: 2)
+
+
+def test_copies_draw_the_same():
+    many, alone = blocks(FEW + 1), blocks(FEW + 1)
+    with drawn_side_by_side(many):
+        pass
+    assert all(isinstance(block.figure, Picture) for block in many)
+    shown, wanted = ([(b.figure, b.caption) for b in each] for each in (many, alone))
+    assert inline_figures(shown) == inline_figures(wanted)
+    assert inline_figures(shown, budget=0) == inline_figures(wanted, budget=0)
+    for (ours, _), (theirs, _) in zip(shown, wanted, strict=True):
+        assert [figure_bytes(ours, k) for k in ("png", "svg")] == [
+            figure_bytes(theirs, k) for k in ("png", "svg")
+        ]
+    assert len({figure_bytes(figure) for figure, _ in shown}) == len(many)
+
+
+def test_few_figures_are_not_worth_copies():
+    few = blocks(FEW)
+    with drawn_side_by_side(few):
+        pass
+    assert not any("figure" in vars(block) for block in few)
+
+
+def test_a_figure_that_fails_says_why():
+    def broken() -> Figure:
+        raise ValueError("no such line")
+
+    with pytest.raises(ValueError, match="no such line"), drawn_side_by_side(
+        [*blocks(FEW), FigureBlock(broken, "broken")]
+    ):
+        pass
+
+
+def test_a_copy_that_is_killed_leaves_its_figures_to_be_drawn_here(monkeypatch):
+    maker = side_by_side.os.getpid()
+
+    def killed() -> Figure:
+        if side_by_side.os.getpid() != maker:
+            side_by_side.os._exit(9)
+        return line(0)
+
+    many = [*blocks(FEW), FigureBlock(killed, "killed")]
+    with drawn_side_by_side(many):
+        pass
+    assert isinstance(many[-1].figure, Figure)
