@@ -219,12 +219,12 @@ __all__ = [
     "Role", "RootCause", "RotaryDamping", "Run", "Runs", "Shown", "ShownFigure", "Signal",
     "SignedCurrent", "Sliders", "Slow", "Source", "SourcePart", "Speed", "Stiffness", "Stimulus",
     "Study", "Sub", "Task", "TimeConstant", "Torque", "TorqueConstant", "Trace", "Undefined",
-    "Unit", "Unknown", "Voltage", "Volume", "Weight", "Wire", "as_run", "calibrated", "chosen", "closed_loop",
-    "compared", "derived", "differentiated", "effort", "estimate", "evaluate", "fixed", "found",
-    "hysteresis", "kpis", "lack_of_fit", "linearize", "measure", "measured", "moved_run",
-    "occupation", "paper", "parameters", "parameters_of", "quantities", "require_ranges",
-    "signals", "simulate", "step_response", "style", "track", "units_of", "validity", "variable",
-    "variables", "wrong_sign", "zeros",
+    "Unit", "Unknown", "Voltage", "Volume", "Weight", "Wire", "as_run", "calibrated", "chosen",
+    "closed_loop", "compared", "derived", "differentiated", "effort", "estimate", "evaluate",
+    "fixed", "found", "hysteresis", "kpis", "lack_of_fit", "linearize", "measure", "measured",
+    "moved_run", "occupation", "paper", "parameters", "parameters_of", "quantities",
+    "require_ranges", "signals", "simulate", "step_response", "style", "track", "units_of",
+    "validity", "variable", "variables", "wrong_sign", "zeros",
 ]  # fmt: skip
 
 

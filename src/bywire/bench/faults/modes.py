@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from bywire.bench.faults.declared import channels_of, failures_of
 from bywire.bench.stimuli.quantities import TOLERANCE
 from bywire.core.errors import ModelError
-from bywire.core.faults import CHANNELS, FAULTS, Channel, Fault, ParameterFault
-from bywire.core.model import ASSEMBLIES, Model
+from bywire.core.faults import Channel, ParameterFault
+from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
@@ -122,55 +122,15 @@ def _every(model: Model, par: ParameterSet) -> Iterator[Mode]:
         for fault in getattr(element, "FAULTS", ()):
             yield _of_element(place, fault, par)
     tasks = model.tasks(par)
-    declared = (*_declared(model), *_declared_within(model))
+    declared = tuple(channels_of(model))
     for channel in (*declared, *_demands(model, {channel.signal for channel in declared})):
         yield from _of_channel(channel, [task.name for task in tasks])
     for task in tasks:
         for name, (summary, kind, value) in _TASK.items():
             yield Mode(f"{task.name}.{name}", f"task {task.name} {summary}", _unit(kind, ""),
                        value, falsified=name, task=task.name)  # fmt: skip
-    for each in _failures(model):
+    for each in failures_of(model):
         yield Mode(each.name, each.summary, each.unit, each.value, each.changes)
-
-
-def _failures(model: Any) -> Iterator[Fault]:
-    """Yield what may fail in a brake, and in those of the assemblies within."""
-    for each in FAULTS.of(ASSEMBLIES.owner(model.name)).values():
-        if each.assembly == model.name:
-            yield each
-    for sub in _subs(model):
-        for each in _failures(sub.assembly):
-            changes = partial(_changes_within, sub, each.changes)
-            yield replace(each, name=f"{sub.path}.{each.name}", changes=changes)
-
-
-def _changes_within(sub: Any, changes: Changes, par: Any, value: float) -> Mapping[str, Any]:
-    changed = changes(sub.parameters(par), value)
-    return {f"{sub.path}.{name}": each for name, each in changed.items()}
-
-
-def _declared_within(model: Any) -> Iterator[Channel]:
-    """Yield the channels of the assemblies within, by their names in the model."""
-    for sub in _subs(model):
-        for channel in (*_declared(sub.assembly), *_declared_within(sub.assembly)):
-            if channel.side == "demand" and channel.signal in sub.feeds:
-                continue  # what the holder's tasks give
-            seen = None if channel.seen is None else partial(_seen_within, sub, channel.seen)
-            yield replace(
-                channel, name=f"{sub.path}.{channel.name}",
-                summary=f"{sub.label}: {channel.summary}", signal=sub.named(channel.signal),
-                seen=seen, task=sub.named(channel.task) if channel.task else "",
-            )  # fmt: skip
-
-
-def _seen_within(sub: Any, seen: Callable[[float, Any], float], value: float, par: Any) -> float:
-    return seen(value, sub.parameters(par))
-
-
-def _subs(model: Any) -> Iterable[Any]:
-    """Return the assemblies within a model: none in one that is no assembly."""
-    held: Mapping[str, Any] = getattr(model, "subs", {})
-    return held.values()
 
 
 def _groups(par: ParameterSet, prefix: str = "") -> Iterator[tuple[str, ParameterSet]]:
@@ -193,21 +153,6 @@ def _of_element(place: str, fault: ParameterFault, par: ParameterSet) -> Mode:
     elif not fault.scaled:
         unit = ""
     return Mode(f"{place}.{fault.name}", fault.summary, unit, fault.value, changes)
-
-
-def _declared(model: Model) -> tuple[Channel, ...]:
-    """Return the channels that the model's brake declares."""
-    known = CHANNELS.of(ASSEMBLIES.owner(model.name)).get(model.name)
-    channels = () if known is None else known.channels
-    for channel in channels:
-        sources = {"reading": model.State, "drive": model.Memory, "demand": model.Stimulus}
-        source = sources[channel.side]
-        if channel.signal not in source._fields:
-            raise ModelError(
-                f"{model.name}: the channel {channel.name!r} names no signal: {channel.signal!r} "
-                f"is none of {', '.join(source._fields)}"
-            )
-    return channels
 
 
 def _demands(model: Model, declared: Collection[str]) -> Iterator[Channel]:
