@@ -11,6 +11,9 @@ import xarray as xr
 
 from bywire.bench.energy_ledger import further_ledgers
 from bywire.bench.recording import record
+from bywire.contracts.run_energy import closes_its_energy
+from bywire.contracts.start import Start
+from bywire.contracts.trial import Trial
 from bywire.core import ops
 from bywire.core.assembly import Assembly
 from bywire.core.connections import Node, network
@@ -267,6 +270,28 @@ def test_what_is_coupled_by_ports_keeps_its_energy() -> None:
     assert got == pytest.approx(0.5 * BOTH.k * stretch**2, rel=1e-3, abs=1e-6)
     given = float(recording["W_left_load"][-1] + recording["W_right_load"][-1])
     assert given == pytest.approx(got, rel=1e-9)
+
+
+class Leaky(Ram):
+    name = "leaky"
+
+    def power(self, w):
+        return super().power(w) | {"E_dry": 0.0}
+
+
+class WithLeaky(Pair):
+    right = Sub(Leaky, prefix="right_")
+
+
+@needs_a_compiler
+@pytest.mark.parametrize(("model", "broken"), [(Pair, set()), (WithLeaky, {"right"})])
+def test_contracts_look_into_every_book(model: type[Pair], broken: set[str]) -> None:
+    state, memory = model().rest(BOTH)
+    start = Start(model(), BOTH, state, memory, zeros(model.Stimulus), "rest")
+    evidence = list(closes_its_energy(Trial(model, lambda: start)))
+    assert len(evidence) == 4  # a large and a small run, two books
+    found = {each.text.rpartition("the book ")[2].strip("'") for each in evidence if not each.holds}
+    assert found == broken
 
 
 def test_faults_of_a_recording_are_told_of_the_right_one() -> None:

@@ -11,6 +11,7 @@ from bywire.bench.experiment import Case, as_run
 from bywire.bench.faults.modes import modes_of
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear
+from bywire.core.errors import ModelError
 from bywire.plant import brake_disc
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.run import simulate
@@ -94,6 +95,11 @@ def test_what_fails_in_the_brake_is_known_by_its_path():
     assert channel.seen(20e5, par) == shown
 
 
+def test_two_ecus_are_not_exported_as_one(tmp_path):
+    with pytest.raises(ModelError, match=r"holds a motorcycle-brake \(rear brake\) with an ECU of"):
+        bywire.export_controller("whole-rear-stop", out=tmp_path / "ecu")
+
+
 def test_brake_without_battery_leaves_the_front_to_stop():
     bench = bywire.Bench(
         "whole-rear-stop", SET, options={"duration": 1.5},
@@ -130,7 +136,7 @@ def test_caliper_that_does_not_stick_lets_go():
 def test_drag_of_a_loop_acts_below_its_pressure_alone():
     bench = bywire.Bench(
         "straight-stop", "sport600", options={"duration": 0.3, "p_rear": 0.0},
-        faults=[{"fault": f"{side}.disc.dragging", "value": "12 N*m"} for side in ("front", "rear")],
+        faults=[{"fault": f"{end}.disc.dragging", "value": "12 N*m"} for end in ("front", "rear")],
     )  # fmt: skip
     run = bywire.run(bench, estimate_error=False).recording
     assert (run["T_r"] == 12.0).all()
