@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from functools import partial
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -317,6 +318,26 @@ def test_one_is_fed_by_the_memory_of_its_holder() -> None:
     x, m = zeros(Fed.State), zeros(Fed.Memory)._replace(right_v=5.0, left_v=1.0)
     after = task.tick(x, m, zeros(Fed.Stimulus), BOTH)
     assert after == m._replace(left_v=5.0 - 0.2, left_x_seen=0.0)
+
+
+def test_one_with_options_of_its_own() -> None:
+    class Geared(Ram):
+        name = "geared"
+
+        def __init__(self, share: float) -> None:
+            self.share = share
+
+        def friction(self, w):
+            ((low, high),) = super().friction(w)
+            return ((self.share * low, self.share * high),)
+
+    class Other(Pair):
+        right = Sub(partial(Geared, 3.0), prefix="right_")
+
+    x, m = zeros(Other.State), zeros(Other.Memory)
+    left, right = Other().bounds(x, x, m, BOTH, (0.0,) * 4)
+    assert left == (-0.02, 0.01)
+    assert right == (3.0 * -0.03, 3.0 * 0.5 * 0.03)
 
 
 def test_one_within_one_within_one() -> None:

@@ -29,7 +29,7 @@ class Sub(Generic[A]):
     Parameters
     ----------
     assembly
-        Its class; or an instance, of one with options of its own.
+        Its class; or what makes one with options of its own, such as ``partial(Rig, side=2)``.
     prefix
         Put before the names of its signals and tasks: ``"rear_"`` makes ``rear_i`` of ``i``.
         What their beginning tells stays in front: ``E_rear_copper``, ``noise_rear_p``.
@@ -52,14 +52,15 @@ class Sub(Generic[A]):
 
     def __init__(
         self,
-        assembly: type[A] | A,
+        assembly: Callable[[], A],
         *,
         prefix: str,
         par: str = "",
         label: str = "",
         feeds: Mapping[str, str] | None = None,
     ) -> None:
-        kind: Any = assembly if isinstance(assembly, type) else type(assembly)
+        made: Any = assembly if isinstance(assembly, type) else assembly()
+        kind: Any = made if isinstance(made, type) else type(made)
         self.path, self.prefix = par, prefix
         self.label = label or prefix.replace("_", " ").strip()
         self.feeds = dict(feeds or {})
@@ -79,7 +80,7 @@ class Sub(Generic[A]):
                     f"Sub({kind.__name__}): feeds names an "
                     f"{unknown_name('stimulus', name, kind.Stimulus._fields)}"
                 )
-        self.assembly: Any = assembly() if isinstance(assembly, type) else assembly
+        self.assembly: Any = kind() if made is kind else made
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name, self.where = name, f"{owner.__name__}.{name}"

@@ -9,12 +9,14 @@ import bywire
 from bywire.bench.energy_ledger import actuator_ledger, further_ledgers
 from bywire.bench.experiment import Case, as_run
 from bywire.bench.faults.modes import modes_of
+from bywire.bench.key_figures import key_figures_of
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear
 from bywire.core.errors import ModelError
 from bywire.plant import brake_disc
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.run import simulate
+from run_once import run_once
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 SET = "sport600-whole-rear"
@@ -93,6 +95,19 @@ def test_what_fails_in_the_brake_is_known_by_its_path():
     assert (channel.signal, channel.side) == ("rear_y_p", "reading")
     shown = alone["pressure.offset"].channel.seen(20e5, par.value("rear.actuator"))
     assert channel.seen(20e5, par) == shown
+
+
+def test_warnings_of_many_stops_are_those_of_each():
+    benches = [
+        bywire.Bench(
+            "whole-rear-stop", SET, {"rear.actuator.motor.R_m": R}, {"p_rear": p, "duration": 0.5}
+        )
+        for R, p in ((0.35, 40e5), (0.3, 60e5))
+    ]
+    said = key_figures_of(benches).warnings
+    assert said == tuple(tuple(run_once(bench).warnings) for bench in benches)
+    assert said[0] == ()
+    assert said[1][0].startswith("rear brake: the piston reached its end stop")
 
 
 def test_two_ecus_are_not_exported_as_one(tmp_path):

@@ -31,17 +31,17 @@ _VEHICLE = (
 )  # fmt: skip
 _REAR = (
     Panel(
-        "rear brake: pressure",
+        "rear cylinder",
         (Trace("rear_p_mc"), Trace("rear_p_pd", Role.SECOND), Trace("rear_p_ref", Role.SET_POINT)),
     ),
     Panel(
-        "rear brake: current", (Trace("rear_i"), Trace("rear_i_ref", Role.SET_POINT)),
+        "rear current", (Trace("rear_i"), Trace("rear_i_ref", Role.SET_POINT)),
         saturation="rear_sat_current",
     ),
-    Panel("rear brake: speed", (Trace("rear_omega"),)),
-    Panel("rear brake: power", (Trace("rear_P_el"),)),
+    Panel("rear motor", (Trace("rear_omega"),)),
+    Panel("rear power", (Trace("rear_P_el"),)),
     Panel(
-        "rear brake: winding", (Trace("rear_T_winding"),),
+        "rear winding", (Trace("rear_T_winding"),),
         saturation="rear_derated", saturated="derated",
     ),
 )  # fmt: skip

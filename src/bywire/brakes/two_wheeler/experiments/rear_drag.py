@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from bywire.bench.experiment import Case, Experiment
+from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.two_wheeler.case import Demand, RidingSpeed, on_surface, rolling_case
 from bywire.brakes.two_wheeler.rigs.whole_rear import (
@@ -81,7 +81,7 @@ def left(run: xr.Dataset, options: Options) -> dict[str, float | tuple[float, st
     return figures
 
 
-def judge(recordings: dict[str, xr.Dataset], options: Options) -> tuple[Kpi, ...]:
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the key figures."""
     (run,) = recordings.values()
     return FIGURES(**left(run, options))
