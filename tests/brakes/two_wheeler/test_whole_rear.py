@@ -12,6 +12,7 @@ from bywire.bench.faults.modes import modes_of
 from bywire.bench.key_figures import key_figures_of
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear
+from bywire.campaigns.residual import NEVER, residuals_of
 from bywire.core.errors import ModelError
 from bywire.plant import brake_disc
 from bywire.simulation.compiler import find_compiler
@@ -95,6 +96,22 @@ def test_what_fails_in_the_brake_is_known_by_its_path():
     assert (channel.signal, channel.side) == ("rear_y_p", "reading")
     shown = alone["pressure.offset"].channel.seen(20e5, par.value("rear.actuator"))
     assert channel.seen(20e5, par) == shown
+
+
+def test_what_the_brakes_ecu_can_see_it_sees_in_the_vehicle_too(wet):
+    known = residuals_of(TwoWheelerWholeRear())
+    alone = residuals_of(MotorcycleBrake())
+    within = {f"rear.actuator.{name}" for name in alone}
+    assert set(known) == {"slip-front", "slip-rear", "speed"} | within
+    par = bywire.parameters(SET)
+    for name, each in alone.items():
+        held = known[f"rear.actuator.{name}"]
+        signals = {n: wet.recording[n].values[None, :] for n in held.signals}
+        own = {n: wet.recording[f"rear_{n}"].values[None, :] for n in each.signals}
+        got = held.lasted(signals, par, wet.recording["time"].values)
+        wanted = each.lasted(own, par.value("rear.actuator"), wet.recording["time"].values)
+        assert np.array_equal(got, wanted)
+        assert got.max() > NEVER, name  # the demand rests for long enough to be looked at
 
 
 def test_warnings_of_many_stops_are_those_of_each():
