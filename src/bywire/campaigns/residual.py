@@ -72,7 +72,8 @@ def residuals_of(model: Any) -> dict[str, Residual]:
     These are named by the path of the parameters there, and take what was recorded under a prefix.
     """
     every = RESIDUALS.of(ASSEMBLIES.owner(model.name)).values()
-    known = {each.name: each for each in every if model.name in each.assemblies}
+    mine = (each for each in every if model.name in each.assemblies)
+    known = {each.name: replace(each, assembly=model.name) for each in mine}
     for sub in getattr(model, "subs", {}).values():
         for each in residuals_of(sub.assembly).values():
             name = f"{sub.path}.{each.name}"

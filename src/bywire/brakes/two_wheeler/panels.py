@@ -46,7 +46,5 @@ _REAR = (
     ),
 )  # fmt: skip
 
-PANELS = (
-    Panels("two-wheeler", ("two-wheeler-by-wire",), _VEHICLE),
-    Panels("two-wheeler-whole-rear", ("two-wheeler-whole-rear",), (*_VEHICLE, *_REAR)),
-)
+PANELS = Panels("two-wheeler", ("two-wheeler-by-wire",), _VEHICLE)
+WHOLE_REAR = Panels("two-wheeler-whole-rear", ("two-wheeler-whole-rear",), (*_VEHICLE, *_REAR))
