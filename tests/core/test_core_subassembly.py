@@ -375,6 +375,11 @@ def test_its_network_shows_it_as_one_box() -> None:
     assert {n.name for n in found.sources(Node("wire", "force"))} == {"left", "right"}
 
 
+class NoWire(Assembly[PairParameters, Any]):
+    left = Sub(Ram, prefix="left_")
+    more = Wire("A", "current")
+
+
 class UnsetPort(Pair):
     def wire(self, w):
         w.left.load = 0.0
@@ -422,6 +427,7 @@ class Nowhere(Pair):
 @pytest.mark.parametrize(
     ("model", "message"),
     [
+        (NoWire, r"Ram.load is read before the holder sets it"),
         (UnsetPort, r"Ram.load is read before the holder sets it: assign w.NAME.load"),
         (EarlyRead, r"Ram.load is read before the holder sets it"),
         (WrongPort, r"a quantity in N and one in A cannot be added"),
@@ -436,6 +442,15 @@ class Nowhere(Pair):
 def test_mistakes_are_said_with_their_place(model: type[Pair], message: str) -> None:
     with pytest.raises(ModelError, match=message):
         check_wiring(model(), BOTH)
+
+
+def test_a_class_without_wire_is_named_where_it_stands() -> None:
+    class Alone(Assembly[PairParameters, Any]):
+        Memory = Stimulus = Held
+        more = Wire("A", "current")
+
+    with pytest.raises(ModelError, match=r"Alone, .*test_core_subassembly.py, line \d+: the wire"):
+        check_wiring(Alone(), BOTH)
 
 
 def declare(**body: Any) -> type[Any]:

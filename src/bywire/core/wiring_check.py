@@ -10,6 +10,7 @@ from typing import Any
 from bywire.core.assembly import Assembly
 from bywire.core.dimensions import Dimension, fits
 from bywire.core.errors import ModelError, UnitError
+from bywire.core.instants import Evaluated
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
 from bywire.core.wired import Instant, instant_of
@@ -227,7 +228,7 @@ def _place(model: AnyAssembly, method: str = "wire") -> str:
     """Return class, file and line of a method."""
     cls = type(model)
     function = getattr(cls, method)
-    if function.__module__ == Assembly.__module__:
+    if function.__module__ in (Assembly.__module__, Evaluated.__module__):
         function = cls
     try:
         line = inspect.getsourcelines(function)[1]
