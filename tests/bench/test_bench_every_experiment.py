@@ -44,7 +44,7 @@ LARGE = (
 )  # fmt: skip
 """kernels in lanes that no other test needs, and long runs; other experiments of the same models
 have their figures computed in the same way, and all that are computed by families are left"""
-WARNED = {"release": ["retracted stop"]}  # its port is not modeled
+WARNED = {name: ["retracted stop"] for name in ("release", "rear-drag")}  # its port is no model's
 STEP = '[stimulus]\nkind = "step"\nstart = "0 {0}"\nend = "1 {0}"\nt_step = "0.1 s"\n'
 
 

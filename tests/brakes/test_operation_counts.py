@@ -13,6 +13,8 @@ from typing import Any
 import pytest
 
 from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.two_wheeler.model import TwoWheelerByWire
+from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear
 from bywire.brakes.wedge.model import WedgeBrake
 from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
 from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
@@ -87,10 +89,15 @@ RIGS: list[tuple[type[Model], dict[str, Any], Counts]] = [
     (DrivenShaft, {"rig.load": "dummy"}, (97, 74, 0, (0,))),
     (DrivenShaft, {"screw.law": "drive"}, (88, 67, 0, (0,))),
 ]
+VEHICLES: list[tuple[type[Model], str, Counts]] = [
+    (TwoWheelerByWire, "sport600", (1314, 1499, 411, (276,))),
+    (TwoWheelerWholeRear, "sport600-whole-rear", (1544, 2766, 547, (276, 144))),
+]
 CASES = [
     *((MotorcycleBrake, "dardanelli2010", changes, counts) for changes, counts in MOTORCYCLE),
     *((WedgeBrake, "roberts2003", changes, counts) for changes, counts in WEDGE),
     *((model, "roberts2003", changes, counts) for model, changes, counts in RIGS),
+    *((model, source, {}, counts) for model, source, counts in VEHICLES),
 ]
 
 

@@ -12,6 +12,7 @@ NOT_CHECKED = {
     "wedge-corner": {"linear model"},  # it rolls
     "two-wheeler-by-wire": {"linear model", "exact rest"},  # it rolls
     "wedge-brake": {"linear model", "exact rest"},  # its disc turns; the steep one slides
+    "two-wheeler-whole-rear": {"linear model"},  # it rolls
     "wheel-on-drum": {"exact rest"},  # it turns
     "driven-shaft": {"*"},  # only an example brings its parameters
 }
@@ -26,6 +27,9 @@ LONG = {
     ("wedge-corner", "exact rest"),
     ("wedge-corner", "lanes"),
     ("two-wheeler-by-wire", "lanes"),
+    ("two-wheeler-whole-rear", "derivatives of a run"),
+    ("two-wheeler-whole-rear", "order of the step"),
+    ("two-wheeler-whole-rear", "lanes"),
 }
 """what takes as long as all else of a model; other models put the contract to the test, tests of
 stops halve the step, and every experiment of the vehicle runs in lanes as alone"""

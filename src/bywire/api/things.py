@@ -49,7 +49,7 @@ def all_things() -> dict[str, Any]:
         "faults": fault_summaries(),
         "campaigns": {each.name: each.summary for each in CAMPAIGNS.all().values()},
         "residuals": {
-            each.name: f"{each.summary} [{display_unit(each.unit)}] ({each.assembly})"
+            each.name: f"{each.summary} [{display_unit(each.unit)}] ({', '.join(each.assemblies)})"
             for each in RESIDUALS.all().values()
         },
         "kpis": {kpi.name: kpi.definition for kpi in definitions().values()},

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from bywire.core.faults import Channel, Channels, Fault, ParameterFault
     from bywire.core.model import Bounds, Matrix, Model, Task
     from bywire.core.parameters import ParameterSet
-    from bywire.core.parts import Integral, Part, Shown, Wire
+    from bywire.core.parts import Integral, Part, Port, Shown, Wire
     from bywire.core.provenance import calibrated, chosen, derived, paper
     from bywire.core.quantities import (
         Area,
@@ -88,6 +88,7 @@ if TYPE_CHECKING:
         Speed,
         zeros,
     )
+    from bywire.core.subassembly import Sub
     from bywire.core.typing import Array, Progress
     from bywire.identification.differentiation import differentiated
     from bywire.identification.estimate import Estimate
@@ -141,7 +142,8 @@ _HOMES = {
     ),
     # a model
     "core.assembly": "Assembly",
-    "core.parts": "Integral Part Shown Wire",
+    "core.parts": "Integral Part Port Shown Wire",
+    "core.subassembly": "Sub",
     "core.model": "Bounds Matrix Model Task",
     "core.signals": "Angle ContactCompliance Energy Overlap Power Role Signal Speed zeros",
     "simulation.run": "Run simulate",
@@ -212,18 +214,17 @@ __all__ = [
     "Inertia", "Integral", "InternalResistance", "Item", "Kpi", "Length", "Life", "LineRole",
     "LinearModel", "Loop", "Map", "Mark", "Mass", "Matrix", "Method", "Model", "ModelError",
     "Nodes", "Overlap", "Panel", "Panels", "ParameterError", "ParameterFault", "ParameterSet",
-    "Part", "Plant", "PlantPoint", "Point", "Position", "Power", "Pressure", "Problem",
+    "Part", "Plant", "PlantPoint", "Point", "Port", "Position", "Power", "Pressure", "Problem",
     "Progress", "Quantity", "Recordings", "Reproduction", "Residual", "Resistance", "Result",
     "Role", "RootCause", "RotaryDamping", "Run", "Runs", "Shown", "ShownFigure", "Signal",
     "SignedCurrent", "Sliders", "Slow", "Source", "SourcePart", "Speed", "Stiffness", "Stimulus",
-    "Study", "Task", "TimeConstant", "Torque", "TorqueConstant", "Trace", "Undefined", "Unit",
-    "Unknown",
-    "Voltage", "Volume", "Weight", "Wire", "as_run", "calibrated", "chosen", "closed_loop",
-    "compared", "derived", "differentiated", "effort", "estimate", "evaluate", "fixed", "found",
-    "hysteresis", "kpis", "lack_of_fit", "linearize", "measure", "measured", "moved_run",
-    "occupation", "paper", "parameters", "parameters_of", "quantities", "require_ranges",
-    "signals", "simulate", "step_response", "style", "track", "units_of", "validity", "variable",
-    "variables", "wrong_sign", "zeros",
+    "Study", "Sub", "Task", "TimeConstant", "Torque", "TorqueConstant", "Trace", "Undefined",
+    "Unit", "Unknown", "Voltage", "Volume", "Weight", "Wire", "as_run", "calibrated", "chosen",
+    "closed_loop", "compared", "derived", "differentiated", "effort", "estimate", "evaluate",
+    "fixed", "found", "hysteresis", "kpis", "lack_of_fit", "linearize", "measure", "measured",
+    "moved_run", "occupation", "paper", "parameters", "parameters_of", "quantities",
+    "require_ranges", "signals", "simulate", "step_response", "style", "track", "units_of",
+    "validity", "variable", "variables", "wrong_sign", "zeros",
 ]  # fmt: skip
 
 

@@ -17,10 +17,9 @@ from bywire.bench.values import number, written
 from bywire.campaigns.criterion import read_criteria
 from bywire.campaigns.declared import CAMPAIGNS
 from bywire.campaigns.plan import CampaignPlan, Failing, Reaction, evenly, touch_alike
-from bywire.campaigns.residual import RESIDUALS, Residual
+from bywire.campaigns.residual import Residual, residuals_of
 from bywire.campaigns.simulating import require_small
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
-from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import choice_fields
 from bywire.core.signals import signals_of
 from bywire.data.toml_file import read_toml
@@ -199,8 +198,7 @@ def _onsets(section: Mapping[str, Any], case: Case) -> tuple[float, ...]:
 
 
 def _residuals(names: Any, case: Case) -> tuple[Residual, ...]:
-    brake = ASSEMBLIES.owner(case.model.name)
-    known = {n: r for n, r in RESIDUALS.of(brake).items() if r.assembly == case.model.name}
+    known = residuals_of(case.model)
     if names is None:
         return tuple(known.values())
     if not isinstance(names, list):

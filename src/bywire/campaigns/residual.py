@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from bywire.campaigns.lasting import first_time, least_of_the_last, mean_of_the_last
+from bywire.core.model import ASSEMBLIES
 from bywire.core.registry import Kind, instances
 from bywire.core.typing import Array
 
@@ -27,7 +29,7 @@ class Residual:
     summary
         What it compares.
     assembly
-        Name of the assembly whose controller computes it.
+        Name of the assembly whose controller computes it, or of several.
     unit
         SI unit.
     signals
@@ -42,11 +44,16 @@ class Residual:
 
     name: str
     summary: str
-    assembly: str
+    assembly: str | tuple[str, ...]
     unit: str
     signals: tuple[str, ...]
     compute: Callable[[Mapping[str, Array], Any, float], Array]
     hold: float = 0.0
+
+    @property
+    def assemblies(self) -> tuple[str, ...]:
+        """Names of the assemblies that have it."""
+        return (self.assembly,) if isinstance(self.assembly, str) else self.assembly
 
     def lasted(self, signals: Mapping[str, Array], par: Any, time: Array) -> Array:
         """Return what it has exceeded for the time that it has to, shape (cases, rows)."""
@@ -57,6 +64,33 @@ class Residual:
 RESIDUALS = Kind("residual", ("residuals",), instances(Residual),
                  declared="a Residual")  # fmt: skip
 """the residuals of every brake"""
+
+
+def residuals_of(model: Any) -> dict[str, Residual]:
+    """Return what the controllers of a model compute, and those of the assemblies within it.
+
+    These are named by the path of the parameters there, and take what was recorded under a prefix.
+    """
+    every = RESIDUALS.of(ASSEMBLIES.owner(model.name)).values()
+    mine = (each for each in every if model.name in each.assemblies)
+    known = {each.name: replace(each, assembly=model.name) for each in mine}
+    for sub in getattr(model, "subs", {}).values():
+        for each in residuals_of(sub.assembly).values():
+            name = f"{sub.path}.{each.name}"
+            known[name] = replace(
+                each, name=name, summary=f"{sub.label}: {each.summary}", assembly=model.name,
+                signals=tuple(map(sub.named, each.signals)),
+                compute=partial(_within, sub, each.signals, each.compute),
+            )  # fmt: skip
+    return known
+
+
+def _within(
+    sub: Any, names: tuple[str, ...], compute: Callable[[Mapping[str, Array], Any, float], Array],
+    signals: Mapping[str, Array], par: Any, dt: float,
+) -> Array:  # fmt: skip
+    own = {name: signals[sub.named(name)] for name in names}
+    return compute(own, sub.parameters(par), dt)
 
 
 def missed_ticks(task: str, assembly: str, period: float) -> Residual:

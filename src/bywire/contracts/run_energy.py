@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from bywire.bench.energy_ledger import Ledger, actuator_ledger
+from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
 from bywire.bench.recording import record
 from bywire.contracts.evidence import Evidence, NotCheckedError, measured
 from bywire.contracts.trial import LARGE, Trial
@@ -17,7 +17,7 @@ SHARES = (LARGE, 0.05)
 
 
 def closes_its_energy(trial: Trial) -> Iterator[Evidence]:
-    """Find whether the recorded energies of a large and of a small run close.
+    """Find whether the recorded energies of a large and of a small run close, book by book.
 
     The step's own error falls with its square: of the residuals at two steps the difference tells
     it, and it is taken off.
@@ -25,17 +25,27 @@ def closes_its_energy(trial: Trial) -> Iterator[Evidence]:
     place = trial.place("powers", "power")
     for share in SHARES:
         run = trial.start.run(share)
-        coarse, fine = (_ledger(replace(run, step=run.step / n)) for n in (1, 2))
-        if not fine.turnover:
+        coarse, fine = (_ledgers(replace(run, step=run.step / n)) for n in (1, 2))
+        turned = {book: each for book, each in fine.items() if each.turnover}
+        if not turned:
             raise NotCheckedError(
                 f"the recording shows no energies (E_source, losses E_..., E_stored) that change "
                 f"in a run from {trial.start.known}"
             )
-        left = (4.0 * fine.closing_error - coarse.closing_error) / 3.0 / fine.turnover
         size = "large" if share == LARGE else "small"
-        text = f"{abs(left):.1e} of the {fine.turnover:.3g} J of a {size} run are unexplained"
-        yield measured(abs(left), RESIDUAL, text, place)
+        for book, each in turned.items():
+            before = coarse[book].closing_error if book in coarse else each.closing_error
+            left = (4.0 * each.closing_error - before) / 3.0 / each.turnover
+            where = f", in the book {book!r}" if book else ""
+            text = (
+                f"{abs(left):.1e} of the {each.turnover:.3g} J of a {size} run are unexplained"
+                + where
+            )
+            yield measured(abs(left), RESIDUAL, text, place)
 
 
-def _ledger(run: Run) -> Ledger:
-    return actuator_ledger(record(run, simulate(run), 0.0, 0.0, {}))
+def _ledgers(run: Run) -> dict[str, Ledger]:
+    """Return the books of a run by name, the first one's empty."""
+    recording = record(run, simulate(run), 0.0, 0.0, {})
+    first = actuator_ledger(recording)
+    return {"": first, **further_ledgers(recording)}

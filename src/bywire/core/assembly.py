@@ -8,19 +8,20 @@ would fight the diagonal mass form of ``core.model``, which stays below this for
 
 from __future__ import annotations
 
-import types
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cache
-from itertools import islice, repeat
 from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 
 from bywire.core.errors import ModelError, unknown_name
 from bywire.core.gathering import AnyPart, contacts, gather, stores
-from bywire.core.model import Bounds, Matrix, Model
-from bywire.core.parts import Part
-from bywire.core.watching import silent_parts, warnings_of, watched_by_elements
-from bywire.core.wired import Instant, Wired, instant_of, line
-from bywire.core.wires import Integral, Shown, Wire
+from bywire.core.instants import Evaluated
+from bywire.core.model import Bounds, Matrix, Task
+from bywire.core.returned import filled, known
+from bywire.core.signals import zeros
+from bywire.core.subassembly import Sub
+from bywire.core.watching import Watching
+from bywire.core.wired import Instant, Wired, instant_of
+from bywire.core.wires import Port
 
 ParT = TypeVar("ParT")
 MemoryT = TypeVar("MemoryT")
@@ -28,12 +29,13 @@ MemoryT = TypeVar("MemoryT")
 _NAN = float("nan")
 
 
-class Assembly(Model, Generic[ParT, MemoryT]):
+class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
     """A model made of parts; see ``docs/modeling.md``.
 
-    A subclass declares `Part`, `Wire`, `Integral` and `Shown` objects, ``Memory``, ``Stimulus`` and
-    ``records``, and defines ``wire``, ``tasks``, and as far as it has any ``friction``, ``power``
-    and ``record``. Where a mode replaces an equation it overrides ``mass`` or ``balance``.
+    A subclass declares `Part`, `Wire`, `Integral`, `Shown` and `Sub` objects, ``Memory``,
+    ``Stimulus`` and ``records``, and defines ``wire``, ``tasks``, and as far as it has any
+    ``friction``, ``power`` and ``record``. Where a mode replaces an equation it overrides ``mass``
+    or ``balance``.
     """
 
     State: ClassVar[Any]
@@ -46,17 +48,21 @@ class Assembly(Model, Generic[ParT, MemoryT]):
     shared: ClassVar[tuple[str, ...]] = ()
     """groups of parameters that several elements take by name, such as a fluid"""
     parts: ClassVar[dict[str, AnyPart]]
+    subs: ClassVar[dict[str, Sub[Any]]]
+    """the assemblies within"""
+    ports: ClassVar[tuple[Port, ...]]
+    """the wires that an assembly sets that holds this one"""
+    reaction_places: ClassVar[dict[str, tuple[int, ...]]]
+    """where the reactions of each assembly within stand, and its own under an empty name"""
 
     def __init_subclass__(cls, *, at_an_instant: bool = False, **options: Any) -> None:
         """Gather what follows from the parts."""
         super().__init_subclass__(**options)
-        if not at_an_instant and isinstance(cls.Memory, type):  # else there is more to come
+        holds = any(isinstance(each, Sub) for base in cls.__mro__ for each in vars(base).values())
+        if not at_an_instant and (isinstance(cls.Memory, type) or holds):  # else more is to come
             gather(cls)
 
     # What an assembly writes.
-
-    def wire(self, w: Self) -> None:
-        """Set every input and every wire once, in the order of the physics."""
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
         """Return (low, high) of each friction, as ``bounds`` of the protocol."""
@@ -70,79 +76,7 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         """Return what is recorded and no part gives, and what replaces what one gives."""
         return {}
 
-    # What it reads at an instant.
-
-    @property
-    def x(self) -> Any:
-        """State that enters the implicit solve."""
-        return instant_of(self, "x").x
-
-    @property
-    def xe(self) -> Any:
-        """State, value-only."""
-        return instant_of(self, "xe").xe
-
-    @property
-    def m(self) -> MemoryT:
-        """What the controllers hold."""
-        return instant_of(self, "m").memory  # type: ignore[no-any-return]
-
-    @property
-    def par(self) -> ParT:
-        """Parameters."""
-        return instant_of(self, "par").par  # type: ignore[no-any-return]
-
-    @property
-    def reaction(self) -> tuple[float, ...]:
-        """Forces of the frictions, then of the limits; in ``power`` and ``record``."""
-        return instant_of(self, "reaction").reaction
-
-    @property
-    def rate(self) -> Any:
-        """Derivative of the state; in ``power``."""
-        return instant_of(self, "rate").rate
-
-    @property
-    def flow(self) -> Any:
-        """Integrals since the start; in ``record``."""
-        return instant_of(self, "flow").flow
-
     # What follows from the parts.
-
-    def at(
-        self,
-        state: Any,
-        memory: MemoryT,
-        par: ParT,
-        contact: tuple[float, ...] | None = None,
-        **more: Any,
-    ) -> Self:
-        """Return the assembly at an instant, wired: its parts, typed, have values there.
-
-        Parameters
-        ----------
-        contact
-            Contact forces; not known by default.
-        more
-            Further fields of `Instant`: ``xe`` where it is not the state, for instance.
-        """
-        w = self._unwired(state, memory, par, contact, **more)
-        self.wire(w)
-        return w
-
-    def _unwired(
-        self, x: Any, memory: Any, par: Any, contact: tuple[float, ...] | None, **more: Any
-    ) -> Self:
-        each: dict[str, tuple[float, ...]] = {}
-        left = iter(contact) if contact is not None else repeat(_NAN)
-        for part in contacts(type(self)):
-            count = sum(part.group_sizes(par))
-            unknown = (_NAN,) * len(part.element.Forces._fields)  # where a choice leaves them out
-            each[part.name] = tuple(islice(left, count)) or unknown
-        fields = {"x": x, "xe": x, "memory": memory, "par": par, "shared": self.shared}
-        w: Self = object.__new__(_at_an_instant(type(self)))
-        vars(w).update(vars(self) | {"_instant": Instant(**fields | {"contact": each} | more)})
-        return w
 
     def mass(self, xe: Any, par: ParT) -> Any:
         """Return the factor of each state's derivative."""
@@ -154,6 +88,8 @@ class Assembly(Model, Generic[ParT, MemoryT]):
                 rows += _row(_wired(w, part).call(part.element.mass))
             else:
                 rows += (1.0,) * count
+        for _, inner, here in _held(w):
+            rows += inner.mass(here.xe, here.par)
         return self.State._make(rows)
 
     def balance(
@@ -165,13 +101,19 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         for part in stores(type(self)):
             name = "balance" if part.has("balance") else "rate"
             rows += _row(_wired(w, part).call(part.function(name)))
+        for _, inner, here in _held(w):
+            rows += inner.balance(here.x, here.xe, here.memory, here.par, here.forces)
         return self.State._make(rows)
 
     def bounds(
         self, x: Any, xe: Any, memory: MemoryT, par: ParT, contact: tuple[float, ...]
     ) -> tuple[Bounds, ...]:
         """Return the limits of the dry frictions."""
-        return self.friction(self.at(x, memory, par, contact, xe=xe))
+        w = self.at(x, memory, par, contact, xe=xe)
+        bounds = [*self.friction(w)]
+        for _, inner, here in _held(w):
+            bounds += inner.bounds(here.x, here.xe, here.memory, here.par, here.forces)
+        return tuple(bounds)
 
     def compliance(self, par: ParT) -> tuple[Matrix, ...]:
         """Return a compliance matrix per contact group, an empty one where it is left out."""
@@ -187,6 +129,8 @@ class Assembly(Model, Generic[ParT, MemoryT]):
             else:
                 compliance = wired.call(part.function("compliance"))
                 groups += (((compliance,),),) * len(sizes)
+        for sub in self.subs.values():
+            groups += sub.assembly.compliance(sub.parameters(par))
         return tuple(groups)
 
     def gap(self, x: Any, xe: Any, par: ParT) -> tuple[tuple[float, ...], ...]:
@@ -200,16 +144,19 @@ class Assembly(Model, Generic[ParT, MemoryT]):
                 continue
             overlaps = _row(_wired(w, part).call(part.function("overlaps")))
             groups += (overlaps,) if part.has("matrix") else ((each,) for each in overlaps)
+        for _, inner, here in _held(w):
+            groups += inner.gap(here.x, here.xe, here.par)
         return tuple(groups)
 
     @property
     def usually_open(self) -> tuple[bool, ...]:
         """Per contact group, whether it rarely touches."""
-        return tuple(
+        own = tuple(
             part.rarely
             for part in contacts(type(self))
             for _ in range(1 if part.has("matrix") else len(part.element.Forces._fields))
         )
+        return sum((sub.assembly.usually_open for sub in self.subs.values()), start=own)
 
     def powers(
         self,
@@ -229,8 +176,12 @@ class Assembly(Model, Generic[ParT, MemoryT]):
                 function = part.function("power_in" if part.work else part.losses[name])
                 value = _wired(w, part).call(function)
                 values[name] = values[name] + value if name in values else value
-        values |= _known(self, "power", self.power(w), self.Flow._fields)
-        return _filled(self, "power", self.Flow, values)
+        for sub, inner, here in _held(w):
+            values |= sub.outside("Flow", inner.powers(
+                here.x, here.xe, here.rate, here.memory, here.par, here.forces, here.reaction
+            ))  # fmt: skip
+        values |= known(self, "power", self.power(w), self.Flow._fields)
+        return filled(self, "power", self.Flow, values)
 
     def output(
         self,
@@ -251,8 +202,12 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         values |= dict(_part_values(w, self.Output._fields))
         if "E_stored" in self.Output._fields:
             values["E_stored"] = self.stored(w)
-        values |= _known(self, "record", self.record(w), self.Output._fields)
-        return _filled(self, "record", self.Output, values)
+        for sub, inner, here in _held(w):
+            values |= sub.outside("Output", inner.output(
+                here.x, here.memory, here.par, here.forces, here.reaction, here.flow
+            ))  # fmt: skip
+        values |= known(self, "record", self.record(w), self.Output._fields)
+        return filled(self, "record", self.Output, values)
 
     def stored(self, w: Self) -> Any:
         """Return the energy that the parts store at an instant [J]; contacts are added up apart."""
@@ -267,9 +222,23 @@ class Assembly(Model, Generic[ParT, MemoryT]):
                 sums.append(sum(values[1:], values[0]))
         return sum(sums[1:], sums[0]) if sums else 0.0
 
+    def tasks(self, par: ParT) -> tuple[Task, ...]:
+        """Return the tasks of the assemblies within; those of its own are added by a subclass."""
+        return tuple(task for sub in self.subs.values() for task in sub.tasks(par))
+
+    def rest(self, par: ParT) -> tuple[Any, Any]:
+        """Return zeros, and where the assemblies within rest."""
+        inner = {name: sub.assembly.rest(sub.parameters(par)) for name, sub in self.subs.items()}
+        return (
+            self.state(**{name: state for name, (state, _) in inner.items()}),
+            self.memory(**{name: memory for name, (_, memory) in inner.items()}),
+        )
+
     @classmethod
     def state(cls, **parts: NamedTuple) -> Any:
-        """Return a State from the states of parts, by their names; those left out are zero.
+        """Return a State from the states of parts and of assemblies within, by their names.
+
+        Those left out are zero.
 
         Raises
         ------
@@ -283,47 +252,40 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         return cls.State._make(values)
 
     @classmethod
+    def memory(cls, own: NamedTuple | None = None, **subs: NamedTuple) -> Any:
+        """Return a Memory from its own fields and from the memories of assemblies within.
+
+        Those left out are zero.
+
+        Raises
+        ------
+        ModelError
+            When no such assembly is within.
+        """
+        values = {} if own is None else own._asdict()
+        for name, given in subs.items():
+            if name not in cls.subs:
+                raise ModelError(f"{cls.__name__}: {unknown_name('assembly', name, cls.subs)}")
+            values |= cls.subs[name].outside("Memory", given)
+        return zeros(cls.Memory)._replace(**values)
+
+    @classmethod
     @cache  # studies begin thousands of runs a second
     def _places(cls, name: str, kind: type) -> tuple[int, ...]:
-        """Return where the states of a part stand in the assembly's."""
+        """Return where the states of a part, or of an assembly within, stand in the State."""
+        fields: tuple[str, ...] = cls.State._fields
+        if name in cls.subs:
+            sub = cls.subs[name]
+            if not issubclass(kind, sub.assembly.State):
+                raise ModelError(f"{sub.where}: {kind.__name__} is no state of {sub.label}")
+            return tuple(fields.index(each) for each in sub.signals("State"))
         part = cls.parts.get(name)
         if part is None:
-            raise ModelError(f"{cls.__name__}: {unknown_name('part', name, cls.parts)}")
+            there = {**cls.parts, **cls.subs}
+            raise ModelError(f"{cls.__name__}: {unknown_name('part', name, there)}")
         if not part.has("State") or not issubclass(kind, part.element.State):
             raise ModelError(f"{part.where}: {kind.__name__} is no state of {part.kind}")
-        fields: tuple[str, ...] = cls.State._fields
         return tuple(fields.index(part.state_name(each)) for each in part.element.State._fields)
-
-    def watch(self, recording: Any, par: Any) -> list[str]:
-        """Return what the elements say of a recording, each of what it felt in every row.
-
-        Of signals that are not recorded nothing is known, and nothing said.
-        """
-        return warnings_of(self, recording, par)
-
-    def watched(self, par: Any) -> tuple[str, ...] | None:
-        """Return the signals that ``watch`` looks at; None where it is written by hand."""
-        return watched_by_elements(self, par) if type(self).watch is Assembly.watch else None
-
-    def silent(self, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
-        """Return the parts whose elements say nothing of any of several cases, by name.
-
-        ``rows``: signals of shape (cases, rows); ``pars``: parameters of each case.
-        """
-        return silent_parts(self, rows, pars)
-
-    def may_warn(self, rows: Any, pars: Sequence[Any]) -> Sequence[int]:
-        """Return the cases of which ``watch`` may say something: none where all parts are silent.
-
-        All where ``watch`` is written by hand, unless this is too.
-        """
-        is_own = type(self).watch is not Assembly.watch
-        return range(len(pars)) if is_own or not self.are_silent(rows) else ()
-
-    def are_silent(self, rows: Any) -> bool:
-        """Return whether no part has anything to say of cases of which ``rows.silent`` is known."""
-        watching = (part.name for part in self.parts.values() if part.has("watch"))
-        return all(name in rows.silent for name in watching)
 
     def _nothing(self) -> Any:
         """Return a memory that is not known: where it does not count, nobody must see it."""
@@ -351,45 +313,8 @@ def _row(value: Any) -> tuple[Any, ...]:
     return tuple(value) if isinstance(value, tuple) else (value,)
 
 
-def _known(
-    model: Assembly[Any, Any], method: str, values: Mapping[str, Any], names: tuple[str, ...]
-) -> dict[str, Any]:
-    for name in values:
-        if name not in names:
-            raise ModelError(
-                f"{type(model).__name__}.{method}: {unknown_name('signal', name, names)}"
-            )
-    return dict(values)
-
-
-def _filled(model: Assembly[Any, Any], method: str, kind: Any, values: Mapping[str, Any]) -> Any:
-    for name in kind._fields:
-        if name not in values:
-            raise ModelError(
-                f"{type(model).__name__}.{method} does not return {name!r}, and no part gives it: "
-                f"add it to what {method} returns"
-            )
-    return kind(**{name: values[name] for name in kind._fields})
-
-
-@cache
-def _at_an_instant(cls: type[Any]) -> type[Any]:
-    """Return what stands for an assembly at an instant: it takes wires and no other names."""
-    kinds = (Part, Wire, Integral, Shown)
-    every = {k: v for base in cls.__mro__ for k, v in vars(base).items()}
-    known = frozenset(name for name, value in every.items() if isinstance(value, kinds))
-
-    def refuse(self: Any, name: str) -> Any:
-        there = known | {n for n, v in vars(Assembly).items() if isinstance(v, property)}
-        error = unknown_name("part or wire", name, there)
-        raise ModelError(f"{cls.__name__}: {line()} names an {error}")
-
-    def assign(self: Any, name: str, value: Any) -> None:
-        if name not in known:
-            refuse(self, name)
-        object.__setattr__(self, name, value)
-
-    body = {"__getattr__": refuse, "__setattr__": assign, "__module__": cls.__module__}
-    return types.new_class(
-        cls.__name__, (cls,), {"at_an_instant": True}, lambda names: names.update(body)
-    )
+def _held(w: Any) -> Iterator[tuple[Sub[Any], Any, Instant]]:
+    """Yield the assemblies within one at an instant: as declared, there, and its own instant."""
+    for name, sub in w.subs.items():
+        inner = getattr(w, name)
+        yield sub, inner, instant_of(inner, name)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 from bywire.core.assembly import Assembly
+from bywire.core.gathering import contact_count
 from bywire.core.traced import Traced, names_in
 from bywire.core.wired import instant_of
 
@@ -103,6 +104,13 @@ def network(model: Assembly[Any, Any], par: Any) -> Network:
         ports[node] = () if inputs is None else tuple(part.element.Input._fields)
         for port, value in zip(ports[node], inputs or (), strict=True):
             connect(node, port, value)
+    for name in model.subs:
+        node, read = Node("part", name), trace.memory_of(name)
+        ports[node] = (*trace.ports[name], *read)
+        for port, value in trace.ports[name].items():
+            connect(node, port, value)
+        for port, source in read.items():
+            connections[Connection(source, node, port)] = None
     for state, bounds in zip(model.frictions, trace.frictions, strict=False):
         node = trace.owners[state]
         if any(source != node for source in trace.sources(bounds)):
@@ -124,11 +132,15 @@ class _Trace:
             for part in model.parts.values() if part.has("State")
             for state in part.element.State._fields
         }  # fmt: skip
-        paths = [part.path for part in model.parts.values()]
-        self._paths = {
-            part.path: Node("part", part.name)
-            for part in model.parts.values() if paths.count(part.path) == 1
+        self.owners |= {
+            state: Node("part", name)
+            for name, sub in model.subs.items() for state in sub.signals("State")
         }  # fmt: skip
+        each: list[Any] = [*model.parts.values(), *model.subs.values()]
+        paths = [one.path for one in each]
+        self._paths = {
+            one.path: Node("part", one.name) for one in each if paths.count(one.path) == 1
+        }
         self._par = par.with_leaves({name: Traced(None, f".{name}") for name in par.leaves()})
         self._state = model.State._make(Traced(None, name) for name in model.State._fields)
         self._memory = model.Memory._make(Traced(None, f"m.{k}") for k in model.Memory._fields)
@@ -139,11 +151,14 @@ class _Trace:
                           if k in held and self.fields.get(k, node) != node}
             for node, read, held in ticks
         }  # fmt: skip
+        counts = {part.name: sum(part.group_sizes(par)) for part in model.parts.values()}
+        counts |= {
+            name: contact_count(sub.assembly, sub.parameters(par))
+            for name, sub in model.subs.items()
+        }
         contact: tuple[Any, ...] = tuple(
-            Traced(None, f"contact.{part.name}")
-            for part in model.parts.values() if part.has("Forces")
-            for _ in part.element.Forces._fields
-        )  # fmt: skip
+            Traced(None, f"contact.{name}") for name, count in counts.items() for _ in range(count)
+        )
         w = model.at(self._state, self._memory, self._par, contact, mark=self._mark)
         wires = instant_of(w, "wire").wires
         self.wires = {name: self._marks[id(value)][1] for name, value in wires.items()}
@@ -153,9 +168,30 @@ class _Trace:
             for name, value in inputs.items() if value is not None
         }  # fmt: skip
         self.frictions = model.friction(w)
+        self.ports = {
+            name: {
+                port.name: self._marks[id(instant_of(inner, name).wires[port.name])][1]
+                for port in inner.ports
+            }
+            for name, inner in ((name, getattr(w, name)) for name in model.subs)
+        }
+
+    def memory_of(self, name: str) -> dict[str, Node]:
+        """Return the memory that an assembly within feels, by its own names, with who renews it."""
+        sub, node = self.model.subs[name], Node("part", name)
+        own = dict(zip(sub.signals("Memory"), sub.assembly.Memory._fields, strict=True))
+        raw = tuple(value for at, value in self._marks.values() if at == node)
+        leaves = {str(each).removeprefix("m.") for each in names_in(raw) if str(each)[:2] == "m."}
+        return {own[each]: self.fields[each]
+                for each in own if each in leaves and each in self.fields}  # fmt: skip
 
     def _mark(self, name: str, value: Any) -> Any:
         """Return a value that is known by the wire or input that carries it."""
+        within = name.partition("/")[0]
+        if within != name:
+            node, is_one = Node("part", within), not isinstance(value, tuple)
+            each = [self._marked(node, one) for one in ((value,) if is_one else value)]
+            return each[0] if is_one else value._make(each)
         part = name.removesuffix(".u")
         node = Node("wire", name) if part == name else Node("part", part)
         if node.kind == "wire":
@@ -209,7 +245,7 @@ class _Trace:
     def nodes(self, connections: Iterable[Connection]) -> tuple[Node, ...]:
         """Return all nodes, the stimulus where anything is connected to it."""
         asked = [STIMULUS] if any(c.source == STIMULUS for c in connections) else []
-        parts = (Node("part", name) for name in self.model.parts)
+        parts = (Node("part", name) for name in (*self.model.parts, *self.model.subs))
         return (*asked, *self.ticks, *(Node("wire", name) for name in self.wires), *parts)
 
     def labels(self) -> dict[Node, str]:
@@ -220,4 +256,8 @@ class _Trace:
             Node("part", name): part.kind.replace("_", " ")
             for name, part in self.model.parts.items()
         }  # fmt: skip
+        labels |= {
+            Node("part", name): str(sub.assembly.name).replace("-", " ")
+            for name, sub in self.model.subs.items()
+        }
         return labels | {STIMULUS: "of the bench"} | dict.fromkeys(self.ticks, "task of the ECU")

@@ -96,7 +96,7 @@ class Fault:
     changes
         ``changes(par, value)``: parameters and choices that change, by dotted name.
     assembly
-        Name of the assembly that has it.
+        Name of the assembly that has it, or of several.
     unit
         SI unit of its value; empty where it has none.
     value
@@ -106,9 +106,13 @@ class Fault:
     name: str
     summary: str
     changes: Callable[[Any, float], Mapping[str, Any]]
-    assembly: str
+    assembly: str | tuple[str, ...]
     unit: str = ""
     value: float = 0.0
+
+    def is_of(self, assembly: str) -> bool:
+        """Return whether an assembly of a name has it."""
+        return assembly in ((self.assembly,) if isinstance(self.assembly, str) else self.assembly)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from typing import Annotated, Any, NamedTuple
 from bywire.core.errors import ModelError, unknown_name
 from bywire.core.parts import Part
 from bywire.core.signals import Role, Signal, signals_of
-from bywire.core.wires import Integral, Shown, Wire
+from bywire.core.subassembly import KINDS, Sub
+from bywire.core.wires import Integral, Port, Shown, Wire
 
 AnyPart = Part[Any, Any, Any, Any]
 
@@ -20,6 +21,8 @@ def gather(cls: type[Any]) -> None:
     """Derive State, Flow and Output of an assembly from its declarations."""
     declared = {k: v for base in reversed(cls.__mro__) for k, v in vars(base).items()}
     cls.parts = {k: v for k, v in declared.items() if isinstance(v, Part)}
+    cls.subs = {k: v for k, v in declared.items() if isinstance(v, Sub)}
+    cls.ports = tuple(v for v in declared.values() if isinstance(v, Port))
     states: dict[str, Signal] = {}
     for part in stores(cls):
         if part.has("balance") and not part.has("mass"):
@@ -46,6 +49,7 @@ def gather(cls: type[Any]) -> None:
             flows[name] = value.signal
         elif isinstance(value, (Wire, Shown)):
             shown[name] = value.signal
+    _take_over(cls, states, flows, shown)
     for kind, signals in (("State", states), ("Flow", flows)):
         if _derives(declared.get(kind)):
             setattr(cls, kind, _named_tuple(cls, kind, signals))
@@ -63,6 +67,74 @@ def gather(cls: type[Any]) -> None:
             if name not in known:
                 raise ModelError(f"{cls.__name__}.records: {unknown_name('signal', name, known)}")
         cls.Output = _named_tuple(cls, "Output", {name: known[name] for name in names})
+
+
+def _take_over(
+    cls: type[Any], states: dict[str, Signal], flows: dict[str, Signal], shown: dict[str, Signal]
+) -> None:
+    """Add the signals, frictions and limits of the assemblies within, by their names there."""
+    own = {kind: getattr(cls, kind, None) for kind in ("Memory", "Stimulus")}
+    own = {kind: getattr(each, "own", each) for kind, each in own.items()}
+    own = {kind: each if isinstance(each, type) else _Nothing for kind, each in own.items()}
+    known = {"State": states, "Flow": flows, "Output": shown}
+    known |= {kind: dict(signals_of(each)) for kind, each in own.items()}
+    for sub in cls.subs.values():
+        recorded = {name for kind in _RECORDED for name in known[kind]}
+        there: set[str] = set()
+        for kind in KINDS:
+            taken = recorded if kind in _RECORDED else set(known[kind])
+            new = {name: each for name, each in sub.signals(kind).items() if name not in there}
+            for name in new:
+                if name in taken:
+                    raise ModelError(
+                        f"{sub.where}: there is a signal {name!r} already: give it another prefix"
+                    )
+            known[kind].update(new)
+            there |= set(new) if kind in _RECORDED else set()  # what it records of these, once
+    if cls.subs:
+        for kind, each in own.items():
+            joined = _named_tuple(cls, kind, known[kind])
+            joined.own = each
+            setattr(cls, kind, joined)
+        for sub in cls.subs.values():
+            for name, source in sub.feeds.items():
+                fields = {**known["Memory"], **known["Stimulus"]}
+                if source not in fields:
+                    error = unknown_name("signal", source, fields)
+                    raise ModelError(f"{sub.where}: {name} is fed by an {error}")
+    _number_reactions(cls)
+
+
+_RECORDED = ("State", "Memory", "Flow", "Output")
+_REACTING = ("frictions", "limits")
+
+
+class _Nothing(NamedTuple):
+    """Neither memory nor stimulus."""
+
+
+def _number_reactions(cls: type[Any]) -> None:
+    """Append the frictions and limits of the assemblies within, and say where whose stand."""
+    inner = {
+        name: [tuple(map(sub.named, _names(type(sub.assembly), kind))) for kind in _REACTING]
+        for name, sub in cls.subs.items()
+    }
+    taken = {name for both in inner.values() for names in both for name in names}
+    own = [tuple(each for each in _names(cls, kind) if each not in taken) for kind in _REACTING]
+    every = [sum((both[k] for both in inner.values()), start=own[k]) for k in range(2)]
+    if cls.subs:
+        cls.frictions, cls.limits = every
+    places = {name: k for k, name in enumerate((*every[0], *every[1]))}
+    cls.reaction_places = {
+        name: tuple(places[each] for each in (*frictions, *limits))
+        for name, (frictions, limits) in {"": own, **inner}.items()
+    }
+
+
+def _names(cls: type[Any], kind: str) -> tuple[str, ...]:
+    """Return the names of frictions or limits that a class declares; none by default."""
+    names = getattr(cls, kind)
+    return names if isinstance(names, tuple) else ()
 
 
 def _derives(kind: Any) -> bool:
@@ -88,3 +160,11 @@ def stores(cls: type[Any]) -> Iterator[AnyPart]:
 def contacts(cls: type[Any]) -> Iterator[AnyPart]:
     """Yield the parts of an assembly that have contact forces."""
     yield from (part for part in cls.parts.values() if part.has("Forces"))
+
+
+def contact_count(model: Any, par: Any) -> int:
+    """Return how many contact forces an assembly has, those of assemblies within included."""
+    own = sum(sum(part.group_sizes(par)) for part in contacts(type(model)))
+    return own + sum(
+        contact_count(sub.assembly, sub.parameters(par)) for sub in model.subs.values()
+    )

@@ -11,9 +11,9 @@ from typing import Any, Generic, Protocol, Self, TypedDict, TypeVar, Unpack, ove
 from bywire.core.errors import ModelError, unknown_name
 from bywire.core.signals import Signal, signal_in, signals_of
 from bywire.core.wired import F, Instant, P, U, Wired, X, instant_of
-from bywire.core.wires import Integral, Shown, Wire
+from bywire.core.wires import Integral, Port, Shown, Wire
 
-__all__ = ["OPTIONS", "Integral", "Part", "PartOptions", "Shown", "Wire"]
+__all__ = ["OPTIONS", "Integral", "Part", "PartOptions", "Port", "Shown", "Wire"]
 
 X_co = TypeVar("X_co", covariant=True)
 U_co = TypeVar("U_co", covariant=True)

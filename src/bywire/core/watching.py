@@ -7,15 +7,77 @@ structure, and on a recording only what leads to those elements is computed.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from bywire.core.model import Model
 from bywire.core.traced import Traced, computed, names_in
 from bywire.core.wired import Instant, Wired
 
 _NAN = float("nan")
 _PARAMETER = "."  # before the name of one, among names of signals
+
+class Watching(Model):
+    """What an assembly says of recordings: its elements, and the assemblies within."""
+
+    parts: ClassVar[dict[str, Any]]
+    subs: ClassVar[dict[str, Any]]
+
+    def watch(self, recording: Any, par: Any) -> list[str]:
+        """Return what the elements say of a recording, each of what it felt in every row.
+
+        Of signals that are not recorded nothing is known, and nothing said.
+        """
+        within = (
+            f"{sub.label}: {text}"
+            for sub in self.subs.values()
+            for text in sub.assembly.watch(sub.seen(recording), sub.parameters(par))
+        )
+        return [*warnings_of(self, recording, par), *within]
+
+    def watched(self, par: Any) -> tuple[str, ...] | None:
+        """Return the signals that ``watch`` looks at; None where it is written by hand."""
+        if type(self).watch is not Watching.watch:
+            return None
+        names = [*watched_by_elements(self, par)]
+        for sub in self.subs.values():
+            inner = sub.assembly.watched(sub.parameters(par))
+            if inner is None:
+                return None
+            names += map(sub.named, inner)
+        return tuple(names)
+
+    def silent(self, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
+        """Return the parts whose elements say nothing of any of several cases, by name.
+
+        ``rows``: signals of shape (cases, rows); ``pars``: parameters of each case.
+        """
+        within = (
+            f"{name}.{part}"
+            for name, sub in self.subs.items()
+            for part in sub.assembly.silent(sub.seen(rows), [sub.parameters(p) for p in pars])
+        )
+        return silent_parts(self, rows, pars) | frozenset(within)
+
+    def may_warn(self, rows: Any, pars: Sequence[Any]) -> Sequence[int]:
+        """Return the cases of which ``watch`` may say something: none where all parts are silent.
+
+        All where ``watch`` is written by hand, unless this is too.
+        """
+        if type(self).watch is not Watching.watch or not self.are_silent(rows):
+            return range(len(pars))
+        within = [
+            sub.assembly.may_warn(sub.seen(rows), [sub.parameters(p) for p in pars])
+            for sub in self.subs.values()
+        ]
+        return tuple(sorted({case for cases in within for case in cases}))
+
+    def are_silent(self, rows: Any) -> bool:
+        """Return whether no part has anything to say of cases of which ``rows.silent`` is known."""
+        watching = (part.name for part in self.parts.values() if part.has("watch"))
+        return all(name in rows.silent for name in watching)
+
 
 Felt = tuple[tuple[Any, dict[str, Any]], ...]
 _KNOWN: dict[Any, Felt] = {}
@@ -100,7 +162,8 @@ def _felt(model: Any, par: Any) -> Felt:
         kind._make(Traced(None, name) for name in kind._fields)
         for kind in (model.State, model.Memory)
     )
-    w = model.at(state, memory, par.with_leaves(leaves))
+    ports = {port.name: Traced(None, port.name) for port in model.ports}
+    w = model.at(state, memory, par.with_leaves(leaves), ports=ports)
     felt = tuple((part, getattr(w, part.name).felt(part.element.watch)) for part in parts)
     if key is not None:
         _KNOWN[key] = felt

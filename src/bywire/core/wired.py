@@ -78,6 +78,8 @@ class Wired(Generic[X, U, F, P]):
     def u(self) -> U:
         """Input, as it was wired."""
         if self._input is None:
+            self._instant.settle()
+        if self._input is None:
             raise ModelError(
                 f"{self._part.where}: its input is read before it is wired: assign "
                 f"w.{self._part.name}.u = {self._part.kind}.Input(...) in wire, above that"
@@ -137,12 +139,22 @@ class Instant:
     shared
         Groups of parameters that elements take by name.
     contact
-        Contact forces by part.
+        Contact forces by part, and by assembly within it.
     lines
         File and line in which every wire and input was set, where that is wanted.
     mark
         ``mark(name, value)``: what takes the place of every wire and input as it is set, where
         connections are followed.
+    held
+        Assemblies within it, at the same instant.
+    forces
+        Contact forces in the order of the protocol; None where they are not known.
+    wiring
+        Wires it, once, as soon as something of it is read; None where that is done.
+    is_held
+        Whether another assembly holds it, and sets its ports.
+    ports
+        What ports carry that nobody sets; 0 by default.
     """
 
     x: Any
@@ -150,7 +162,7 @@ class Instant:
     memory: Any
     par: Any
     shared: tuple[str, ...]
-    contact: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    contact: Mapping[str, Any] = field(default_factory=dict)
     reaction: tuple[float, ...] = ()
     rate: Any = None
     flow: Any = None
@@ -158,6 +170,17 @@ class Instant:
     parts: dict[str, Wired[Any, Any, Any, Any]] = field(default_factory=dict)
     lines: dict[str, str] | None = None
     mark: Callable[[str, Any], Any] | None = None
+    held: dict[str, Any] = field(default_factory=dict)
+    forces: tuple[float, ...] | None = None
+    wiring: Callable[[], None] | None = None
+    is_held: bool = False
+    ports: Mapping[str, Any] = field(default_factory=dict)
+
+    def settle(self) -> None:
+        """Wire the assembly unless that is done, or under way."""
+        wiring, self.wiring = self.wiring, None
+        if wiring is not None:
+            wiring()
 
     def marked(self, name: str, value: Any) -> Any:
         """Return a wire or an input as it is kept."""

@@ -6,7 +6,7 @@ from typing import Any, Self, overload
 
 from bywire.core.errors import ModelError
 from bywire.core.signals import Role, Signal
-from bywire.core.wired import instant_of, line
+from bywire.core.wired import Instant, instant_of, line
 
 
 class _Named:
@@ -35,13 +35,19 @@ class Wire(_Named):
         """Return the wire, or of an assembly at an instant its value."""
         if instance is None:
             return self
-        wires = instant_of(instance, self.where).wires
+        instant = instant_of(instance, self.where)
+        wires = instant.wires
         if self.name not in wires:
-            raise ModelError(
-                f"{self.where} is read before it is set: assign w.{self.name} = ... in wire, "
-                "above that"
-            )
+            instant.settle()
+        if self.name not in wires:
+            self.unset(instant)
         return wires[self.name]
+
+    def unset(self, instant: Instant) -> None:
+        """Refuse to be read before it is set."""
+        raise ModelError(
+            f"{self.where} is read before it is set: assign w.{self.name} = ... in wire, above that"
+        )
 
     def __set__(self, instance: Any, value: float) -> None:
         instant = instant_of(instance, self.where)
@@ -49,6 +55,22 @@ class Wire(_Named):
             raise ModelError(f"{self.where}: {line()} sets it a second time: set a wire once")
         instant.wires[self.name] = instant.marked(self.name, value)
         instant.note(self.name)
+
+
+class Port(Wire):
+    """A wire by which an assembly feels what holds it; where nothing does, 0 or what ``wire`` sets.
+
+    The holder sets it, ``w.brake.PORT = ...``, above what it reads of that assembly's wires.
+    """
+
+    def unset(self, instant: Instant) -> None:
+        """Take what an assembly feels that nothing holds; refuse where something does."""
+        if instant.is_held:
+            raise ModelError(
+                f"{self.where} is read before the holder sets it: assign w.NAME.{self.name} = ... "
+                "in its wire, above what reads wires or inputs of w.NAME"
+            )
+        instant.wires[self.name] = instant.marked(self.name, instant.ports.get(self.name, 0.0))
 
 
 class Integral(_Named):

@@ -10,6 +10,7 @@ from typing import Any
 from bywire.core.assembly import Assembly
 from bywire.core.dimensions import Dimension, fits
 from bywire.core.errors import ModelError, UnitError
+from bywire.core.instants import Evaluated
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
 from bywire.core.wired import Instant, instant_of
@@ -29,6 +30,7 @@ def check_wiring(model: AnyAssembly, par: ParameterSet) -> None:
     at = _Operands(model, par)
     w = at.wired("wire")
     _check_inputs(model, at, w)
+    _check_held(model, par)
     _check_balance(model, at, w)
     _check_contacts(model, at)
     bounds = at.evaluated("friction", model.friction, w)
@@ -58,12 +60,7 @@ class _Operands:
             leaf = fields.get(name) or fields[name.rpartition(".")[0]]  # a node of a table
             numbers[name] = self.dimension(leaf.unit.symbol, f"parameter {name}")
         self.par = par.with_leaves(numbers)
-        self.contact = tuple(
-            each
-            for part in model.parts.values()
-            if any(part.group_sizes(par))
-            for each in self.tuple(part.element.Forces)
-        )
+        self.contact = tuple(self.forces(model, par))
         mass = self.evaluated("mass", model.mass, self.state, self.par)
         rates = dict(zip(model.State._fields, mass, strict=True))
         self.balance = {name: rate * getattr(self.rate, name) for name, rate in rates.items()}
@@ -76,6 +73,14 @@ class _Operands:
             self.dimension(s.unit, f"{kind.__name__}.{name}")
             for name, s in signals_of(kind).items()
         )
+
+    def forces(self, model: Any, par: Any) -> Iterator[Any]:
+        """Yield the dimensions of an assembly's contact forces, of those within included."""
+        for part in model.parts.values():
+            if any(part.group_sizes(par)):
+                yield from self.tuple(part.element.Forces)
+        for sub in model.subs.values():
+            yield from self.forces(sub.assembly, sub.parameters(par))
 
     def dimension(self, unit: str, what: str) -> Dimension:
         """Return the dimension of a unit; the error names what it belongs to."""
@@ -135,6 +140,27 @@ def _check_inputs(model: AnyAssembly, at: _Operands, w: AnyAssembly) -> None:
         ):
             _require(model, "wire", f"{part.name}.u.{field}", each, signal.unit, signal.label,
                      instant)  # fmt: skip
+    for name, sub in model.subs.items():
+        _check_inputs(sub.assembly, at, getattr(w, name))
+
+
+def _check_held(model: AnyAssembly, par: ParameterSet) -> None:
+    """Check that the assemblies within get what feeds them, and that their tasks run."""
+    known = signals_of(model.Stimulus) | signals_of(model.Memory)
+    running = {task.name for task in model.tasks(par)}
+    for sub in model.subs.values():
+        for name, source in sub.feeds.items():
+            wanted, given = signals_of(sub.assembly.Stimulus)[name].unit, known[source].unit
+            if not fits(Dimension.of(given), wanted):
+                raise ModelError(
+                    f"{sub.where}: its {name} is in {wanted}, but is fed by {source} in {given}"
+                )
+        missing = [task.name for task in sub.tasks(par) if task.name not in running]
+        if missing:
+            raise ModelError(
+                f"{_place(model, 'tasks')}: the task {missing[0]} of {sub.name} never runs: add "
+                "*super().tasks(par) to what tasks returns"
+            )
 
 
 def _check_balance(model: AnyAssembly, at: _Operands, w: AnyAssembly) -> None:
@@ -202,7 +228,7 @@ def _place(model: AnyAssembly, method: str = "wire") -> str:
     """Return class, file and line of a method."""
     cls = type(model)
     function = getattr(cls, method)
-    if function.__module__ == Assembly.__module__:
+    if function.__module__ in (Assembly.__module__, Evaluated.__module__):
         function = cls
     try:
         line = inspect.getsourcelines(function)[1]

@@ -9,7 +9,7 @@ from pydantic import Field
 from bywire.core import ops
 from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Area, Factor, Length, Unit
+from bywire.core.quantities import Area, Factor, Length, Torque, Unit
 from bywire.core.signals import Pressure, Signal
 
 Count = Annotated[float, Unit("1", 2.0), Field(ge=1, allow_inf_nan=False)]
@@ -26,10 +26,14 @@ class Parameters(ParameterSet):
     """area of the pistons on one side of a disc"""
     r_eff: Length
     """radius at which the pads' friction acts"""
+    T_drag: Torque
+    """what pads that do not come off hold without pressure; 0 where they do"""
 
 
 FAULTS = (
     ParameterFault("glazed", "less friction of the pads", ("mu_pad",), 0.7),
+    ParameterFault("dragging", "a piston sticks in its caliper: pads drag, by the torque",
+                   replaced="T_drag", value=10.0),
 )
 
 
@@ -53,5 +57,5 @@ def torque_per_pressure(
 
 
 def output(u: Input, par: Parameters) -> Output:
-    """Return the torque; none without pressure."""
-    return Output(torque=torque_per_pressure(par) * ops.fmax(u.p, 0.0))
+    """Return the torque; without pressure none but what drags."""
+    return Output(torque=ops.fmax(torque_per_pressure(par) * u.p, par.T_drag))

@@ -28,7 +28,7 @@ def test_elements_that_look_at_what_varies_are_silent_together(monkeypatch):
     given = []
     silent_parts = watching.silent_parts
     monkeypatch.setattr(
-        "bywire.core.assembly.silent_parts",
+        "bywire.core.watching.silent_parts",
         lambda *of: given.append(silent_parts(*of)) or given[-1],
     )
     key_figures_of([changed(bench, {"motor.R_m": R, "fluid.nu": 1e-5 * R}) for R in (1.0, 1.1)])

@@ -22,7 +22,7 @@ from systems.loading import loaded
 EXAMPLES = Path(__file__).parents[3] / "examples"
 MODELS = {
     "motorcycle-brake": None, "two-wheeler-by-wire": None, "wedge-brake": None,
-    "wedge-corner": None, "wheel-on-drum": None,
+    "wedge-corner": None, "wheel-on-drum": None, "two-wheeler-whole-rear": None,
     "hydraulic-brake": EXAMPLES / "hydraulic_brake.py", "emb-caliper": EXAMPLES / "emb_caliper",
 }  # fmt: skip
 
@@ -43,7 +43,7 @@ def test_every_part_and_wire_is_in_it(known: tuple[type, Network, Schematic]) ->
     texts = {html.unescape(text) for text in re.findall(r"<text[^>]*>([^<]*)</text>", svg)}
     declared = {k: v for base in model.__mro__ for k, v in vars(base).items()}
     wires = {name for name, value in declared.items() if isinstance(value, Wire)}
-    assert wires | set(model.parts) <= texts  # type: ignore[attr-defined]
+    assert wires | set(model.parts) | set(model.subs) <= texts  # type: ignore[attr-defined]
     for name, part in model.parts.items():  # type: ignore[attr-defined]
         if part.has("Input"):
             assert set(part.element.Input._fields) <= set(found.ports[Node("part", name)])

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from bywire.bench.faults.declared import channels_of, failures_of
 from bywire.bench.stimuli.quantities import TOLERANCE
 from bywire.core.errors import ModelError
-from bywire.core.faults import CHANNELS, FAULTS, Channel, ParameterFault
-from bywire.core.model import ASSEMBLIES, Model
+from bywire.core.faults import Channel, ParameterFault
+from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
@@ -121,17 +122,15 @@ def _every(model: Model, par: ParameterSet) -> Iterator[Mode]:
         for fault in getattr(element, "FAULTS", ()):
             yield _of_element(place, fault, par)
     tasks = model.tasks(par)
-    declared = _declared(model)
+    declared = tuple(channels_of(model))
     for channel in (*declared, *_demands(model, {channel.signal for channel in declared})):
         yield from _of_channel(channel, [task.name for task in tasks])
     for task in tasks:
         for name, (summary, kind, value) in _TASK.items():
             yield Mode(f"{task.name}.{name}", f"task {task.name} {summary}", _unit(kind, ""),
                        value, falsified=name, task=task.name)  # fmt: skip
-    brake = ASSEMBLIES.owner(model.name)
-    for each in FAULTS.of(brake).values():
-        if each.assembly == model.name:
-            yield Mode(each.name, each.summary, each.unit, each.value, each.changes)
+    for each in failures_of(model):
+        yield Mode(each.name, each.summary, each.unit, each.value, each.changes)
 
 
 def _groups(par: ParameterSet, prefix: str = "") -> Iterator[tuple[str, ParameterSet]]:
@@ -154,21 +153,6 @@ def _of_element(place: str, fault: ParameterFault, par: ParameterSet) -> Mode:
     elif not fault.scaled:
         unit = ""
     return Mode(f"{place}.{fault.name}", fault.summary, unit, fault.value, changes)
-
-
-def _declared(model: Model) -> tuple[Channel, ...]:
-    """Return the channels that the model's brake declares."""
-    known = CHANNELS.of(ASSEMBLIES.owner(model.name)).get(model.name)
-    channels = () if known is None else known.channels
-    for channel in channels:
-        sources = {"reading": model.State, "drive": model.Memory, "demand": model.Stimulus}
-        source = sources[channel.side]
-        if channel.signal not in source._fields:
-            raise ModelError(
-                f"{model.name}: the channel {channel.name!r} names no signal: {channel.signal!r} "
-                f"is none of {', '.join(source._fields)}"
-            )
-    return channels
 
 
 def _demands(model: Model, declared: Collection[str]) -> Iterator[Channel]:

@@ -56,3 +56,4 @@ def _body(par: VehicleParameters) -> str:
 
 
 STOP = SceneKind("two-wheeler-by-wire", "x", _stop)
+WHOLE_REAR_STOP = SceneKind("two-wheeler-whole-rear", "x", _stop)

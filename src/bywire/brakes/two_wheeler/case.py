@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
@@ -15,6 +16,7 @@ from bywire.bench.kpis.cases import FamilyJudge
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire, at_speed
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
 from bywire.core.typing import Array
 from bywire.plant import adhesion, road
@@ -25,17 +27,19 @@ from bywire.vehicle.two_wheeler import VehicleParameters
 
 RidingSpeed = ideal_stop.RidingSpeed
 Course = Callable[[Array], Array]
+Vehicle = tuple[type[Any], Callable[..., tuple[Any, Any]]]
 Demand = Annotated[float, Unit("Pa", 4e6), Field(ge=0, allow_inf_nan=False)]
 
 
 def rolling_case(
-    par: TwoWheelerParameters,
+    par: ParameterSet,
     v_0: float,
     demands: Mapping[str, float | Course],
     duration: float,
     changes: Mapping[str, Any] | None = None,
     label: str = "run",
     heat: Mapping[str, Any] | None = None,
+    vehicle: Vehicle = (TwoWheelerByWire, at_speed),
 ) -> Case:
     """Return a run that begins rolling at a speed [m/s]; the rider demands from time zero on.
 
@@ -47,9 +51,12 @@ def rolling_case(
         Parameters that the experiment sets.
     heat
         Temperatures of the brakes at the start, by their parts; cold by default.
+    vehicle
+        Its model, and ``at_speed(v, par, heat)`` of it.
     """
+    model, rolling = vehicle
     changed = par.replace(dict(changes or {}))
-    state, memory = at_speed(v_0, changed, heat)
+    state, memory = rolling(v_0, changed, heat)
 
     def stimulus(t: Array) -> dict[str, Array]:
         return {
@@ -58,8 +65,8 @@ def rolling_case(
         }
 
     return Case(
-        label, TwoWheelerByWire(), changed, state, memory, stimulus, duration,
-        start=lambda par: at_speed(v_0, par, heat),
+        label, model(), changed, state, memory, stimulus, duration,
+        start=lambda par: rolling(v_0, par, heat),
     )  # fmt: skip
 
 
@@ -77,8 +84,12 @@ def parameters_of(run: xr.Dataset) -> TwoWheelerParameters:
 
 
 def vehicle_of(run: xr.Dataset) -> VehicleParameters:
-    """Return the parameters of the vehicle with which a recording was made."""
-    return parameters_of(run).vehicle
+    """Return the parameters of the vehicle with which a recording was made, whatever its brakes."""
+    known = getattr(run, "par", None)
+    if known is not None:
+        of_it: VehicleParameters = known.vehicle
+        return of_it
+    return VehicleParameters.model_validate(json.loads(run.attrs["parameters"])["vehicle"])
 
 
 def _levels(run: xr.Dataset, options: Any) -> dict[str, dict[str, float]]:
@@ -93,11 +104,11 @@ JUDGE = FamilyJudge(lambda _: {"vehicle_stop": vehicle_stop.Setting()}, levels=_
 """the judge of a stop from the speed ``options.v_0``"""
 
 
-def locked_stop(v_0: float, par: TwoWheelerParameters) -> float:
+def locked_stop(v_0: float, par: VehicleParameters) -> float:
     """Return a time [s] in which locked wheels stop a vehicle, a single one on most roads."""
-    road_ahead, body = par.vehicle.road, par.vehicle.body
+    road_ahead, body = par.road, par.body
     slope = road.slope(0.0, road_ahead)
-    locked = adhesion.adhesion(1.0, road.surface(0.0, road_ahead), par.vehicle.front_tyre)
+    locked = adhesion.adhesion(1.0, road.surface(0.0, road_ahead), par.front_tyre)
     held = locked * slope.cosine + slope.sine
     if not held > 0.0:
         raise ParameterError(

@@ -1,23 +1,30 @@
-"""What may fail on the two-wheeler beside what its elements say."""
+"""What may fail on the two-wheeler beside what its elements say.
+
+Of a whole brake at the rear, what is declared of that brake may fail too, under its path.
+"""
 
 from __future__ import annotations
 
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire
+from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear
 from bywire.core.faults import Channel, Channels, Fault
 
 NAME = TwoWheelerByWire.name
+WHOLE_REAR = TwoWheelerWholeRear.name
 
-CHANNELS = Channels(
-    NAME,
-    (
-        Channel("encoder_f", "front wheel's encoder", "rad", "theta_f", offset=0.1),
-        Channel("encoder_r", "rear wheel's encoder", "rad", "theta_r", offset=0.1),
-        Channel("front", "front brake", "Pa", "p_f_ref", "drive", task="ecu"),
-        Channel("rear", "rear brake", "Pa", "p_r_ref", "drive", task="ecu"),
+_VEHICLE = (
+    Channel("encoder_f", "front wheel's encoder", "rad", "theta_f", offset=0.1),
+    Channel("encoder_r", "rear wheel's encoder", "rad", "theta_r", offset=0.1),
+    Channel("front", "front brake", "Pa", "p_f_ref", "drive", task="ecu"),
+)
+CHANNELS = (
+    Channels(
+        NAME, (*_VEHICLE, Channel("rear", "rear brake", "Pa", "p_r_ref", "drive", task="ecu"))
     ),
+    Channels(WHOLE_REAR, _VEHICLE),
 )
 
 FAULTS = (
     Fault("accelerometer.offset", "the accelerometer shows too much deceleration",
-          lambda par, value: {"sensors.a_offset": value}, NAME, "m/s**2", 1.0),
+          lambda par, value: {"sensors.a_offset": value}, (NAME, WHOLE_REAR), "m/s**2", 1.0),
 )  # fmt: skip

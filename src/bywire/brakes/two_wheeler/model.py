@@ -12,7 +12,7 @@ from bywire.core.parts import Part
 from bywire.core.signals import zeros
 from bywire.plant import brake_disc, pressure_loop, road, road_wheel, wheel_encoder
 from bywire.vehicle.hot_brakes import HotBrakes, cold_start
-from bywire.vehicle.two_wheeler import rolling_start
+from bywire.vehicle.two_wheeler import VehicleParameters, rolling_start
 
 Par = TwoWheelerParameters
 
@@ -56,7 +56,7 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
         """Return the ECU's task."""
-        return (Task("ecu", par.ecu.T_s, _tick),)
+        return (Task("ecu", par.ecu.T_s, tick),)
 
     def rest(self, par: Par) -> tuple[Any, ecu.Memory]:
         """Return the vehicle standing on its wheels, brakes open."""
@@ -70,17 +70,22 @@ def at_speed(
 
     ``heat``: temperatures of the brakes by their parts, see `cold_start`, which is the default.
     """
-    front, rear = v / par.vehicle.front_wheel.r, v / par.vehicle.rear_wheel.r
-    T = par.ecu.T_s
-    memory = zeros(ecu.Memory)._replace(
-        v_hat=v, v_last=v, tread_f=v, tread_r=v, omega_f_hat=front, omega_r_hat=rear,
-        edge_f=-front * T, edge_r=-rear * T,
-    )  # fmt: skip
     brakes = cold_start(par.front.heat, par.rear.heat) if heat is None else heat
-    return TwoWheelerByWire.state(**rolling_start(v, par.vehicle), **brakes), memory
+    state = TwoWheelerByWire.state(**rolling_start(v, par.vehicle), **brakes)
+    return state, awake(v, par.vehicle, par.ecu.T_s)
 
 
-def _tick(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
+def awake(v: float, vehicle: VehicleParameters, T_s: float) -> ecu.Memory:
+    """Return what the ECU, of a sample time [s], holds while the vehicle rolls [m/s]."""
+    front, rear = v / vehicle.front_wheel.r, v / vehicle.rear_wheel.r
+    return zeros(ecu.Memory)._replace(
+        v_hat=v, v_last=v, tread_f=v, tread_r=v, omega_f_hat=front, omega_r_hat=rear,
+        edge_f=-front * T_s, edge_r=-rear * T_s,
+    )  # fmt: skip
+
+
+def tick(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
+    """Run the ECU once, of what its sensors show."""
     front, rear = par.vehicle.front_wheel, par.vehicle.rear_wheel
     edges = [
         wheel_encoder.reading(

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire
+from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear
 from bywire.campaigns.lasting import mean_of_the_last
 from bywire.campaigns.residual import NEVER, Residual
 from bywire.core.typing import Array
 
-NAME = TwoWheelerByWire.name
+VEHICLES = (TwoWheelerByWire.name, TwoWheelerWholeRear.name)
 Signals = Mapping[str, Array]
 _SPAN = 0.1  # s, over which both speeds are compared
 
@@ -44,10 +45,10 @@ def _speed(signals: Signals, par: Any, dt: float) -> Array:
 
 
 RESIDUALS = (
-    Residual("slip-front", "slip of the front wheel, which control keeps small", NAME, "1",
+    Residual("slip-front", "slip of the front wheel, which control keeps small", VEHICLES, "1",
              ("slip_f_hat", "v_hat"), _slip("f"), hold=50e-3),
-    Residual("slip-rear", "slip of the rear wheel, which control keeps small", NAME, "1",
+    Residual("slip-rear", "slip of the rear wheel, which control keeps small", VEHICLES, "1",
              ("slip_r_hat", "v_hat"), _slip("r"), hold=50e-3),
-    Residual("speed", "speed of the wheels and what the accelerometer shows", NAME, "m/s",
+    Residual("speed", "speed of the wheels and what the accelerometer shows", VEHICLES, "m/s",
              ("v_hat", "a_hat"), _speed, hold=5e-3),
 )  # fmt: skip

@@ -4,7 +4,7 @@ from bywire.report.live_page.sliders import Sliders
 
 SLIDERS = Sliders(
     "two-wheeler",
-    ("two-wheeler-by-wire",),
+    ("two-wheeler-by-wire", "two-wheeler-whole-rear"),
     (
         "vehicle.road.grip",
         "vehicle.body.m",

@@ -126,8 +126,16 @@ def program(model: Model, par: ParameterSet, precision: str = "double", name: st
     Raises
     ------
     ModelError
-        With file, line and operation of what cannot be translated.
+        With file, line and operation of what cannot be translated; for a model that holds another
+        one with an ECU of its own.
     """
+    for sub in getattr(model, "subs", {}).values():
+        if any(sub.tasks(par)):
+            raise ModelError(
+                f"{model.name} holds a {sub.assembly.name} ({sub.label}) with an ECU of its own: "
+                "two ECUs are no single one in C; export that of each from an experiment in which "
+                f"it stands alone, as those of {sub.assembly.name}"
+            )
     short = c_name(name or model.name).lower()
     used: frozenset[Use] | None = None
     copied: set[Site] = set()

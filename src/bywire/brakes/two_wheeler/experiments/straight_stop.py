@@ -39,7 +39,7 @@ def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tupl
     """Return the one run."""
     demands = {"p_f_set": options.p_front, "p_r_set": options.p_rear}
     changes = on_surface(options.surface)
-    duration = options.duration or locked_stop(options.v_0, par.replace(changes))
+    duration = options.duration or locked_stop(options.v_0, par.replace(changes).vehicle)
     return (rolling_case(par, options.v_0, demands, duration, changes),)
 
 

@@ -1,0 +1,100 @@
+"""Drag of the rear brake after it was let go, while the vehicle rolls on: a caliper that sticks."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.two_wheeler.case import Demand, RidingSpeed, on_surface, rolling_case
+from bywire.brakes.two_wheeler.rigs.whole_rear import (
+    TwoWheelerWholeRear,
+    WholeRearParameters,
+    at_speed,
+)
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration
+from bywire.core.typing import Array
+from bywire.plant.road import SurfaceName
+
+_LEFT = 0.1  # of the torque, below which the brake counts as released
+_END = 0.1  # s at the end over which what is left is averaged
+
+FIGURES = Figures(
+    drag=("N*m", f"Mean torque that the rear brake holds in the last {_END:g} s."),
+    residual_pressure=("Pa", "Mean pressure at its pads then."),
+    release_time=(
+        "s", f"Time from letting go until the torque stays below {_LEFT:g} of what it was."
+    ),
+)  # fmt: skip
+_SIGNALS = ("T_r", "p_r")
+
+
+class Options(ParameterSet):
+    """The ride."""
+
+    v_0: RidingSpeed
+    """speed at the start"""
+    p_rear: Demand
+    """rear pressure at the start, which the rider demands until he lets go"""
+    hold: Duration
+    """when he lets go"""
+    surface: SurfaceName
+    """what the road is made of"""
+    duration: Duration
+    """time recorded"""
+
+
+def cases(par: WholeRearParameters, options: Options, _: object = None) -> tuple[Case, ...]:
+    """Return the one run, which begins with the rear brake pressed."""
+
+    def demand(t: Array) -> Array:
+        return np.where(t < options.hold, options.p_rear, 0.0)
+
+    changes = {**on_surface(options.surface), "rear.actuator.drive.mode": "pressure"}
+    return (
+        rolling_case(
+            par, options.v_0, {"p_r_set": demand}, options.duration, changes,
+            vehicle=(TwoWheelerWholeRear, lambda v, now, heat: at_speed(
+                v, now, heat, options.p_rear
+            )),
+        ),
+    )  # fmt: skip
+
+
+def left(run: xr.Dataset, options: Options) -> dict[str, float | tuple[float, str]]:
+    """Return what the brake still holds after it was let go."""
+    t, torque, p = (run[name].values for name in ("time", *_SIGNALS))
+    end = t >= t[-1] - _END
+    figures: dict[str, float | tuple[float, str]] = {
+        "drag": float(torque[end].mean()), "residual_pressure": float(p[end].mean()),
+    }  # fmt: skip
+    go = int(np.searchsorted(t, options.hold))
+    above = np.flatnonzero(torque > _LEFT * torque[min(go, t.size - 1)])
+    if not go or go >= t.size or not torque[go] > 0.0:
+        figures["release_time"] = (np.nan, "the brake was not pressed, or never let go")
+    elif above[-1] + 1 == t.size:
+        figures["release_time"] = (np.nan, "the brake is not released within the recorded time")
+    else:
+        figures["release_time"] = float(t[above[-1] + 1] - options.hold)
+    return figures
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return the key figures."""
+    (run,) = recordings.values()
+    return FIGURES(**left(run, options))
+
+
+EXPERIMENT = Experiment(
+    name="rear-drag",
+    assembly="two-wheeler-whole-rear",
+    summary="the rider lets the whole rear brake go at 20 m/s: what drags on",
+    options=Options,
+    defaults=Options(v_0=20.0, p_rear=20e5, hold=0.5, surface="dry-asphalt", duration=2.0),
+    cases=cases,
+    judge=judge,
+    kpis=FIGURES.units,
+    figures=("time-traces", "energy-balance"),
+)

@@ -1,0 +1,116 @@
+"""The two-wheeler with a whole brake by wire at its rear wheel: that of Dardanelli et al. (2010).
+
+The front brake is known by the loop of its pressure alone. At the rear there is all of the other
+one: battery, motor, screw, cylinder, line, caliper, and an ECU with dither that follows what slip
+control leaves of the rider's demand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import memory_at, resting_at
+from bywire.brakes.two_wheeler import ecu
+from bywire.brakes.two_wheeler.model import TwoWheelerByWire, awake, tick
+from bywire.brakes.two_wheeler.parameters import (
+    EcuParameters,
+    HotBrakeParameters,
+    SensorParameters,
+)
+from bywire.core.model import Task
+from bywire.core.parameters import ParameterSet
+from bywire.core.parts import Part, Wire
+from bywire.core.subassembly import Sub
+from bywire.plant import brake_disc, disc_heat, pressure_loop, wheel_encoder
+from bywire.vehicle.hot_brakes import HotBrakes, cold_start
+from bywire.vehicle.two_wheeler import VehicleParameters, rolling_start
+
+
+class RearParameters(ParameterSet):
+    """The rear brake: all of its actuator, the disc, and its heat."""
+
+    actuator: MotorcycleParameters
+    disc: brake_disc.Parameters
+    heat: disc_heat.Parameters
+
+
+class WholeRearParameters(ParameterSet):
+    """The whole vehicle."""
+
+    vehicle: VehicleParameters
+    front: HotBrakeParameters
+    rear: RearParameters
+    sensors: SensorParameters
+    ecu: EcuParameters
+
+
+Par = WholeRearParameters
+
+
+class TwoWheelerWholeRear(HotBrakes[WholeRearParameters, Any]):
+    """The vehicle's ECU lowers what the rear brake's own ECU is asked for.
+
+    The pads press as hard as the caliper pushes them: a caliper that sticks drags.
+    """
+
+    name: ClassVar[str] = "two-wheeler-whole-rear"
+    Memory: ClassVar = ecu.Memory
+    Stimulus: ClassVar = ecu.Stimulus
+
+    front_circuit = Part(pressure_loop, par="front.circuit", suffix="_f")
+    front_encoder = Part(wheel_encoder, par="sensors.encoder", suffix="_f")
+    rear_encoder = Part(wheel_encoder, par="sensors.encoder", suffix="_r")
+    front_disc = Part(brake_disc, par="front.disc")
+    rear_disc = Part(brake_disc, par="rear.disc")
+    actuator = Sub(
+        MotorcycleBrake, prefix="rear_", par="rear.actuator", label="rear brake",
+        feeds={"p_set": "p_r_ref"},
+    )  # fmt: skip
+    p_r = Wire("Pa", "pressure at the rear pads", 2e6)
+
+    records: ClassVar[tuple[str, ...]] = (*TwoWheelerByWire.records, *actuator.records)
+
+    def cold_torques(self, w: Self) -> tuple[float, float]:
+        """Return what cold discs hold at the pressures that press the pads."""
+        w.p_r = w.actuator.pads.x.p
+        w.front_circuit.u = pressure_loop.Input(w.m.p_f_ref)
+        w.front_encoder.u = wheel_encoder.Input(w.front.x.omega)
+        w.rear_encoder.u = wheel_encoder.Input(w.rear.x.omega)
+        w.front_disc.u = brake_disc.Input(w.front_circuit.x.p)
+        w.rear_disc.u = brake_disc.Input(w.p_r)
+        return (
+            brake_disc.output(w.front_disc.u, w.front_disc.par).torque,
+            brake_disc.output(w.rear_disc.u, w.rear_disc.par).torque,
+        )
+
+    def tasks(self, par: Par) -> tuple[Task, ...]:
+        """Return the vehicle's task, then that of the brake, which follows it at once."""
+        return (Task("ecu", par.ecu.T_s, tick), *super().tasks(par))
+
+    def rest(self, par: Par) -> tuple[Any, Any]:
+        """Return the vehicle standing on its wheels, brakes open."""
+        return at_speed(0.0, par)
+
+
+def at_speed(
+    v: float, par: Par, heat: Mapping[str, Any] | None = None, p_rear: float = 0.0
+) -> tuple[Any, Any]:
+    """Return the vehicle rolling at a speed [m/s], its front brake open, its ECUs awake.
+
+    Parameters
+    ----------
+    heat
+        Temperatures of the brakes by their parts, see `cold_start`, which is the default.
+    p_rear
+        Pressure [Pa] that the rear brake's own ECU holds, and the vehicle's demands.
+    """
+    warm = cold_start(par.front.heat, par.rear.heat) if heat is None else heat
+    vehicle, brake = rolling_start(v, par.vehicle), par.rear.actuator
+    own = awake(v, par.vehicle, par.ecu.T_s)._replace(p_r_ref=p_rear, p_r_most=p_rear)
+    return (
+        TwoWheelerWholeRear.state(**vehicle, **warm, actuator=resting_at(p_rear, brake)),
+        TwoWheelerWholeRear.memory(own, actuator=memory_at(p_rear, brake)),
+    )
