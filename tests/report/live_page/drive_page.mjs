@@ -36,4 +36,4 @@ const answers = JSON.parse(readFileSync(task)).map(({ kind, ...given }) => {
     return { error: error.message };
   }
 });
-writeFileSync(`${task}.out`, JSON.stringify(answers, (_, x) => (Number.isNaN(x) ? "NaN" : x)));
+writeFileSync(`${task}.out`, JSON.stringify(answers, (_, x) => (typeof x === "number" && !Number.isFinite(x) ? String(x) : x)));

@@ -42,7 +42,7 @@ function bodeView(place, loop) {
   const text = element("p", { role: "status" });
   const figure = element("figure", { "aria-label": `Bode diagram of the loop ${loop.name}` });
   place.append(element("h3", {}, `Loop ${loop.name}`),
-    element("p", { class: "summary" }, `${loop.summary}; as it is sampled, cut at ${loop.cutName}, ` +
+    element("p", { class: "summary" }, `${loop.summary}; ${loop.isAnalog ? "" : "as it is sampled, "}cut at ${loop.cutName}, ` +
       `${loop.point}, dry friction left out`), text, figure);
   let plots = [], shape = "", now = null;
   const parts = [
