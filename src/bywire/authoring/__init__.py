@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from bywire.bench.kpis.kpi import Figures, Kpi, Undefined, measure
     from bywire.bench.kpis.registry import evaluate, units_of
     from bywire.bench.result import Result
+    from bywire.bench.stated import StatedFigure, StatedLevel, StatedRange
     from bywire.bench.stimuli.registry import Stimulus
     from bywire.campaigns.declared import DeclaredCampaign
     from bywire.campaigns.residual import Residual
@@ -148,6 +149,7 @@ _HOMES = {
     # experiments and figures
     "bench.bench": "Bench",
     "bench.result": "Result",
+    "bench.stated": "StatedFigure StatedLevel StatedRange",
     "bench.experiment": "Case Experiment Recordings as_run fixed",
     "bench.kpis.cases": "FamilyJudge",
     "bench.kpis.kpi": "Figures Kpi Undefined measure",
@@ -215,7 +217,8 @@ __all__ = [
     "Part", "Plant", "PlantPoint", "Point", "Position", "Power", "Pressure", "Problem",
     "Progress", "Quantity", "Recordings", "Reproduction", "Residual", "Resistance", "Result",
     "Role", "RootCause", "RotaryDamping", "Run", "Runs", "Shown", "ShownFigure", "Signal",
-    "SignedCurrent", "Sliders", "Slow", "Source", "SourcePart", "Speed", "Stiffness", "Stimulus",
+    "SignedCurrent", "Sliders", "Slow", "Source", "SourcePart", "Speed", "StatedFigure",
+    "StatedLevel", "StatedRange", "Stiffness", "Stimulus",
     "Study", "Task", "TimeConstant", "Torque", "TorqueConstant", "Trace", "Undefined", "Unit",
     "Unknown",
     "Voltage", "Volume", "Weight", "Wire", "as_run", "calibrated", "chosen", "closed_loop",

@@ -13,8 +13,9 @@ const call = (name, ...given) => runInThisContext(name)(...given);
 const tries = {
   run({ changes }) {
     const made = call("recordingOf", brake.run(changes), description.settle, keep);
-    const signals = Object.fromEntries(Object.entries(made.signals).map(([n, c]) => [n, Array.from(c)]));
-    const figures = judged && call("keyFigures", brake.exports, made.time, made.signals, judged.families);
+    const names = description.signals.map(({ name }) => name), columns = call("columnsOf", made.table, made.time, names);
+    const signals = Object.fromEntries(Object.entries(columns).map(([n, c]) => [n, Array.from(c)]));
+    const figures = judged && call("keyFigures", brake.exports, made, names, judged.families);
     return { time: Array.from(made.time), signals, figures };
   },
   loops({ changes }) {

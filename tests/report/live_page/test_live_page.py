@@ -141,11 +141,19 @@ def test_texts_of_a_bench_cannot_leave_their_place(tmp_path):
     assert len(re.findall(r"<script>", text)) == 2
 
 
-def test_levels_that_a_source_states_stand_in_the_first_panel_of_their_signal(pages):
+def test_what_a_source_states_stands_in_the_first_panel_of_its_signal(pages):
     moment, *others = block(pages["wedge"], "bench")["panels"]
-    assert {each["value"] for each in moment["stated"]} >= {200.0, 160.0}
+    spans = [(each["low"], *each["levels"], each["high"]) for each in moment["stated"]]
+    assert spans == [(190.0, 200.0, 210.0), (152.0, 160.0, 168.0)]
     assert all("Fig. 7" in each["label"] for each in moment["stated"])
-    assert not any(each["value"] == 200.0 for panel in others for each in panel["stated"])
+    assert not any(panel["stated"] for panel in others)
+
+
+def test_what_a_source_states_of_key_figures_stands_beside_them(pages):
+    stated = {f["name"]: f["stated"] for f in block(pages["motorcycle"], "bench")["judged"]["figures"]}
+    assert stated["overshoot"] == {"text": "<= 15 %", "where": "section 6, requirement"}
+    assert stated["steady_state_error"]["text"] == "0 bar ± 0.05 bar"
+    assert stated["rise_time"] is None
 
 
 def test_what_a_brake_declares_stands_first_where_nobody_chose(pages):
