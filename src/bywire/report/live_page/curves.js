@@ -2,6 +2,8 @@
 
 const HEIGHT = 150; // px of a panel of height 1
 const NEAR = 0.5; // share of a limit from which its lines are drawn
+const OFF = 0.25; // px by which a drawn line may be off a point
+const DENSE = 4; // points in a column of pixels from which their extremes are drawn
 const DASHES = { "set point": [6, 4], limit: [2, 4], stated: [7, 3] };
 
 /** Return the colors of the page as they are: they change with its theme. */
@@ -16,15 +18,48 @@ function palette() {
 const converted = (values, quantity) =>
   quantity.factor === 1 && quantity.offset === 0 ? values : values.map((value) => shownOf(value, quantity));
 
+/** Return the rows at which a line bends: all between are within `off` of it, along y. x ascends. */
+function bendsOf(x, y, from, to, off) {
+  const bends = [from];
+  let at = from, low = -Infinity, high = Infinity;
+  for (let k = from + 1; k <= to; ++k) {
+    let slope = (y(k) - y(at)) / (x(k) - x(at));
+    if (!(slope >= low && slope <= high)) {
+      bends.push((at = k - 1));
+      [low, high] = [-Infinity, Infinity];
+      slope = (y(k) - y(at)) / (x(k) - x(at));
+    }
+    const wide = off / (x(k) - x(at));
+    low = Math.max(low, slope - wide);
+    high = Math.min(high, slope + wide);
+  }
+  bends.push(to);
+  return bends;
+}
+
+/** Return a line as uPlot takes it, through its bends alone: a stroke takes as long as it has corners. */
+function lineOf(plot, series, from, to) {
+  const { bbox, scales, data } = plot;
+  if (to - from > DENSE * bbox.width) return uPlot.paths.linear()(plot, series, from, to);
+  const [x, y] = [["x", data[0]], ["y", data[series]]].map(([axis, values]) => {
+    const { min, max } = scales[axis], first = plot.valToPos(min, axis, true);
+    const each = (plot.valToPos(max, axis, true) - first) / (max - min);
+    return (k) => first + each * (values[k] - min);
+  });
+  const stroke = new Path2D();
+  for (const k of bendsOf(x, y, from, to, OFF)) stroke.lineTo(Math.round(x(k)), Math.round(y(k)));
+  return { stroke, fill: null, clip: null, band: null, gaps: null, flags: 1 };
+}
+
 /** Return the lines of a panel: traces of the run, and first traces of kept runs. */
 function linesOf(panel, kept, colors) {
   const lines = panel.traces.map(({ label, role }) => ({
     label, stroke: colors[role] ?? colors.third, width: role === "main" ? 2 : 1.5,
     dash: DASHES[role], points: { show: false },
-    paths: panel.levels.length ? uPlot.paths.stepped({ align: 1 }) : undefined,
+    paths: panel.levels.length ? uPlot.paths.stepped({ align: 1 }) : lineOf,
   }));
   const others = kept.map(({ name }) => ({
-    label: name, stroke: colors.kept, width: 1.5, dash: [8, 3, 2, 3], points: { show: false },
+    label: name, stroke: colors.kept, width: 1.5, dash: [8, 3, 2, 3], points: { show: false }, paths: lineOf,
   }));
   return [{ label: "time" }, ...lines, ...others];
 }
