@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-import re
 import zlib
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -32,6 +31,7 @@ from bywire.core.units import convert
 from bywire.core.version import __version__
 from bywire.export.exported import Exported
 from bywire.export.wasm.module import module_files
+from bywire.report.inline_script import bare
 from bywire.report.live_page.dependence import dependence
 from bywire.report.live_page.loops import loops_of, told
 from bywire.report.live_page.sliders import first_sliders
@@ -84,7 +84,7 @@ def page_text(
     data["digest"] = digest
     data["description"]["name"] = "".join(c if c.isalnum() else "_" for c in name)
     loader = module["bywire.mjs"].decode().replace("export async function", "async function")
-    blocks = {"bench": data, "loader": _bare(loader), "worker": "\n".join(map(_script, _WORKER))}
+    blocks = {"bench": data, "loader": bare(loader), "worker": "\n".join(map(_script, _WORKER))}
     style = _text("uplot/uPlot.min.css") + _text("live.css")
     library = f"/* {_text('uplot/LICENSE').strip()} */\n{_text('uplot/uPlot.iife.min.js')}"
     script = '"use strict";\n' + "\n".join(map(_script, _SCRIPTS))
@@ -249,13 +249,7 @@ def _block(key: str, value: Any) -> str:
 
 
 def _script(name: str) -> str:
-    return _bare(_text(name))
-
-
-def _bare(script: str) -> str:
-    """Return a script without comments and indentation: they are for who changes it."""
-    what = r"/\*.*?\*/\s*|^//[^\n]*\n|[ \t]+//[^\n]*$|^[ \t]+"
-    return re.sub(what, "", script, flags=re.DOTALL | re.MULTILINE)
+    return bare(_text(name))
 
 
 def _packed(module: bytes) -> str:
