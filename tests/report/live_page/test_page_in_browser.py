@@ -11,6 +11,8 @@ import pytest
 from page_benches import BENCHES, VARIED
 
 import bywire
+from screenshots.subjects import SUBJECTS
+from screenshots.taken import differing, taken
 
 DAILY = 3  # positions of sliders
 READY = "() => run !== null && !busy"
@@ -194,3 +196,21 @@ def test_a_browser_without_webassembly_is_told_so(tab, chromium):
     page.goto(tab.file.as_uri())
     assert "no WebAssembly" in page.evaluate(SAID)
     context.close()
+
+
+@pytest.mark.parametrize("suffix", ["", "-phone"])
+def test_a_page_looks_as_it_is_stored_in_both_themes(tab, chromium, suffix):
+    name = f"page-{tab.file.stem}{suffix}"
+    if name not in SUBJECTS:
+        pytest.skip("one phone is enough")
+    subject = SUBJECTS[name]
+    assert not differing(name, taken(chromium, tab.file.as_uri(), subject.width, subject.ready))
+
+
+def test_a_panel_that_is_missing_is_seen(tab, chromium):
+    name = f"page-{tab.file.stem}"
+    hide = "() => { document.querySelectorAll('#curves canvas')[1].style.visibility = 'hidden'; }"
+    shots = taken(
+        chromium, tab.file.as_uri(), ready=SUBJECTS[name].ready, change=hide, themes=["dark"]
+    )
+    assert "differs" in differing(name, shots)
