@@ -18,18 +18,25 @@ from bywire.report.time_traces import time_traces
 JUMP = 0.5  # s, where the signals jump: its place on the screen says where that time is
 FRAME = 18  # px that border and padding of a figure take
 SEEN = """() => [...document.querySelectorAll(".zoom svg")].map((svg) => {
-  const { a, d, e, f } = svg.getScreenCTM(), viewBox = svg.getAttribute("viewBox").split(" ").map(Number);
+  const { a, d, e, f } = svg.getScreenCTM();
+  const viewBox = svg.getAttribute("viewBox").split(" ").map(Number), [, , w, h] = viewBox;
   const boxes = JSON.parse(svg.dataset.axes).map(({ box: [left, bottom, right, top] }) => ({
-    left: e + a * viewBox[2] * left, right: e + a * viewBox[2] * right,
-    top: f + d * viewBox[3] * (1 - top), bottom: f + d * viewBox[3] * (1 - bottom) }));
+    left: e + a * w * left, right: e + a * w * right,
+    top: f + d * h * (1 - top), bottom: f + d * h * (1 - bottom) }));
   const jumps = [...svg.querySelectorAll("path")].flatMap((path) => {
-    const points = [...path.getAttribute("d").matchAll(/[ML] (\\S+) (\\S+)/g)].map(([, x, y]) => new DOMPoint(x, y));
-    const k = points.findIndex(({ y }, k) => points.length > 5 && k && Math.abs(y - points[k - 1].y) > 30);
-    return k < 0 ? [] : [{ x: points[k].matrixTransform(path.getScreenCTM()).x, height: path.getBoundingClientRect().height }];
+    const points = [...path.getAttribute("d").matchAll(/[ML] (\\S+) (\\S+)/g)]
+      .map(([, x, y]) => new DOMPoint(x, y));
+    const k = points.length < 6 ? -1
+      : points.findIndex(({ y }, k) => k && Math.abs(y - points[k - 1].y) > 30);
+    const { height } = path.getBoundingClientRect();
+    return k < 0 ? [] : [{ x: points[k].matrixTransform(path.getScreenCTM()).x, height }];
   });
-  const ticks = [...svg.querySelectorAll("text")].map((text) => [text, text.getBoundingClientRect()])
-    .filter(([text, { top }]) => top > boxes.at(-1).bottom && text.style.display !== "none" && /^[−.\\d]+$/.test(text.textContent))
-    .map(([{ textContent }, { left, right }]) => [Number(textContent.replace("−", "-")), (left + right) / 2]);
+  const ticks = [...svg.querySelectorAll("text")].flatMap((text) => {
+    const { left, right, top } = text.getBoundingClientRect();
+    const isTick = top > boxes.at(-1).bottom && text.style.display !== "none"
+      && /^[.\\d]+$/.test(text.textContent);
+    return isTick ? [[Number(text.textContent), (left + right) / 2]] : [];
+  });
   return { boxes, jumps, ticks, viewBox };
 })"""
 
@@ -49,7 +56,8 @@ def page(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[An
     f = np.geomspace(1.0, 100.0, 50)
     figures = [
         time_traces(_step(1.0), panels=panels), time_traces(_step(1.0), panels=panels[:1]),
-        time_traces(_step(0.1), panels=panels[:1]), bode([Response("lag", f, 1.0 / (1.0 + 1j * f))]),
+        time_traces(_step(0.1), panels=panels[:1]),
+        bode([Response("lag", f, 1.0 / (1.0 + 1j * f))]),
     ]  # fmt: skip
     blocks = [FigureBlock(figure, "A figure.") for figure in figures]
     path = tmp_path_factory.mktemp("zoom") / "report.html"
@@ -73,10 +81,10 @@ def seen(page: Any) -> Iterator[Any]:
         page.keyboard.press("Escape")
 
 
-def drag(page: Any, box: dict[str, float], start: tuple[float, float], end: tuple[float, float]) -> None:
+def drag(page: Any, box: dict[str, float], *ends: tuple[float, float]) -> None:
     """Drag from one place to another, in shares of a panel."""
     width, height = box["right"] - box["left"], box["bottom"] - box["top"]
-    for k, (x, y) in enumerate((start, end)):
+    for k, (x, y) in enumerate(ends):
         page.mouse.move(box["left"] + x * width, box["top"] + y * height, steps=3)
         (page.mouse.up if k else page.mouse.down)()
 
@@ -131,7 +139,8 @@ def test_the_corner_reads_the_time_that_is_shown_and_arrows_move_on(page, seen):
 def test_other_drags_show_a_part_of_the_figure_in_its_proportions(page, seen):
     before = seen()
     for figure, end in ((1, (0.4, 0.9)), (3, (0.7, 0.1))):  # down; across a panel over frequency
-        box, whole = before[figure]["boxes"][0], page.locator(".zoom svg").nth(figure).bounding_box()
+        box = before[figure]["boxes"][0]
+        whole = page.locator(".zoom svg").nth(figure).bounding_box()
         drag(page, box, (0.3, 0.1), end)
         now = seen()
         share = [now[figure]["viewBox"][k] / before[figure]["viewBox"][k] for k in (2, 3)]
@@ -152,8 +161,8 @@ def test_wheel_and_buttons_zoom_a_figure(page, seen):
     place.focus()
     place.hover()
     page.mouse.wheel(0, -300)
-    page.wait_for_function("(whole) => document.querySelector('.zoom svg').viewBox.baseVal.width < whole",
-                           arg=before["viewBox"][2])
+    width = "document.querySelector('.zoom svg').viewBox.baseVal.width"
+    page.wait_for_function(f"() => {width} < {before['viewBox'][2]}")
     place.locator("button[title='Whole figure']").click()
     assert seen()[0]["viewBox"] == before["viewBox"]
     place.locator("button[title='Zoom in']").click()

@@ -1,4 +1,4 @@
-"""Whether two screenshots show the same: antialiasing may differ, a part that is shifted may not."""
+"""Whether two screenshots show the same: antialiasing may differ, where a part stands may not."""
 
 from __future__ import annotations
 

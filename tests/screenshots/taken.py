@@ -24,7 +24,8 @@ _SETTLED = 400  # ms after which a page that has computed draws no more
 _FONTS = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
 _FONT = """(() => {
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-  for (const [weight, text] of %s) document.fonts.add(new FontFace("Shot", bytes(text), { weight }));
+  for (const [weight, text] of %s)
+    document.fonts.add(new FontFace("Shot", bytes(text), { weight }));
   const sheet = new CSSStyleSheet();
   sheet.replaceSync("* { font-family: Shot !important }");
   document.adoptedStyleSheets = [sheet];

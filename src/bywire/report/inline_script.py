@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import re
 
-_LEFT_OUT = re.compile(r"/\*.*?\*/\s*|^//[^\n]*\n|[ \t]+//[^\n]*$|^[ \t]+", re.DOTALL | re.MULTILINE)
+_COMMENT = r"/\*.*?\*/\s*|^//[^\n]*\n|[ \t]+//[^\n]*$"
+_LEFT_OUT = re.compile(rf"{_COMMENT}|^[ \t]+", re.DOTALL | re.MULTILINE)
 
 
 def bare(script: str) -> str:
     """Return a script without comments and indentation.
 
-    No text in it may hold two slashes after a space.
+    No text in it may hold two slashes after a space, nor a slash before a star.
 
     Examples
     --------
-    >>> bare("/* A sum. */\\nlet a = 1; // one\\n  a += 2;")
-    'let a = 1;\\na += 2;'
+    >>> bare("/* A sum. */ let a = 1; // one")
+    'let a = 1;'
     """
     return _LEFT_OUT.sub("", script)

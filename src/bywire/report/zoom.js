@@ -42,7 +42,8 @@
       && Math.abs(y.baseVal.value + height.baseVal.value - bottom) < 1;
     const clip = [...svg.querySelectorAll("clipPath")].find(isOurs);
     if (!clip) return null;
-    const [low, high] = axes.x, held = [...svg.querySelectorAll(`[clip-path="url(#${clip.id})"]`)];
+    const isHeld = (each) => each.getAttribute("clip-path").endsWith(`#${clip.id})`);
+    const [low, high] = axes.x, held = [...svg.querySelectorAll("[clip-path]")].filter(isHeld);
     const ticks = held.flatMap((grid) => {  // matplotlib draws a tick as line, mark and text
       const next = grid.nextElementSibling, mark = next?.localName === "defs" ? next.nextElementSibling : next;
       const use = mark?.querySelector("use"), text = mark?.nextElementSibling;

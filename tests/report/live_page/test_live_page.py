@@ -89,8 +89,8 @@ def test_links_and_files_hold_what_was_moved(pages, tmp_path):
 def test_a_line_through_its_bends_is_within_a_quarter_of_a_pixel_of_every_point(pages, tmp_path):
     rng, x = np.random.default_rng(5), np.linspace(0.0, 800.0, 1700)
     lines = {
-        "straight": 3.0 * x, "jump": np.where(x < 300.0, 0.0, 90.0), "wave": 60.0 * np.sin(0.02 * x),
-        "noise": rng.normal(0.0, 20.0, x.size),
+        "straight": 3.0 * x, "jump": np.where(x < 300.0, 0.0, 90.0),
+        "wave": 60.0 * np.sin(0.02 * x), "noise": rng.normal(0.0, 20.0, x.size),
     }  # fmt: skip
     tasks = [{"kind": "bends", "x": [*x], "y": [*y], "off": 0.25} for y in lines.values()]
     answers = tried(pages["motorcycle"], tmp_path, *tasks)

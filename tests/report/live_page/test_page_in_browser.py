@@ -207,6 +207,11 @@ def test_a_page_looks_as_it_is_stored_in_both_themes(tab, chromium, suffix):
     assert not differing(name, taken(chromium, tab.file.as_uri(), subject.width, subject.ready))
 
 
+def test_a_report_looks_as_it_is_stored_in_both_themes(chromium, tmp_path):
+    address = SUBJECTS["report"].write(tmp_path).as_uri()
+    assert not differing("report", taken(chromium, address))
+
+
 def test_a_panel_that_is_missing_is_seen(tab, chromium):
     name = f"page-{tab.file.stem}"
     hide = "() => { document.querySelectorAll('#curves canvas')[1].style.visibility = 'hidden'; }"
