@@ -21,7 +21,7 @@
     if (text) made.textContent = text;
     return made;
   };
-  const group = () => document.createElementNS("http://www.w3.org/2000/svg", "g");
+  const group = (svg) => document.createElementNS(svg.namespaceURI, "g");
   const toggled = (tag, isShown) => { if (tag) tag.style.display = isShown ? "" : "none"; };
 
   // Round values between two, about as many as wanted, with their texts.
@@ -53,7 +53,7 @@
     });
     const lines = new Set(ticks.map(({ grid }) => grid)), markers = [];
     const inner = held.filter((each) => !lines.has(each)).map((each) => {
-      const clipped = group(), moved = group();
+      const clipped = group(svg), moved = group(svg);
       clipped.setAttribute("clip-path", each.getAttribute("clip-path"));
       each.removeAttribute("clip-path");
       each.replaceWith(clipped);
