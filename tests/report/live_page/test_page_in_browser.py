@@ -219,3 +219,16 @@ def test_a_panel_that_is_missing_is_seen(tab, chromium):
         chromium, tab.file.as_uri(), ready=SUBJECTS[name].ready, change=hide, themes=["dark"]
     )
     assert "differs" in differing(name, shots)
+
+
+def test_ranges_that_a_source_states_are_bands(tab):
+    count = """() => {
+      const canvas = document.querySelector("#curves canvas");
+      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      const faint = data.filter((alpha, k) => k % 4 === 3 && alpha > 30 && alpha < 50);
+      return faint.length / (data.length / 4);
+    }"""
+    tab.open()
+    stated = sum(each["high"] - each["low"] for each in tab.page.evaluate("() => panels[0].stated"))
+    assert (stated > 0.0) == (tab.file.stem == "wedge")
+    assert (tab.page.evaluate(count) > 0.05) == (stated > 0.0)
