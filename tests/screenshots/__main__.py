@@ -1,6 +1,7 @@
 """Renew stored screenshots of pages: ``python tests/screenshots [NAME ...]`` (from the root).
 
-All, or those of the names. What changed is said; look at the files before they are committed.
+All, or those of the names. What changed is said, the others stay; look at the files before they
+are committed.
 """
 
 from __future__ import annotations
@@ -35,9 +36,11 @@ def main() -> int:
             for theme, shot in taken(opened, address, subject.width, subject.ready).items():
                 label = f"{name}-{theme}"
                 old = stored(label) if path_of(label).exists() else shot[:0]
-                changed = "changed" if difference(old, shot).is_seen else "as it was"
-                path = store(label, shot)
-                print(f"{label}: {changed}, {path.stat().st_size / 1e3:.0f} kB")
+                if difference(old, shot).is_seen:
+                    size = store(label, shot).stat().st_size
+                    print(f"{label}: changed, {size / 1e3:.0f} kB")
+                else:
+                    print(f"{label}: as it was")
     return 0
 
 
