@@ -168,10 +168,10 @@ def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str
         kpi.name: limit_of(kpi.name, bench.requirements[kpi.name], kpi.unit)
         for kpi in result.kpis if kpi.name in bench.requirements
     }  # fmt: skip
+    units = {kpi.name: kpi.unit for kpi in result.kpis}
     stated = {
-        figure: {"text": stated_figure(each, units[figure]), "where": each.where}
-        for units in [{kpi.name: kpi.unit for kpi in result.kpis}]
-        for figure, each in stated_figures(bench).items()
+        name: {"text": stated_figure(each, units[name]), "where": each.where}
+        for name, each in stated_figures(bench).items() if name in units
     }  # fmt: skip
     figures = [
         {"name": kpi.name, "unit": unit_text(display_unit(kpi.unit)), **_shown(kpi.unit),
