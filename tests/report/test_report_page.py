@@ -145,6 +145,16 @@ def test_a_figure_says_where_its_axes_lie_and_what_they_span() -> None:
     ]
 
 
+@pytest.mark.parametrize(("label", "unit"), [("time [ms]", 1e-3), ("time [s]", 1.0)])
+def test_panels_say_that_they_are_over_time_and_in_which_unit(label: str, unit: float) -> None:
+    figure = Figure()
+    _, lower = figure.subplots(2, 1, sharex=True)
+    for text, wanted in ((label, unit), ("frequency [Hz]", None)):
+        lower.set_xlabel(text)
+        said = parsed(inline_figures([(figure, "axes")])[0]).tags[0][1]["data-axes"]
+        assert [each.get("t") for each in json.loads(said or "")] == [wanted, wanted]
+
+
 def test_hostile_text_is_only_text(recording: xr.Dataset) -> None:
     hostile = recording.copy()
     hostile["p_mc"].attrs = {"units": "Pa", "long_name": HOSTILE}

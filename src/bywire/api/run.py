@@ -19,6 +19,7 @@ from bywire.bench.requirements import Verdict
 from bywire.bench.result import Result
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Progress
+from bywire.bench.stated import stated_figures
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
     Attachment,
@@ -32,6 +33,7 @@ from bywire.report.document import (
     TableBlock,
     recording_file,
 )
+from bywire.report.stated_levels import stated_figure
 from bywire.report.tables import KpiRow, kpi_table
 from bywire.report.wording import amount, measured_amount
 
@@ -56,7 +58,7 @@ class BenchResult(Result, Answer):
     @property
     def rows(self) -> list[KpiRow]:
         """The key figures beside their requirements."""
-        verdicts = {v.kpi: v for v in self.verdicts}
+        verdicts, stated = {v.kpi: v for v in self.verdicts}, stated_figures(self.bench)
         return [
             KpiRow(
                 kpi.name, kpi.value, kpi.unit,
@@ -64,6 +66,8 @@ class BenchResult(Result, Answer):
                 verdicts[kpi.name].limit if kpi.name in verdicts else "",
                 verdicts[kpi.name].outcome if kpi.name in verdicts else "",
                 kpi.error,
+                stated_figure(stated[kpi.name], kpi.unit) if kpi.name in stated else "",
+                stated[kpi.name].where if kpi.name in stated else "",
             )
             for kpi in self.kpis
         ]  # fmt: skip
@@ -86,6 +90,7 @@ class BenchResult(Result, Answer):
         """Return verdict and changes, figures, key figures, energy, and how it was made."""
         bench = self.bench
         table = TableBlock(kpi_table(self.rows))
+        narrow = TableBlock(kpi_table([replace(row, where="") for row in self.rows]))
         said = [*remarks(self), *self._unplayed()]
         notes: list[Block] = [Paragraph(f"Warning: {text}.") for text in self.warnings]
         beside = [*unexpected(self), *self._unplayed()]  # the page has a table of changes
@@ -95,13 +100,13 @@ class BenchResult(Result, Answer):
             f"{bench.definition.summary}; parameter set {bench.parameters}",
             sections=lambda: [
                 outcome(self, self.rows, notes),
-                Section("Figures", [*self._figures(), *source_says(self.bench)]),
+                Section("Figures", [*self._figures(), *source_says(self)]),
                 Section("Key figures", [table]),
                 *energy(self.ledgers()),
                 *schematic_section(self.bench),
                 how_it_was_made(self, self._step_errors()),
             ],
-            brief=[*([Listing(said)] if said else []), *([table] if self.kpis else [])],
+            brief=[*([Listing(said)] if said else []), *([narrow] if self.kpis else [])],
             data={**self._data(), "remarks": said},
             banner=self._banner(),
             attachments=[

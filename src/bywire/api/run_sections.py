@@ -13,11 +13,11 @@ from bywire.bench.result import Result
 from bywire.bench.stated import stated_for
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES
-from bywire.core.signals import signals_of
 from bywire.core.units import difference_unit
 from bywire.report.document import Block, Details, Paragraph, Section, TableBlock
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.schematic.blocks import schematic_blocks
+from bywire.report.stated_levels import stated_level
 from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
 from bywire.report.wording import amount
 
@@ -47,17 +47,19 @@ def outcome(result: Result, rows: Sequence[KpiRow], notes: Sequence[Block]) -> S
     return Section("Outcome", [*blocks, *notes])
 
 
-def source_says(bench: Bench) -> list[Block]:
+def source_says(result: Result) -> list[Block]:
     """Return what a source states for the experiment, drawn in green in its figures."""
-    levels = stated_for(bench)
+    levels = stated_for(result.bench)
     if not levels:
         return []
-    leaves = signals_of(ASSEMBLIES.find(bench.system).Output)
+    units = {
+        name: str(signal.attrs.get("units", "1"))
+        for recording in result.recordings.values() for name, signal in recording.data_vars.items()
+    }  # fmt: skip
     rows = [
-        (each.label, each.signal, amount(each.value, leaves[each.signal].unit)
-         if each.signal in leaves else f"{each.value:g}", each.where)
+        (each.label, each.signal, stated_level(each, units.get(each.signal, "1")), each.where)
         for each in levels
-    ]  # fmt: skip
+    ]
     table = text_table(("level", "signal", "stated", "where"), rows)
     return [TableBlock(table, "What the source states for this experiment: green in the figures.")]
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from bywire.bench.kpis.kpi import Figures, Kpi, Undefined, measure
     from bywire.bench.kpis.registry import evaluate, units_of
     from bywire.bench.result import Result
+    from bywire.bench.stated import StatedFigure, StatedLevel, StatedRange
     from bywire.bench.stimuli.registry import Stimulus
     from bywire.campaigns.declared import DeclaredCampaign
     from bywire.campaigns.residual import Residual
@@ -150,6 +151,7 @@ _HOMES = {
     # experiments and figures
     "bench.bench": "Bench",
     "bench.result": "Result",
+    "bench.stated": "StatedFigure StatedLevel StatedRange",
     "bench.experiment": "Case Experiment Recordings as_run fixed",
     "bench.kpis.cases": "FamilyJudge",
     "bench.kpis.kpi": "Figures Kpi Undefined measure",
@@ -217,14 +219,15 @@ __all__ = [
     "Part", "Plant", "PlantPoint", "Point", "Port", "Position", "Power", "Pressure", "Problem",
     "Progress", "Quantity", "Recordings", "Reproduction", "Residual", "Resistance", "Result",
     "Role", "RootCause", "RotaryDamping", "Run", "Runs", "Shown", "ShownFigure", "Signal",
-    "SignedCurrent", "Sliders", "Slow", "Source", "SourcePart", "Speed", "Stiffness", "Stimulus",
-    "Study", "Sub", "Task", "TimeConstant", "Torque", "TorqueConstant", "Trace", "Undefined",
-    "Unit", "Unknown", "Voltage", "Volume", "Weight", "Wire", "as_run", "calibrated", "chosen",
-    "closed_loop", "compared", "derived", "differentiated", "effort", "estimate", "evaluate",
-    "fixed", "found", "hysteresis", "kpis", "lack_of_fit", "linearize", "measure", "measured",
-    "moved_run", "occupation", "paper", "parameters", "parameters_of", "quantities",
-    "require_ranges", "signals", "simulate", "step_response", "style", "track", "units_of",
-    "validity", "variable", "variables", "wrong_sign", "zeros",
+    "SignedCurrent", "Sliders", "Slow", "Source", "SourcePart", "Speed", "StatedFigure",
+    "StatedLevel", "StatedRange", "Stiffness", "Stimulus", "Study", "Sub", "Task", "TimeConstant",
+    "Torque", "TorqueConstant", "Trace", "Undefined", "Unit", "Unknown", "Voltage", "Volume",
+    "Weight", "Wire", "as_run", "calibrated", "chosen", "closed_loop", "compared", "derived",
+    "differentiated", "effort", "estimate", "evaluate", "fixed", "found", "hysteresis", "kpis",
+    "lack_of_fit", "linearize", "measure", "measured", "moved_run", "occupation", "paper",
+    "parameters", "parameters_of", "quantities", "require_ranges", "signals", "simulate",
+    "step_response", "style", "track", "units_of", "validity", "variable", "variables",
+    "wrong_sign", "zeros",
 ]  # fmt: skip
 
 

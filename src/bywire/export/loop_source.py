@@ -23,7 +23,7 @@ _NOT_SYMBOLIC = (BywireError, TypeError, ValueError, ArithmeticError, RuntimeErr
 
 @dataclass(frozen=True)
 class LoopSource:
-    """The linear model of a loop as it is sampled, at one operating point, for any parameters.
+    """The linear model of a loop, sampled or analog, at one operating point, for any parameters.
 
     Parameters
     ----------
@@ -33,9 +33,9 @@ class LoopSource:
         Name and C text of ``void entry(const double *p, double *out)``, which writes what is not
         zero of: how clearly each contact is closed or open [m], then row by row A (n, n) and
         B (n, nm) of the plant, and of each task the memory's Jacobians by states (nm, n) and by
-        memory (nm, nm).
+        memory (nm, nm). Of an analog loop, whose sampled controllers hold, A is all.
     states, memory
-        Names, in the order of rows and columns.
+        Names, in the order of rows and columns; an analog loop has no memory.
     contacts
         How many there are.
     every, frame
@@ -61,7 +61,7 @@ class LoopSource:
 def loop_source(loop: Loop, par: ParameterSet) -> LoopSource | None:
     """Return a loop's linear model in C, at the loop's usual operating point.
 
-    None for an analog loop, and where the point or the structure cannot follow symbols.
+    None where the point or the structure cannot follow symbols.
     """
     names = par.leaves()
     p = SX.sym("p", len(names))
@@ -69,7 +69,7 @@ def loop_source(loop: Loop, par: ParameterSet) -> LoopSource | None:
     try:
         at = loop.point(loop.smooth(par), loop.at.default)
         moving = loop.point(loop.smooth(symbolic), loop.at.default)
-        if loop.analog or at.par.leaves().keys() != names.keys():
+        if at.par.leaves().keys() != names.keys():
             return None
         results = _jacobians(loop, at, moving)
         function = ca.Function("loop", [p], results)
@@ -79,10 +79,8 @@ def loop_source(loop: Loop, par: ParameterSet) -> LoopSource | None:
     kept = tuple(name for name in at.model.State._fields if name not in loop.locked)
     entry = f"bw_loop_{loop.name.replace('-', '_')}"
     text = _in_c(entry, function)
-    contacts = results[0].shape[0]
-    return LoopSource(
-        loop, entry, text, kept, at.model.Memory._fields, contacts, tuple(every), frame
-    )
+    contacts, memory = results[0].shape[0], () if loop.analog else at.model.Memory._fields
+    return LoopSource(loop, entry, text, kept, memory, contacts, tuple(every), frame)
 
 
 def _jacobians(loop: Loop, at: Point, moving: Point) -> list[Any]:
@@ -108,7 +106,10 @@ def _jacobians(loop: Loop, at: Point, moving: Point) -> list[Any]:
     nothing, free = SX.zeros(len(model.frictions)), SX.ones(len(model.frictions))
     A, B, *_ = functions.plant(x, m, p, K, nothing, free)
     kept = [k for k, name in enumerate(model.State._fields) if name not in loop.locked]
-    rows = [column(slack), _by_rows(A[kept, kept]), _by_rows(B[kept, :])]
+    rows = [column(slack), _by_rows(A[kept, kept])]
+    if loop.analog:
+        return rows
+    rows.append(_by_rows(B[kept, :]))
     for tick in functions.ticks:
         M_x, M_m, _ = tick(x, m, u, p)
         rows += [_by_rows(M_x[:, kept]), _by_rows(M_m)]

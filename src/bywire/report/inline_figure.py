@@ -9,11 +9,15 @@ import struct
 from collections.abc import Sequence
 from html import escape
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bywire.report.files import figure_bytes
 from bywire.report.picture import Picture
 from bywire.report.wording import clean
+
+_TIME = re.compile(r"time \[(m?s)\]")  # the label of an abscissa
+_SECONDS = {"s": 1.0, "ms": 1e-3}
 
 BUDGET = 2_000_000
 """bytes that the figures of a page may take together while they are vector graphics"""
@@ -60,12 +64,20 @@ def axes_of(figure: Figure | Picture) -> str:
             "box": [round(float(each), 5) for each in axes.get_position().extents],
             "x": _span(axes.get_xlim(), axes.get_xscale()),
             "y": _span(axes.get_ylim(), axes.get_yscale()),
+            **_time(axes),
         }
         for axes in figure.axes
         if {axes.get_xscale(), axes.get_yscale()} <= {"linear", "log"} and axes.axison
     ]
     text = json.dumps(known, separators=(",", ":"))
     return f' data-axes="{escape(text, quote=True)}"' if known else ""
+
+
+def _time(axes: Axes) -> dict[str, float]:
+    """Return how long a unit of an abscissa over time is [s]; nothing of any other abscissa."""
+    together = axes.get_shared_x_axes().get_siblings(axes)
+    labels = (_TIME.fullmatch(each.get_xlabel()) for each in together)
+    return next(({"t": _SECONDS[found[1]]} for found in labels if found), {})
 
 
 def _span(limits: tuple[float, float], scale: str) -> list[float | bool]:

@@ -27,6 +27,7 @@ from bywire.report.document import (
 )
 from bywire.report.files import write_bytes
 from bywire.report.inline_figure import inline_figures
+from bywire.report.inline_script import bare
 from bywire.report.policy import admitted
 from bywire.report.result_folder import listed
 from bywire.report.tables import Cell, Column, Table
@@ -77,7 +78,7 @@ def page_html(
 ) -> str:  # fmt: skip
     """Return a report as one HTML page; see :func:`write_page`."""
     numbered = _numbered(sections)
-    style, script = _file("page.css"), _file("zoom.js") if numbered.has_figures else ""
+    style, script = _file("page.css"), bare(_file("zoom.js")) if numbered.has_figures else ""
     parts = [
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n{_policy(script)}\n'
         f"{listed(names)}"

@@ -1,30 +1,60 @@
-"""Levels that a source states, drawn under our curves."""
+"""What a source states: levels and ranges drawn under our curves, and words for tables."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from bywire.core.units import convert
+from bywire.core.units import convert, difference_unit
 from bywire.report import style
 from bywire.report.channel import Channel
+from bywire.report.wording import amount
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from bywire.bench.stated import StatedLevel
+    from bywire.bench.stated import StatedFigure, StatedLevel, StatedRange
 
 _DASHES: tuple[style.Dash, ...] = ((0, (7, 3)), (0, (7, 2, 2, 2)), (0, (2, 2)))
+_OPACITY = 0.15  # of a band: the curves' grid shines through
 
 
-def draw_stated(axes: Axes, levels: Sequence[StatedLevel], shown: Channel) -> None:
-    """Draw levels as lines across an axes, below its curves, each with its own legend entry.
+def draw_stated(
+    axes: Axes, levels: Sequence[StatedLevel | StatedRange], shown: Channel
+) -> None:
+    """Draw levels as lines across an axes and ranges as bands, each with its own legend entry.
 
-    ``shown``: a channel of the axes, for its unit.
+    They lie below the curves. ``shown``: a channel of the axes, for its unit.
     """
     for k, each in enumerate(levels):
-        axes.axhline(
-            convert(each.value, shown.symbol, shown.unit), color=style.GREEN, linewidth=1.4,
-            linestyle=_DASHES[k % len(_DASHES)], zorder=2.3,
-            label=style.plain(f"stated: {each.label}"),
-        )  # fmt: skip
+        low, high, *lines = (
+            convert(value, shown.symbol, shown.unit)
+            for value in (each.low, each.high, *each.levels)
+        )
+        if high > low:
+            axes.axhspan(
+                low, high, facecolor=style.GREEN, alpha=_OPACITY, linewidth=0, zorder=1.4
+            )
+        for at, line in enumerate(lines):
+            axes.axhline(
+                line, color=style.GREEN, linewidth=1.4, linestyle=_DASHES[k % len(_DASHES)],
+                zorder=2.3, label=None if at else style.plain(f"stated: {each.label}"),
+            )  # fmt: skip
+
+
+def stated_level(level: StatedLevel | StatedRange, unit: str) -> str:
+    """Return what is stated of a signal in an SI unit, for instance ``200 N·m ± 10 N·m``."""
+    if len(level.levels) > 1:
+        return f"{amount(level.low, unit)} to {amount(level.high, unit)}"
+    return _within(level.levels[0], level.high - level.levels[0], unit)
+
+
+def stated_figure(figure: StatedFigure, unit: str) -> str:
+    """Return what is stated of a key figure in its unit, for instance ``<= 15 %``."""
+    written = _within(figure.value, figure.tolerance, unit)
+    return f"{figure.bound} {written}".strip()
+
+
+def _within(value: float, tolerance: float, unit: str) -> str:
+    off = f" ± {amount(tolerance, difference_unit(unit))}" if tolerance else ""
+    return amount(value, unit) + off

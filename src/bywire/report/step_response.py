@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from bywire.bench.stated import StatedLevel
+    from bywire.bench.stated import StatedLevel, StatedRange
 
 
 def step_response(
@@ -36,7 +36,7 @@ def step_response(
     facts: StepFacts | None = None,
     measured: xr.Dataset | None = None,
     smoothing: float = 0.0,
-    stated: Sequence[StatedLevel] = (),
+    stated: Sequence[StatedLevel | StatedRange] = (),
 ) -> Figure:
     """Draw one variable with its set point, tolerance band, overshoot limit, rise and settling.
 
@@ -56,7 +56,7 @@ def step_response(
         Averaging time [s] of the curve that was judged; that curve is then drawn thin, the raw
         one pale behind it, and the marks sit on it. 0 where the curve itself was judged.
     stated
-        Levels that a source states; those of the variable are drawn.
+        Levels and ranges that a source states; those of the variable are drawn.
     """
     shown = channel(recording, variable)
     figure, (axes,) = style.new_figure(3.3)

@@ -66,6 +66,8 @@ class KpiRow:
         ``met``, ``missed`` or ``undecided``; empty without a requirement.
     error
         How far the value may be off, in ``unit``; NaN where that was not estimated.
+    stated, where
+        What a source states of it, as text, and its place there; empty for nothing.
     """
 
     name: str
@@ -75,6 +77,8 @@ class KpiRow:
     limit: str = ""
     outcome: str = ""
     error: float = math.nan
+    stated: str = ""
+    where: str = ""
 
 
 @dataclass(frozen=True)
@@ -140,16 +144,18 @@ class ParameterRow:
 
 
 def kpi_table(rows: Iterable[KpiRow]) -> Table:
-    """Return the table of key figures; columns for limits and errors only where there are any.
+    """Return the table of key figures; columns of limits, errors, statements where there are any.
 
     A value is written in the digits that its error leaves.
     """
     listed = list(rows)
     limited = any(row.limit for row in listed)
     estimated = any(not math.isnan(row.error) for row in listed)
+    stated, placed = any(row.stated for row in listed), any(row.where for row in listed)
     columns = [Column("name"), Column("value", numeric=True)]
     columns += [Column("error", numeric=True)] * estimated
     columns += [Column("limit", numeric=True), Column("result")] * limited
+    columns += [Column("stated", numeric=True)] * stated + [Column("stated in")] * placed
     return Table(
         (*columns, Column("definition")),
         tuple(
@@ -158,6 +164,8 @@ def kpi_table(rows: Iterable[KpiRow]) -> Table:
                 Cell(measured_amount(row.value, row.unit, row.error)),
                 *((Cell(error_text(row.value, row.unit, row.error)),) * estimated),
                 *((Cell(clean(row.limit) or "-"), _OUTCOMES[row.outcome]) * limited),
+                *((Cell(clean(row.stated) or "-"),) * stated),
+                *((Cell(clean(row.where) or "-"),) * placed),
                 Cell(clean(row.definition)),
             )
             for row in listed

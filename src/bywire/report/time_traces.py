@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from bywire.bench.stated import StatedLevel
+    from bywire.bench.stated import StatedLevel, StatedRange
 
 
 NEAR = 0.5
@@ -40,7 +40,7 @@ def time_traces(
     limits: StepLimits | None = None,
     measured: xr.Dataset | None = None,
     stuck: str = "stuck",
-    stated: Sequence[StatedLevel] = (),
+    stated: Sequence[StatedLevel | StatedRange] = (),
 ) -> Figure:
     """Draw panels of variables over a shared time axis.
 
@@ -66,7 +66,8 @@ def time_traces(
     stuck
         Variable that is 1 while shafts and pistons stick.
     stated
-        Levels that a source states; each is drawn in the first panel that shows its signal.
+        Levels and ranges that a source states; each is drawn in the first panel that shows its
+        signal.
 
     Raises
     ------

@@ -86,6 +86,25 @@ def test_links_and_files_hold_what_was_moved(pages, tmp_path):
 
 
 @needs_node
+def test_a_line_through_its_bends_is_within_a_quarter_of_a_pixel_of_every_point(pages, tmp_path):
+    rng, x = np.random.default_rng(5), np.linspace(0.0, 800.0, 1700)
+    lines = {
+        "straight": 3.0 * x, "jump": np.where(x < 300.0, 0.0, 90.0),
+        "wave": 60.0 * np.sin(0.02 * x), "noise": rng.normal(0.0, 20.0, x.size),
+    }  # fmt: skip
+    tasks = [{"kind": "bends", "x": [*x], "y": [*y], "off": 0.25} for y in lines.values()]
+    answers = tried(pages["motorcycle"], tmp_path, *tasks)
+    count = {}
+    for (name, y), each in zip(lines.items(), answers, strict=True):
+        bends = each["answer"]
+        assert (bends[0], bends[-1]) == (0, x.size - 1)
+        assert np.abs(np.interp(x, x[bends], y[bends]) - y).max() <= 0.25 + 1e-9, name
+        count[name] = len(bends)
+    assert (count["straight"], count["jump"]) == (2, 4)
+    assert count["wave"] < 200 < count["noise"]
+
+
+@needs_node
 @pytest.mark.parametrize(
     ("link", "text"),
     [
@@ -141,11 +160,20 @@ def test_texts_of_a_bench_cannot_leave_their_place(tmp_path):
     assert len(re.findall(r"<script>", text)) == 2
 
 
-def test_levels_that_a_source_states_stand_in_the_first_panel_of_their_signal(pages):
+def test_what_a_source_states_stands_in_the_first_panel_of_its_signal(pages):
     moment, *others = block(pages["wedge"], "bench")["panels"]
-    assert {each["value"] for each in moment["stated"]} >= {200.0, 160.0}
+    spans = [(each["low"], *each["levels"], each["high"]) for each in moment["stated"]]
+    assert spans == [(190.0, 200.0, 210.0), (152.0, 160.0, 168.0)]
     assert all("Fig. 7" in each["label"] for each in moment["stated"])
-    assert not any(each["value"] == 200.0 for panel in others for each in panel["stated"])
+    assert not any(panel["stated"] for panel in others)
+
+
+def test_what_a_source_states_of_key_figures_stands_beside_them(pages):
+    figures = block(pages["motorcycle"], "bench")["judged"]["figures"]
+    stated = {each["name"]: each["stated"] for each in figures}
+    assert stated["overshoot"] == {"text": "<= 15 %", "where": "section 6, requirement"}
+    assert stated["steady_state_error"]["text"] == "0 bar ± 0.05 bar"
+    assert stated["rise_time"] is None
 
 
 def test_what_a_brake_declares_stands_first_where_nobody_chose(pages):

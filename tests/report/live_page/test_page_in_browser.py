@@ -11,6 +11,8 @@ import pytest
 from page_benches import BENCHES, VARIED
 
 import bywire
+from screenshots.subjects import SUBJECTS
+from screenshots.taken import differing, taken
 
 DAILY = 3  # positions of sliders
 READY = "() => run !== null && !busy"
@@ -115,6 +117,8 @@ def test_panels_out_of_sight_follow_when_sliders_rest(tab):
 
 def test_a_link_restores_what_was_moved(tab):
     given = tab.moved({name: 417 for name in VARIED[tab.file.stem]})
+    count = len(VARIED[tab.file.stem])  # the address follows when sliders rest
+    tab.page.wait_for_function(f"() => location.hash.split('&').length > {count}")
     tab.open(tab.page.evaluate("() => location.hash"))
     again = tab.page.evaluate(GIVEN)
     assert again["changes"] == given["changes"]  # to the last bit
@@ -192,3 +196,39 @@ def test_a_browser_without_webassembly_is_told_so(tab, chromium):
     page.goto(tab.file.as_uri())
     assert "no WebAssembly" in page.evaluate(SAID)
     context.close()
+
+
+@pytest.mark.parametrize("suffix", ["", "-phone"])
+def test_a_page_looks_as_it_is_stored_in_both_themes(tab, chromium, suffix):
+    name = f"page-{tab.file.stem}{suffix}"
+    if name not in SUBJECTS:
+        pytest.skip("one phone is enough")
+    subject = SUBJECTS[name]
+    assert not differing(name, taken(chromium, tab.file.as_uri(), subject.width, subject.ready))
+
+
+def test_a_report_looks_as_it_is_stored_in_both_themes(chromium, tmp_path):
+    address = SUBJECTS["report"].write(tmp_path).as_uri()
+    assert not differing("report", taken(chromium, address))
+
+
+def test_a_panel_that_is_missing_is_seen(tab, chromium):
+    name = f"page-{tab.file.stem}"
+    hide = "() => { document.querySelectorAll('#curves canvas')[1].style.visibility = 'hidden'; }"
+    shots = taken(
+        chromium, tab.file.as_uri(), ready=SUBJECTS[name].ready, change=hide, themes=["dark"]
+    )
+    assert "differs" in differing(name, shots)
+
+
+def test_ranges_that_a_source_states_are_bands(tab):
+    count = """() => {
+      const canvas = document.querySelector("#curves canvas");
+      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      const faint = data.filter((alpha, k) => k % 4 === 3 && alpha > 30 && alpha < 50);
+      return faint.length / (data.length / 4);
+    }"""
+    tab.open()
+    stated = sum(each["high"] - each["low"] for each in tab.page.evaluate("() => panels[0].stated"))
+    assert (stated > 0.0) == (tab.file.stem == "wedge")
+    assert (tab.page.evaluate(count) > 0.05) == (stated > 0.0)

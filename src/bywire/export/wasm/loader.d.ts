@@ -22,6 +22,8 @@ export interface Options {
 export interface Recording {
   time: Float64Array;
   signals: Record<string, Float64Array>;
+  /** The same row by row: all signals of an instant, in their order, then those of the next. */
+  table: Float64Array;
   /** Whether contacts and frictions settled in all substeps, and all values are numbers. */
   settled: boolean;
 }

@@ -51,9 +51,9 @@ function rowsOf(description, given, count, interval) {
 /**
  * Compile a module; the result runs it as often as is wanted.
  *
- * `run(parameters, { stimulus, duration })` returns `{ time, signals, settled, atRest }`: signals by
- * name as Float64Array, row by row those of a bench. Parameters and stimuli that are left out are
- * the bench's; noise is none unless it is given as rows.
+ * `run(parameters, { stimulus, duration })` returns `{ time, signals, table, settled }`: signals by
+ * name as Float64Array, row by row those of a bench, or all beside each other as a table of rows.
+ * Parameters and stimuli that are left out are the bench's; noise is none unless it is given as rows.
  */
 export async function load(bytes, description) {
   const { exp, log, sin, cos, tan, atan, tanh, pow } = Math;
@@ -90,16 +90,21 @@ export async function load(bytes, description) {
       if (!areFinite(begun))
         throw new RangeError("there is no state at rest with these parameters");
       advance(u, stimulusFrames, 0, frames, 1, recordFrames, rec);
-      const table = new Float64Array(memory.buffer, rec, count * width);
-      const signals = {};
-      description.signals.forEach(({ name }, k) => {
-        const values = (signals[name] = new Float64Array(count));
-        for (let row = 0, at = k; row < count; ++row, at += width) values[row] = table[at];
-      });
+      const table = new Float64Array(memory.buffer, rec, count * width).slice(); // the next run's place
       const time = new Float64Array(count);
       for (let row = 0; row < count; ++row) time[row] = row * recordFrames * frame;
       const unsettled = new Float64Array(memory.buffer, working(), stateLength)[stateLength - 2];
-      return { time, signals, settled: unsettled === 0 && areFinite(table) };
+      let signals;
+      return {
+        time, table, settled: unsettled === 0 && areFinite(table),
+        get signals() {
+          return (signals ??= Object.fromEntries(description.signals.map(({ name }, k) => {
+            const values = new Float64Array(count);
+            for (let row = 0, at = k; row < count; ++row, at += width) values[row] = table[at];
+            return [name, values];
+          })));
+        },
+      };
     },
   };
 }

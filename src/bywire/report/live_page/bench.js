@@ -8,7 +8,7 @@ const parameters = description.parameters.filter(({ used }) => used);
 const values = Object.fromEntries(parameters.map(({ name, start }) => [name, start]));
 const kept = [];
 const place = (id) => document.getElementById(id);
-let run = null, busy = false, wanted = null, number = 0, resting = 0;
+let run = null, busy = false, wanted = null, resting = 0, slow = 0, moved = 0;
 
 function complain(text) {
   place("message").textContent = text;
@@ -27,7 +27,14 @@ function describe() {
     }).join(", ")}`
     : "as in the bench";
   place("reset").disabled = count === 0;
-  history.replaceState(null, "", count ? `#${linkOf(digest, made)}` : location.pathname + location.search);
+  clearTimeout(moved);
+  moved = setTimeout(address, REST); // browsers refuse more than some ten of these a second
+}
+
+function address() {
+  const made = changes();
+  const isChanged = Object.keys(made).length > 0;
+  history.replaceState(null, "", isChanged ? `#${linkOf(digest, made)}` : location.pathname + location.search);
 }
 
 /* Key figures beside those of the runs that were kept, and whether they are as required. */
@@ -37,6 +44,8 @@ function judge() {
   if (!judged) return;
   const following = judged.families.find(({ name }) => name === "step_response")?.figures ?? [];
   const followed = judged.followed.filter((name) => name in changes());
+  const isStated = judged.figures.some(({ stated }) => stated);
+  place("stated").hidden = !isStated;
   place("figures").tBodies[0].replaceChildren(...judged.figures.map((figure) => {
     const computed = followed.length && following.includes(figure.name)
       ? { value: NaN, reason: `an option follows ${followed}: save the bench file and run it` }
@@ -48,7 +57,9 @@ function judge() {
     const verdict = figure.limit
       ? element("td", { class: met ? "met" : "missed" }, `${met ? "✓" : "✗"} ${figure.text}`)
       : element("td", {}, computed.reason);
-    return element("tr", {}, element("th", { scope: "row", title: figure.definition }, figure.name), value, verdict);
+    const { text, where } = figure.stated ?? { text: "", where: "" };
+    const stated = isStated ? [element("td", {}, text, element("span", { class: "meaning" }, ` ${where}`))] : [];
+    return element("tr", {}, element("th", { scope: "row", title: figure.definition }, figure.name), value, verdict, ...stated);
   }));
 }
 
@@ -58,20 +69,20 @@ function ask() {
   clearTimeout(resting);
   if (busy) return;
   busy = true;
-  number += 1;
-  place("work").textContent = "running …";
-  worker.postMessage({ number, values: wanted });
+  slow = setTimeout(() => (place("work").textContent = "running …"), REST);
+  worker.postMessage({ values: wanted });
   wanted = null;
 }
 
-function answered({ data: { error, time, signals, figures, settled, loops: computed } }) {
+function answered({ data: { error, time, table, figures, settled, loops: computed } }) {
   if (computed) return views.forEach((view, k) => view.draw(computed[k]));
   busy = false;
+  clearTimeout(slow);
   if (error) {
     complain(error);
     place("work").textContent = "not run";
   } else {
-    run = { time, signals, figures };
+    run = { time, signals: columnsOf(table, time, description.signals.map(({ name }) => name)), figures };
     place("work").textContent = settled ? "" : "contacts or frictions did not settle in some step";
     place("keep").disabled = place("csv").disabled = false;
     judge();
@@ -122,6 +133,7 @@ place("csv").addEventListener("click", () =>
 place("toml").addEventListener("click", () =>
   save(`${description.name}.toml`, "application/toml", benchFile(bench.text, changes(), parameters)));
 place("link").addEventListener("click", async () => {
+  address();
   await navigator.clipboard?.writeText(location.href).catch(() => undefined);
   place("work").textContent = "the address of this page holds its values";
 });

@@ -16,33 +16,25 @@ function marginText({ reason, margins }) {
 }
 
 /** Draw a margin as a bar from one level to another at a frequency. */
-function markOf(result, at, from, to) {
-  return (plot) => {
-    const { margins } = result(), f = margins?.isStable ? at(margins) : NaN;
-    if (!Number.isFinite(f) || !Number.isFinite(to(margins))) return;
-    const { ctx, bbox } = plot, x = plot.valToPos(f, "x", true);
-    if (x < bbox.left || x > bbox.left + bbox.width) return;
-    ctx.save();
-    ctx.beginPath();
-    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-    ctx.clip();
-    ctx.strokeStyle = palette().limit;
-    ctx.lineWidth = 3 * devicePixelRatio;
-    ctx.setLineDash([]);
-    ctx.beginPath();
-    ctx.moveTo(x, plot.valToPos(from, "y", true));
-    ctx.lineTo(x, plot.valToPos(to(margins), "y", true));
-    ctx.stroke();
-    ctx.restore();
-  };
-}
+const markOf = (result, at, from, to) => clipped((ctx, _, plot) => {
+  const { margins } = result(), f = margins?.isStable ? at(margins) : NaN;
+  if (!Number.isFinite(f) || !Number.isFinite(to(margins))) return;
+  const x = plot.valToPos(f, "x", true);
+  ctx.strokeStyle = palette().limit;
+  ctx.lineWidth = 3 * devicePixelRatio;
+  ctx.setLineDash([]);
+  ctx.beginPath();
+  ctx.moveTo(x, plot.valToPos(from, "y", true));
+  ctx.lineTo(x, plot.valToPos(to(margins), "y", true));
+  ctx.stroke();
+});
 
 /** Make the diagrams of a loop; `draw(result)` shows it. */
 function bodeView(place, loop) {
   const text = element("p", { role: "status" });
   const figure = element("figure", { "aria-label": `Bode diagram of the loop ${loop.name}` });
   place.append(element("h3", {}, `Loop ${loop.name}`),
-    element("p", { class: "summary" }, `${loop.summary}; as it is sampled, cut at ${loop.cutName}, ` +
+    element("p", { class: "summary" }, `${loop.summary}; ${loop.isAnalog ? "" : "as it is sampled, "}cut at ${loop.cutName}, ` +
       `${loop.point}, dry friction left out`), text, figure);
   let plots = [], shape = "", now = null;
   const parts = [

@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-import re
 import zlib
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -25,19 +24,21 @@ from bywire.bench.kpis.in_c import entry_of, source_of
 from bywire.bench.kpis.registry import FAMILIES
 from bywire.bench.requirements import limit_of
 from bywire.bench.result import Result
-from bywire.bench.stated import StatedLevel, stated_for
+from bywire.bench.stated import StatedLevel, StatedRange, stated_figures, stated_for
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.quantities import display_unit
 from bywire.core.units import convert
 from bywire.core.version import __version__
 from bywire.export.exported import Exported
 from bywire.export.wasm.module import module_files
+from bywire.report.inline_script import bare
 from bywire.report.live_page.dependence import dependence
 from bywire.report.live_page.loops import loops_of, told
 from bywire.report.live_page.sliders import first_sliders
 from bywire.report.panels import Panel, Trace
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.policy import admitted
+from bywire.report.stated_levels import stated_figure
 from bywire.report.wording import unit_text
 from bywire.simulation.c_runtime import SCALAR
 
@@ -83,10 +84,7 @@ def page_text(
     data["digest"] = digest
     data["description"]["name"] = "".join(c if c.isalnum() else "_" for c in name)
     loader = module["bywire.mjs"].decode().replace("export async function", "async function")
-    blocks = {
-        "bench": data, "kernel": _packed(module[f"{_NAME}.wasm"]),
-        "loader": loader, "worker": "\n".join(map(_script, _WORKER)),
-    }  # fmt: skip
+    blocks = {"bench": data, "loader": bare(loader), "worker": "\n".join(map(_script, _WORKER))}
     style = _text("uplot/uPlot.min.css") + _text("live.css")
     library = f"/* {_text('uplot/LICENSE').strip()} */\n{_text('uplot/uPlot.iife.min.js')}"
     script = '"use strict";\n' + "\n".join(map(_script, _SCRIPTS))
@@ -95,7 +93,9 @@ def page_text(
         "'wasm-unsafe-eval'; "
         f"style-src {admitted(style)}; worker-src blob:; base-uri 'none'; form-action 'none'"
     )
+    # The kernel stands first: among text, what a server compresses takes 1.5 kB more for it.
     return Template(_text("page.html")).substitute(
+        kernel=_block("kernel", _packed(module[f"{_NAME}.wasm"])),
         policy=policy, title=escape(name), summary=escape(_summary(made)),
         style=style, library=library, script=script, footer=escape(_footer(made)),
         data="\n".join(_block(key, value) for key, value in blocks.items()),
@@ -168,11 +168,16 @@ def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str
         kpi.name: limit_of(kpi.name, bench.requirements[kpi.name], kpi.unit)
         for kpi in result.kpis if kpi.name in bench.requirements
     }  # fmt: skip
+    units = {kpi.name: kpi.unit for kpi in result.kpis}
+    stated = {
+        name: {"text": stated_figure(each, units[name]), "where": each.where}
+        for name, each in stated_figures(bench).items() if name in units
+    }  # fmt: skip
     figures = [
         {"name": kpi.name, "unit": unit_text(display_unit(kpi.unit)), **_shown(kpi.unit),
          "definition": kpi.definition, "text": bench.requirements.get(kpi.name, ""),
          "limit": dict(zip(("compare", "bound"), limits[kpi.name], strict=True))
-         if kpi.name in limits else None}
+         if kpi.name in limits else None, "stated": stated.get(kpi.name)}
         for kpi in result.kpis
     ]  # fmt: skip
     return {"families": [_family(name, each) for name, each in settings.items()],
@@ -181,15 +186,19 @@ def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str
 
 def _panels(
     panels: Sequence[tuple[Panel, Sequence[Trace]]], recording: xr.Dataset, used: set[str],
-    stated: Sequence[StatedLevel],
+    stated: Sequence[StatedLevel | StatedRange],
 ) -> list[dict[str, Any]]:  # fmt: skip
-    """Return the panels, each level that a source states in the first one that shows its signal."""
+    """Return the panels, what a source states of a signal in the first one that shows it."""
     shown, left = [], list(stated)
     for panel, traces in panels:
         names = {trace.variable for trace in traces}
         here = [each for each in left if each.signal in names]
         left = [each for each in left if each not in here]
-        levels = [{"label": f"stated: {each.label}", "value": each.value} for each in here]
+        levels = [
+            {"label": f"stated: {each.label}", "low": each.low, "high": each.high,
+             "levels": each.levels}
+            for each in here
+        ]  # fmt: skip
         shown.append({**_panel(panel, traces, recording, used), "stated": levels})
     return shown
 
@@ -240,8 +249,7 @@ def _block(key: str, value: Any) -> str:
 
 
 def _script(name: str) -> str:
-    """Return a script without the lines that are comments alone: they are for who changes it."""
-    return re.sub(r"^[ \t]*/\*(?:(?!\*/).)*\*/[ \t]*\n", "", _text(name), flags=re.MULTILINE)
+    return bare(_text(name))
 
 
 def _packed(module: bytes) -> str:

@@ -2,6 +2,8 @@
 
 const HEIGHT = 150; // px of a panel of height 1
 const NEAR = 0.5; // share of a limit from which its lines are drawn
+const OFF = 0.25; // px by which a drawn line may be off a point
+const DENSE = 4; // points in a column of pixels from which their extremes are drawn
 const DASHES = { "set point": [6, 4], limit: [2, 4], stated: [7, 3] };
 
 /** Return the colors of the page as they are: they change with its theme. */
@@ -16,65 +18,125 @@ function palette() {
 const converted = (values, quantity) =>
   quantity.factor === 1 && quantity.offset === 0 ? values : values.map((value) => shownOf(value, quantity));
 
-/** Return the lines of a panel: traces of the run, its limit, what a source states, and first traces of kept runs. */
+/** Return the rows at which a line bends: all between are within `off` of it, along y. x ascends. */
+function bendsOf(x, y, from, to, off) {
+  const bends = [from];
+  let at = from, low = -Infinity, high = Infinity;
+  for (let k = from + 1; k <= to; ++k) {
+    let slope = (y(k) - y(at)) / (x(k) - x(at));
+    if (!(slope >= low && slope <= high)) {
+      bends.push((at = k - 1));
+      [low, high] = [-Infinity, Infinity];
+      slope = (y(k) - y(at)) / (x(k) - x(at));
+    }
+    const wide = off / (x(k) - x(at));
+    low = Math.max(low, slope - wide);
+    high = Math.min(high, slope + wide);
+  }
+  bends.push(to);
+  return bends;
+}
+
+/** Return a line as uPlot takes it, through its bends alone: a stroke takes as long as it has corners. */
+function lineOf(plot, series, from, to) {
+  const { bbox, scales, data } = plot;
+  if (to - from > DENSE * bbox.width) return uPlot.paths.linear()(plot, series, from, to);
+  const [x, y] = [["x", data[0]], ["y", data[series]]].map(([axis, values]) => {
+    const { min, max } = scales[axis], first = plot.valToPos(min, axis, true);
+    const each = (plot.valToPos(max, axis, true) - first) / (max - min);
+    return (k) => first + each * (values[k] - min);
+  });
+  const stroke = new Path2D();
+  for (const k of bendsOf(x, y, from, to, OFF)) stroke.lineTo(Math.round(x(k)), Math.round(y(k)));
+  return { stroke, fill: null, clip: null, band: null, gaps: null, flags: 1 };
+}
+
+/** Return the lines of a panel: traces of the run, and first traces of kept runs. */
 function linesOf(panel, kept, colors) {
   const lines = panel.traces.map(({ label, role }) => ({
     label, stroke: colors[role] ?? colors.third, width: role === "main" ? 2 : 1.5,
     dash: DASHES[role], points: { show: false },
-    paths: panel.levels.length ? uPlot.paths.stepped({ align: 1 }) : undefined,
+    paths: panel.levels.length ? uPlot.paths.stepped({ align: 1 }) : lineOf,
   }));
-  const limits = panel.limit
-    ? [1, -1].map(() => ({ label: "limit", stroke: colors.limit, dash: DASHES.limit, points: { show: false } }))
-    : [];
-  const stated = panel.stated.map(({ label }) => (
-    { label, stroke: colors.third, width: 1.5, dash: DASHES.stated, points: { show: false } }));
   const others = kept.map(({ name }) => ({
-    label: name, stroke: colors.kept, width: 1.5, dash: [8, 3, 2, 3], points: { show: false },
+    label: name, stroke: colors.kept, width: 1.5, dash: [8, 3, 2, 3], points: { show: false }, paths: lineOf,
   }));
-  return [{ label: "time" }, ...lines, ...limits, ...stated, ...others];
+  return [{ label: "time" }, ...lines, ...others];
 }
 
 /** Return the numbers of a panel's lines, in their order. */
-function numbersOf(panel, run, kept, values) {
-  const { time } = run, column = ({ name }, { signals }) => converted(signals[name], panel);
-  const traces = panel.traces.map((trace) => column(trace, run));
-  const limits = [];
-  if (panel.limit) {
-    const bound = shownOf(values[panel.limit], panel);
-    const largest = traces[0].reduce((most, value) => Math.max(most, Math.abs(value)), 0);
-    for (const sign of [1, -1])
-      limits.push(Array(time.length).fill(largest > NEAR * bound ? sign * bound : null));
-  }
-  const stated = panel.stated.map(({ value }) => Array(time.length).fill(shownOf(value, panel)));
-  return [time, ...traces, ...limits, ...stated, ...kept.map((each) => column(panel.traces[0], each))];
+function numbersOf(panel, run, kept) {
+  const column = ({ name }, { signals }) => converted(signals[name], panel);
+  return [run.time, ...panel.traces.map((trace) => column(trace, run)),
+    ...kept.map((each) => column(panel.traces[0], each))];
 }
 
+/** Return what stands below a panel's curves: what a source states, and the limit that they come near. */
+function marksOf(panel, largest, values) {
+  const at = (value) => shownOf(value, panel), bound = panel.limit && at(values[panel.limit]);
+  const limits = panel.limit && largest > NEAR * bound ? [bound, -bound] : [];
+  return [...panel.stated.map(({ low, high, levels }) => (
+    { role: "stated", low: at(low), high: at(high), levels: levels.map(at) })),
+  ...limits.map((level) => ({ role: "limit", low: level, high: level, levels: [level] }))];
+}
+
+/** Return a drawing that stays within the axes. */
+const clipped = (draw) => (plot) => {
+  const { ctx, bbox } = plot;
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+  ctx.clip();
+  draw(ctx, bbox, plot);
+  ctx.restore();
+};
+
+/** Draw ranges as bands, and levels as lines across the axes. */
+const drawMarks = (marks, color) => clipped((ctx, { left, width }, plot) => {
+  const place = (value) => plot.valToPos(value, "y", true);
+  for (const { low, high, levels, role } of marks()) {
+    ctx.fillStyle = ctx.strokeStyle = color(role);
+    ctx.lineWidth = 1.5 * devicePixelRatio;
+    ctx.setLineDash(DASHES[role].map((length) => length * devicePixelRatio));
+    ctx.globalAlpha = 0.15;
+    ctx.fillRect(left, place(high), width, place(low) - place(high));
+    ctx.globalAlpha = 1;
+    ctx.beginPath();
+    for (const level of levels) {
+      ctx.moveTo(left, place(level));
+      ctx.lineTo(left + width, place(level));
+    }
+    ctx.stroke();
+  }
+});
+
 /** Draw a bar along the upper edge while a signal is 1. */
-function barOf(panel, runNow, colors) {
-  return (plot) => {
-    const on = panel.saturation && runNow()?.signals[panel.saturation];
-    if (!on) return;
-    const { ctx, bbox } = plot, { time } = runNow();
-    ctx.save();
-    ctx.fillStyle = colors.bar;
-    for (let k = 0; k + 1 < time.length; ++k)
-      if (on[k] > 0.5) {
-        const from = Math.max(bbox.left, plot.valToPos(time[k], "x", true));
-        const to = Math.min(bbox.left + bbox.width, plot.valToPos(time[k + 1], "x", true));
-        if (to > from) ctx.fillRect(from, bbox.top, to - from, 5 * devicePixelRatio);
-      }
-    ctx.restore();
-  };
+const drawBar = (panel, runNow, colors) => clipped((ctx, { top }, plot) => {
+  const on = panel.saturation && runNow()?.signals[panel.saturation];
+  if (!on) return;
+  const { time } = runNow(), place = (k) => plot.valToPos(time[k], "x", true);
+  ctx.fillStyle = colors.bar;
+  for (let k = 0; k + 1 < time.length; ++k)
+    if (on[k] > 0.5) ctx.fillRect(place(k), top, place(k + 1) - place(k), 5 * devicePixelRatio);
+});
+
+/** Say in a legend what is drawn below the curves. */
+function named(plot, marks, color) {
+  for (const { label, role } of marks) {
+    const swatch = element("div", { class: "u-marker" }), name = element("div", { class: "u-label" }, label);
+    swatch.style.border = `2px dashed ${color(role)}`;
+    plot.root.querySelector(".u-legend").append(element("tr", { class: "u-series mark" }, element("td", {}, swatch, name)));
+  }
 }
 
 /** Make the plots of all panels; `draw(run, kept, values)` shows a run. */
 function curves(place, panels) {
   let plots = [], shape = "", current = null, waiting = new Map(), later = 0;
-  const inSight = new Set();
+  const marks = panels.map(() => []), inSight = new Set();
   const observer = new IntersectionObserver((entries) => {
     for (const { target, isIntersecting } of entries) inSight[isIntersecting ? "add" : "delete"](target);
     show(inSight);
-  }, { rootMargin: "25%" });
+  });
   /* Draw what waits, of all panels or of some. */
   function show(figures) {
     for (const [figure, set] of waiting)
@@ -85,7 +147,7 @@ function curves(place, panels) {
   }
   const width = () => Math.max(280, place.clientWidth);
   function make(kept) {
-    const colors = palette();
+    const colors = palette(), color = (role) => (role === "limit" ? colors.limit : colors.third);
     plots.forEach((plot) => plot.destroy());
     observer.disconnect();
     inSight.clear();
@@ -97,12 +159,15 @@ function curves(place, panels) {
       const figure = element("figure", { "aria-label": `${panel.quantity} over time` });
       place.append(figure);
       observer.observe(figure);
-      const names = panel.levels;
-      return new uPlot({
+      const names = panel.levels, ends = () => marks[k].flatMap(({ low, high }) => [low, high]);
+      const plot = new uPlot({
         width: width(), height: HEIGHT * panel.height + (last ? 50 : 30),
-        scales: { x: { time: false } }, legend: { live: true },
+        scales: { x: { time: false }, y: { range: (_, low, high) => (low === null ? [null, null]
+          : uPlot.rangeNum(Math.min(low, ...ends()), Math.max(high, ...ends()), 0.1, true)) } },
+        legend: { live: true },
         cursor: { sync: { key: "time" }, drag: { x: true, y: false } },
-        series: linesOf(panel, kept, colors), hooks: { draw: [barOf(panel, () => current, colors)] },
+        series: linesOf(panel, kept, colors),
+        hooks: { drawAxes: [drawMarks(() => marks[k], color)], draw: [drawBar(panel, () => current, colors)] },
         axes: [
           { ...axis, label: last ? "time [s]" : undefined, labelSize: 20, size: 30 },
           { ...axis, label: panel.quantity + unit, labelSize: 20, size: 62,
@@ -110,6 +175,9 @@ function curves(place, panels) {
               values: (_, levels) => levels.map((level) => names[level] ?? "") }) },
         ],
       }, null, figure);
+      const limit = panel.limit ? [{ label: "limit", role: "limit" }] : [];
+      named(plot, [...panel.stated.map(({ label }) => ({ label, role: "stated" })), ...limit], color);
+      return plot;
     });
   }
   function draw(run, kept, values) {
@@ -117,8 +185,12 @@ function curves(place, panels) {
     const now = `${width()} ${kept.map(({ name }) => name)}`;
     if (now !== shape) make(kept);
     shape = now;
-    waiting = new Map(plots.map((plot, k) =>
-      [plot.root.parentElement, () => plot.setData(numbersOf(panels[k], run, kept, values))]));
+    waiting = new Map(plots.map((plot, k) => [plot.root.parentElement, () => {
+      const numbers = numbersOf(panels[k], run, kept);
+      const largest = numbers[1].reduce((most, value) => Math.max(most, Math.abs(value)), 0);
+      marks[k] = marksOf(panels[k], largest, values);
+      plot.setData(numbers);
+    }]));
     show(inSight); // the others when sliders rest, or they come into sight
     clearTimeout(later);
     later = setTimeout(() => show(), REST);

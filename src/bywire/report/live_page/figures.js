@@ -1,17 +1,16 @@
 /* Key figures of a run, by the C of their families, which stands in the module beside the kernel. */
 
 /** Return what a bench records of a run: time from the end of settling on, and what is kept before. */
-function recordingOf({ time, signals }, settle, keep) {
+function recordingOf({ time, table }, settle, keep) {
   const begin = time.findIndex((t) => t >= settle - keep - 1e-9);
-  const cut = Object.entries(signals).map(([name, column]) => [name, column.slice(begin)]);
   const since = time.slice(begin).map((t) => Math.round((t - settle) * 1e12) / 1e12);
-  return { time: since, signals: Object.fromEntries(cut) };
+  return { time: since, table: table.subarray(begin * (table.length / time.length)) };
 }
 
 /** Return all figures of a family by name: a number, or why there is none. */
-function familyOf({ memory, room, ...functions }, time, signals, family) {
-  const count = time.length, columns = family.signals.map((name) => signals[name]);
-  const here = columns.filter(Boolean).length, figures = family.figures.length;
+function familyOf({ memory, room, ...functions }, { time, table }, names, family) {
+  const count = time.length, columns = family.signals.map((name) => names.indexOf(name));
+  const here = columns.filter((k) => k >= 0).length, figures = family.figures.length;
   const numbers = count * (1 + here + family.room) + family.setting.length + 3 * figures + 2 * columns.length;
   const begin = (room() + 15) & ~15, missing = begin + 8 * numbers - memory.buffer.byteLength;
   if (missing > 0) memory.grow(Math.ceil(missing / 65536));
@@ -20,7 +19,8 @@ function familyOf({ memory, room, ...functions }, time, signals, family) {
     new Float64Array(memory.buffer, free, values.length).set(values);
     return (free += 8 * values.length) - 8 * values.length;
   };
-  const t = placed(time), starts = columns.map((column) => (column ? placed(column) : 0));
+  const column = (k) => time.map((_, row) => table[row * names.length + k]);
+  const t = placed(time), starts = columns.map((k) => (k < 0 ? 0 : placed(column(k))));
   const setting = placed(family.setting), work = free, values = work + 8 * count * family.room;
   const reasons = values + 8 * figures, rows = reasons + 8 * figures;
   const places = new Uint32Array(memory.buffer, rows, 4 * columns.length).fill(0);
@@ -35,5 +35,5 @@ function familyOf({ memory, room, ...functions }, time, signals, family) {
 }
 
 /** Return all key figures of a run by name. */
-const keyFigures = (exported, time, signals, families) =>
-  Object.fromEntries(families.flatMap((family) => familyOf(exported, time, signals, family)));
+const keyFigures = (exported, recording, names, families) =>
+  Object.fromEntries(families.flatMap((family) => familyOf(exported, recording, names, family)));

@@ -1,5 +1,5 @@
-/* Loops as they are sampled, from the Jacobians that the module computes: response and margins. The
- * definitions are those of bywire.margins. Matrices are arrays of rows. */
+/* Loops as they are sampled, or analog, from the Jacobians that the module computes: response and margins.
+ * The definitions are those of bywire.margins. Matrices are arrays of rows. */
 
 const TOUCH = 1e-12; // m, below which a contact counts as neither closed nor open
 const LOWEST = 1e-2, NYQUIST = 0.998, POINTS = 2000; // Hz, share of half the sampling frequency
@@ -103,8 +103,17 @@ function cutOpen({ A, ticks }, { cut, held, every }) {
 const divisor = (a, b) => (b ? divisor(b, a % b) : a);
 const leastCommon = (a, b) => a / divisor(a, b) * b;
 
-/** Return the loop gain as a sampled model, the cut its input and (with a minus) its output. */
+/** Return an analog loop's gain: what reads the cut state reads an input; its own decay is no feedback and stays. */
+function analogGain({ A }, { cut: { at }, every, frame }) {
+  const B = A.map((row, i) => (i === at ? 0 : row[at]));
+  const opened = A.map((row, i) => row.map((value, j) => (j === at && i !== at ? 0 : value)));
+  const C = A.map((_, k) => (k === at ? -1 : 0));
+  return { ...effective(opened, B, C, every.reduce(leastCommon) * frame), isAnalog: true };
+}
+
+/** Return the loop gain as a model, the cut its input and (with a minus) its output. */
 function gainOf(found, loop) {
+  if (loop.isAnalog) return analogGain(found, loop);
   const opened = cutOpen(found, loop);
   if (!opened) return null;
   const { states: n, held: m, every, frame } = loop, common = every.reduce(leastCommon);
@@ -143,12 +152,13 @@ function effective(A, B, C, period) {
   };
 }
 
-/** Return the response C (z - A)^-1 B at a frequency [Hz], by elimination with the largest pivots. */
-function responseAt({ A, B, C, period }, frequency) {
-  const n = A.length, angle = 2 * Math.PI * frequency * period;
+/** Return the response C (z - A)^-1 B at a frequency [Hz], by elimination with the largest pivots; of an analog model, at s. */
+function responseAt({ A, B, C, period, isAnalog }, frequency) {
+  const n = A.length, omega = 2 * Math.PI * frequency;
+  const [x, y] = isAnalog ? [0, omega] : [Math.cos(omega * period), Math.sin(omega * period)];
   const re = A.map((row, i) => Float64Array.of(...row.map((value) => -value), B[i]));
   const im = A.map(() => new Float64Array(n + 1));
-  for (let i = 0; i < n; ++i) (re[i][i] += Math.cos(angle)), (im[i][i] = Math.sin(angle));
+  for (let i = 0; i < n; ++i) (re[i][i] += x), (im[i][i] = y);
   for (let k = 0; k < n; ++k) {
     let best = k, largest = 0;
     for (let i = k; i < n; ++i) {
@@ -161,10 +171,10 @@ function responseAt({ A, B, C, period }, frequency) {
     for (let i = k + 1; i < n; ++i) {
       const c = re[i], d = im[i];
       if (c[k] === 0 && d[k] === 0) continue;
-      const x = (c[k] * a[k] + d[k] * b[k]) / size, y = (d[k] * a[k] - c[k] * b[k]) / size;
+      const share = (c[k] * a[k] + d[k] * b[k]) / size, turned = (d[k] * a[k] - c[k] * b[k]) / size;
       for (let j = k + 1; j <= n; ++j) {
-        c[j] -= x * a[j] - y * b[j];
-        d[j] -= x * b[j] + y * a[j];
+        c[j] -= share * a[j] - turned * b[j];
+        d[j] -= share * b[j] + turned * a[j];
       }
     }
   }
@@ -175,18 +185,20 @@ function responseAt({ A, B, C, period }, frequency) {
       a[n] -= a[j] * re[j][n] - b[j] * im[j][n];
       b[n] -= a[j] * im[j][n] + b[j] * re[j][n];
     }
-    const size = a[k] * a[k] + b[k] * b[k], x = (a[n] * a[k] + b[n] * b[k]) / size;
+    const size = a[k] * a[k] + b[k] * b[k], value = (a[n] * a[k] + b[n] * b[k]) / size;
     b[n] = (b[n] * a[k] - a[n] * b[k]) / size;
-    a[n] = x;
+    a[n] = value;
     real += C[k] * a[n];
     imaginary += C[k] * b[n];
   }
   return [real, imaginary];
 }
 
-/** Return the closed loop's growth in a sample: the root of a high power's size. */
-function growthOf({ A, B, C }) {
-  let X = A.map((row, i) => Float64Array.from(row, (value, j) => value - B[i] * C[j])), total = 0, power = 1;
+/** Return the closed loop's growth in a sample, or as long: the root of a high power's size. */
+function growthOf({ A, B, C, period, isAnalog }) {
+  const closed = A.map((row, i) => Float64Array.from(row, (value, j) => value - B[i] * C[j]));
+  let X = isAnalog ? exponential(closed.map((row) => row.map((value) => value * period))) : closed;
+  let total = 0, power = 1;
   for (let k = 0; k < 40; ++k) {
     const size = Math.max(...X.map((row) => row.reduce((sum, value) => sum + Math.abs(value), 0)));
     if (size === 0) return 0;

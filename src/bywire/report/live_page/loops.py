@@ -15,7 +15,7 @@ def loops_of(made: Exported) -> list[LoopSource]:
     par = made.run.par
     shown = [
         loop for loop in LOOPS.all().values()
-        if loop.proof == made.bench.experiment and not loop.analog
+        if loop.proof == made.bench.experiment
         and made.bench.definition.assembly == loop.assembly
     ]  # fmt: skip
     sources = [loop_source(loop, par) for loop in shown]
@@ -32,6 +32,6 @@ def told(source: LoopSource) -> dict[str, Any]:
         "name": loop.name, "summary": loop.summary, "point": point, "cutName": loop.cut,
         "entry": source.entry, "size": source.size, "contacts": source.contacts,
         "states": len(source.states), "held": len(source.memory), "every": list(source.every),
-        "frame": source.frame, "from": loop.band[0],
+        "frame": source.frame, "from": loop.band[0], "isAnalog": loop.analog,
         "cut": {"isState": is_state, "at": names.index(loop.cut)},
     }  # fmt: skip

@@ -1,4 +1,4 @@
-/* Margins of a sampled loop gain L, negative feedback not counted; definitions as in bywire.margins. */
+/* Margins of a loop gain L, negative feedback not counted; definitions as in bywire.margins. */
 
 const DEGREE = 180 / Math.PI;
 const wrapped = (angle) => angle - 360 * Math.floor((angle + 180) / 360);
@@ -47,8 +47,8 @@ function gainMargin({ frequency, L }, model) {
     const share = b / (b - d);
     real.push({ size: Math.abs(a + share * (c - a)), at: frequency[k] * (frequency[k + 1] / frequency[k]) ** share });
   }
-  const last = 0.5 / model.period;
-  real.push({ size: Math.max(-responseAt(model, last)[0], 0), at: last });
+  const last = 0.5 / model.period; // where a sampled one is real
+  if (!model.isAnalog) real.push({ size: Math.max(-responseAt(model, last)[0], 0), at: last });
   const able = real.filter(({ size }) => size > 0 && size < 1);
   return able.reduce((least, { size, at }) => (1 / size < least.gain ? { gain: 1 / size, gainAt: at } : least),
     { gain: Infinity, gainAt: NaN });

@@ -78,6 +78,17 @@ function isMet({ value }, { compare, bound }) {
     : compare === "<" ? value < bound : value > bound;
 }
 
+/** Return signals by name, each taken out of a table of rows when it is first asked for. */
+function columnsOf(table, time, names) {
+  const signals = {};
+  names.forEach((name, k) => Object.defineProperty(signals, name, { enumerable: true, configurable: true, get() {
+    const value = time.map((_, row) => table[row * names.length + k]);
+    Object.defineProperty(signals, name, { value });
+    return value;
+  } }));
+  return signals;
+}
+
 /** Return recorded signals as CSV, units in the heads, all SI. */
 function csvOf(time, signals, known) {
   const heads = ["time [s]", ...known.map(({ name, unit }) => `${name} [${unit}]`)];

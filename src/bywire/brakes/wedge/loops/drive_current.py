@@ -7,6 +7,7 @@ from typing import cast
 from bywire.analysis.loop import Loop, Point, Quantity
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.shaft_rig import Memory, ShaftRig, Stimulus
+from bywire.core import ops
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
@@ -46,6 +47,8 @@ def point(par: ParameterSet, value: float) -> Point:
 
 
 def _require_reachable(value: float, par: WedgeParameters) -> None:
+    if ops.is_symbol(par.drive.V_dc):
+        return
     drive, motor = par.drive, par.motor_1
     held = abs(value) / drive.G_sense
     torque = servo_motor.torque_constant(motor) * held

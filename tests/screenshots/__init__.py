@@ -1,0 +1,1 @@
+"""Screenshots of pages: how they are taken, stored and compared."""
