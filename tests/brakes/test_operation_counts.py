@@ -71,6 +71,8 @@ WEDGE: list[tuple[dict[str, Any], Counts]] = [
      (1534, 3622, 450, (70,))),
     ({"motor_heat.law": "lumped", "control.derating.law": "current"},
      (1605, 3693, 477, (109, 158))),
+    ({"adjuster.law": "screw", "control.adjuster.ways": "both",
+      "control.adjuster.fault": "none"}, (1557, 3646, 456, (109, 75, 98))),
     ({"command.mode": "current"}, (1528, 3616, 450, (3,))),
 ]
 RIGS: list[tuple[type[Model], dict[str, Any], Counts]] = [

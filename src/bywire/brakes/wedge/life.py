@@ -86,7 +86,7 @@ def between(
     seen = z["clearance"] + readings["beyond"] - law.growth * (T - law.T_cold)
     state, out = wear_adjuster.output(
         wear_adjuster.State(applied=1.0, wide=z["wide"], teeth=z["counted"]),
-        wear_adjuster.Input(gap=seen, T=T, parked=1.0, wanted=0.0), law,
+        wear_adjuster.Input(gap=seen, T=T, touching=0.0, parked=1.0, wanted=0.0), law,
     )  # fmt: skip
     return {
         **z,
@@ -135,6 +135,7 @@ WEDGE_PADS = Life(
         "adjuster.applications": chosen(3.0, "a single odd application does not turn it"),
         "adjuster.growth": derived(12e-6 * 28e-3, "12e-6 1/K of cast iron, a disc of 28 mm"),
         "adjuster.T_cold": chosen(293.15, "20 degC"),
+        "adjuster.ways": chosen("closing", "wear alone moves the clearance"),
         "adjuster.fault": chosen("none", "sound"),
         "h_new": chosen(10e-3, "front pads of a mid-size car"),
         "h_min": chosen(2e-3, "usual limit of wear"),

@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Literal
 
 from bywire.brakes.wedge.elements import brake_heart, wedge, wedge_caliper, wedge_friction
-from bywire.brakes.wedge.laws import moment_control, screw_offset
+from bywire.brakes.wedge.laws import gap_adjusting, moment_control, screw_offset
 from bywire.brakes.wedge.rigs import rig_parameters
 from bywire.control import derating, position_pd
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.plant import (
     axial_bearing,
+    clearance_adjuster,
     current_drive,
     drive_supply,
     end_stop,
@@ -46,6 +47,7 @@ class ControlParameters(ParameterSet):
     derating: derating.Parameters
     offset: screw_offset.Parameters
     moment: moment_control.Parameters
+    adjuster: gap_adjusting.Parameters
 
 
 class WedgeParameters(ParameterSet):
@@ -63,6 +65,7 @@ class WedgeParameters(ParameterSet):
     wedge_friction: wedge_friction.Parameters
     stop: end_stop.Parameters
     caliper: wedge_caliper.Parameters
+    adjuster: clearance_adjuster.Parameters
     flywheel: flywheel.Parameters
     moment_sensor: moment_sensor.Parameters
     encoder: shaft_encoder.Parameters

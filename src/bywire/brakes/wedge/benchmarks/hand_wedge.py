@@ -34,6 +34,7 @@ SUBJECT = _Wedge(
         "screw.law": ("load",),
         "wedge_friction.stopped_disc": ("drop",),
         "caliper.law": ("linear",),
+        "adjuster.law": ("none",),
         "flywheel.law": ("coasting",),
         "encoder.law": ("ideal", "quantized"),
         "control.offset.law": ("preload",),
