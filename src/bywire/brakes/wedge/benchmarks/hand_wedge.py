@@ -35,6 +35,8 @@ SUBJECT = _Wedge(
         "wedge_friction.stopped_disc": ("drop",),
         "caliper.law": ("linear",),
         "adjuster.law": ("none",),
+        "control.adjuster.ways": ("both",),
+        "control.adjuster.fault": ("none",),
         "flywheel.law": ("coasting",),
         "encoder.law": ("ideal", "quantized"),
         "control.offset.law": ("preload",),
