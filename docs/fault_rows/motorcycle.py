@@ -39,10 +39,10 @@ PHASE = (
 LATE = (
     "five ticks late the current loop is beyond its margin: where its phase crosses -180 degrees, "
     "at 44 Hz, its gain is 1.28, and without dither it swings by itself, at 41 Hz with 18 A. The "
-    "50 Hz of the dither come out 4.6 times as large, 13.5 A, with 3.6 A of 41 Hz beside them. That "
+    "50 Hz of the dither come out 4.6 times as large, 13.5 A, with 3.6 A of 41 Hz beside them. So "
     "near the resonance its gain decides: a tenth more or less of its integral part gives 12.1 or "
-    "8.1 A, and 7 A belong to 17 % less. No way of counting ours gives 7: half its range is 17.3 A, "
-    "its mean deviation 8.8 A"
+    "8.1 A, and 7 A belong to 17 % less. How the stated one was counted is not known: half the "
+    "range of ours is 17.3 A, its mean deviation 8.8 A, and it is 6.5 A above the healthy one's"
 )
 RIGID = "our line is rigid, as the paper's: nothing but the pads gives way"
 
