@@ -19,7 +19,7 @@ def remarks(result: Result) -> list[str]:
     """Return what was changed from the cited set, and what a run did instead of what was asked.
 
     A run is remarkable that is stuck more than half of its time, at a limit more than a tenth of
-    it, or that ends off its set point by more than a twentieth of the step; and what its model says.
+    it, or that ends off its set point by more than a twentieth of the step; what its model says is.
     """
     return [*_changes(result), *unexpected(result)]
 

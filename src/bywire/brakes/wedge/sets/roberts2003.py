@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.sets import adjuster
 from bywire.core.catalog import CitedSet
 from bywire.core.provenance import Cited, calibrated, chosen, derived, paper
 
@@ -27,7 +28,6 @@ _DEGREE, _MICRO = math.pi / 180.0, 1e-6
 _ALPHA, _MU_B, _K_CAL, _R_B, _LEAD = 20.0 * _DEGREE, 0.35, 30e6, 0.125, 2e-3
 _R, _L, _V, _LOOP_RATE = 0.45, 0.2e-3, 48.0, 2.0 * math.pi * 1200.0
 _SLOPE = _LEAD / (2.0 * math.pi)
-_TOOTH, _GROWTH = 0.08e-3, 12e-6 * 28e-3
 _MU_B_HIGH, _ALPHA_STEEP = 0.45, 24.5 * _DEGREE
 
 
@@ -131,9 +131,6 @@ _MECHANICAL = {
     "caliper.tau_cal": chosen(20 * _MICRO, "light damping"),
     "caliper.clearance": chosen(0.2e-3, "usual running clearance"),
     "caliper.r_B": chosen(_R_B, "a passenger car's front disc"),
-    "adjuster.law": chosen("none", "the paper wants one for its next prototype"),
-    "adjuster.tooth": chosen(_TOOTH, "below the band of its law: it never turns too far"),
-    "adjuster.tau_turn": chosen(5e-3, "a tooth in some 30 ms, a small geared motor's"),
 }
 
 _STAND = {
@@ -174,18 +171,7 @@ _CONTROL = {
     "control.moment.M_on": chosen(5.0, "below the contact threshold"),
     "control.moment.M_contact": chosen(12.0, "above the sensor's offset"),
     "control.moment.Omega_still": chosen(0.5, "a twelfth of a revolution per second"),
-    "control.adjuster.T_adjust": chosen(0.02, "short beside an application, and time for a tooth"),
-    "control.adjuster.gap_nominal": chosen(0.2e-3, "the clearance of the new brake"),
-    "control.adjuster.band": chosen(0.1e-3, "7 ms more until the pads touch"),
-    "control.adjuster.gap_min": chosen(0.13e-3, "what a disc 400 K hotter takes away"),
-    "control.adjuster.tooth": chosen(_TOOTH, "the controller knows its screw"),
-    "control.adjuster.applications": chosen(3.0, "a single odd application does not turn it"),
-    "control.adjuster.growth": derived(_GROWTH, "12e-6 1/K of cast iron, a disc of 28 mm"),
-    "control.adjuster.T_cold": chosen(293.15, "20 degC"),
-    "control.adjuster.ways": chosen("both", "clearance taken in error is given back"),
-    "control.adjuster.fault": chosen("none", "sound"),
     "control.adjuster.gap_slope_hat": derived(_SLOPE * math.tan(_ALPHA), "L/2pi tan(alpha)"),
-    "control.adjuster.T_disc_hat": chosen(293.15, "20 degC: on the stand no disc warms"),
     "command.mode": chosen("moment", "the experiment decides"),
 }
 
@@ -209,6 +195,7 @@ _VALUES = {
     **_MECHANICAL,
     **_STAND,
     **_CONTROL,
+    **adjuster.IN_ECU,
     **_RIG,
 }
 
