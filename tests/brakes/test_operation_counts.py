@@ -72,7 +72,7 @@ WEDGE: list[tuple[dict[str, Any], Counts]] = [
     ({"motor_heat.law": "lumped", "control.derating.law": "current"},
      (1605, 3693, 477, (109, 158))),
     ({"adjuster.law": "screw", "control.adjuster.ways": "both",
-      "control.adjuster.fault": "none"}, (1557, 3646, 456, (109, 75, 98))),
+      "control.adjuster.fault": "none"}, (1548, 3637, 456, (114, 72, 98))),
     ({"command.mode": "current"}, (1528, 3616, 450, (3,))),
 ]
 RIGS: list[tuple[type[Model], dict[str, Any], Counts]] = [

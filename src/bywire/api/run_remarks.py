@@ -49,10 +49,11 @@ def _of_models(result: Result) -> list[str]:
     """Return what the models say of their runs; the same of several of them once."""
     texts: dict[str, None] = {}
     for recording in result.recordings.values():
-        model, text = recording.attrs.get("model"), recording.attrs.get("parameters")
-        if model in ASSEMBLIES.all() and text is not None and recording.sizes.get("time"):
+        model = ASSEMBLIES.all().get(str(recording.attrs.get("model")))
+        text = recording.attrs.get("parameters")
+        if model is not None and text is not None and recording.sizes.get("time"):
             par = type(result.bench.par).model_validate_json(text)
-            texts |= dict.fromkeys(ASSEMBLIES.find(model)().remarks(recording, par))
+            texts |= dict.fromkeys(model().remarks(recording, par))
     return list(texts)
 
 

@@ -1,6 +1,6 @@
-"""Adjuster's screw: takes clearance away by whole teeth, a moment after they are turned.
+"""Adjuster's screw: takes clearance away while it is turned, and stays where it is else.
 
-What turns it is held by a controller; it is self-locking, so that no load drives it.
+A controller holds how fast it turns; it is self-locking, so that no load drives it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Lag = Annotated[float, Unit("s", 5e-3), Field(gt=0, allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):
-    """A screw that comes to where it is turned, critically damped.
+    """A screw that follows its drive with a lag of first order.
 
     ``law``: ``"screw"``; ``"none"``: the brake has no adjuster.
     """
@@ -27,7 +27,7 @@ class Parameters(ParameterSet):
     tooth: Length
     """clearance that a tooth takes away"""
     tau_turn: Lag
-    """time constant with which it comes to where it is turned"""
+    """time constant with which its speed follows that of its drive"""
 
 
 class State(NamedTuple):
@@ -45,22 +45,22 @@ class Rate(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Where it is turned."""
+    """How it is turned."""
 
-    teeth: Annotated[float, Signal("1", "teeth turned since the start", 3.0)]
+    turning: Annotated[float, Signal("1/s", "teeth turned in a second", 50.0)]
 
 
 def rate(x: State, u: Input, par: Parameters) -> Rate:
     r"""Return how the screw moves.
 
-    .. math:: \tau^2 \ddot c + 2 \tau \dot c + c = n s
+    .. math:: \tau \ddot c + \dot c = s \dot n
 
-    with n teeth of s turned.
+    with teeth of s, turned at a speed. In the end the clearance has changed by whole teeth, as
+    long as whole teeth were turned.
     """
     if par.law == "none":
         return Rate(0.0, 0.0)
-    left = par.tooth * u.teeth - x.taken
-    return Rate(x.taking, (left / par.tau_turn - 2.0 * x.taking) / par.tau_turn)
+    return Rate(x.taking, (par.tooth * u.turning - x.taking) / par.tau_turn)
 
 
 def moved(x: State, par: Parameters) -> State:

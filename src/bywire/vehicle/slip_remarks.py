@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 from bywire.core.typing import Array
 from bywire.plant import adhesion, road
 from bywire.vehicle.surfaces import surface_name
@@ -36,16 +38,15 @@ def far_from_peak(
         slip that is held.
     """
     met = place[acts > 0.5]
+    is_further = cast("Array", road.share(cast("Any", met), ways)) > 0.5
     texts: dict[str, None] = {}
-    for x in (met[road.share(met, ways) <= 0.5][:1], met[road.share(met, ways) > 0.5][:1]):
-        if not x.size:
-            continue
-        ground = road.surface(float(x[0]), ways)
+    for x in (*met[~is_further][:1], *met[is_further][:1]):
+        ground = road.surface(float(x), ways)
         peak = float(adhesion.peak_slip(ground, curve))
         if not peak > FAR * slip_set:
             continue
         most, held = (float(adhesion.adhesion(slip, ground, curve)) for slip in (peak, slip_set))
-        name = surface_name(float(x[0]), ways)
+        name = surface_name(float(x), ways)
         surface = "the road" if name == "own" else name
         texts[
             f"slip control holds a slip of {slip_set:.3g} ({parameter}), but {surface} holds most "

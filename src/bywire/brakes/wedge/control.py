@@ -53,6 +53,8 @@ class Memory(NamedTuple):
     i_most: Annotated[float, Signal("A", "limit of both current demands", 20.0)]
     derated: Annotated[float, Signal("1", "motors derated")]
     adjusting: Annotated[float, Signal("1", "adjuster: 0 waits, 1 brake applied, 2 turns", 2.0)]
+    click_rate: Annotated[float, Signal("1/s", "teeth that the adjuster turns in a second", 50.0)]
+    meant_rate: Annotated[float, Signal("1/s", "teeth that it means to turn in a second", 50.0)]
     clicks: Annotated[float, Signal("1", "teeth that the adjuster has turned", 3.0)]
     gap_hat: Annotated[float, Signal("m", "clearance as the adjuster believes it", 2e-4)]
     applied: Annotated[float, Signal("1", "the brake was applied since it was parked last")]
@@ -72,6 +74,9 @@ class Readings(NamedTuple):
 def moment_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
     """Run the moment control once: its output is the speed of the common angle reference."""
     control, T = par.control.moment, par.control.T_slow
+    if par.adjuster.law != "none":
+        contact = gap_adjusting.contact(m.theta_c, m.meant_rate, T, par.control.adjuster)
+        m = m._replace(theta_c=contact)
     rotation = ops.where(r.Omega < 0, -1.0, 1.0)
     direction = ops.where(m.mode < 0.5, rotation, m.direction)
     measured = rotation * r.M
@@ -129,15 +134,21 @@ def position_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> 
 
 
 def adjuster_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
-    """Run the adjuster once: what it turns, the moment control knows at once."""
+    """Run the adjuster once: what it turns takes it a sample, and the moment control follows."""
+    own = par.control.adjuster
     wanted = ops.where(u.M_set > par.control.moment.M_on, 1.0, 0.0)
     x, out = gap_adjusting.output(
-        gap_adjusting.State(m.applied, m.wide, m.teeth, m.theta_c),
-        gap_adjusting.Input(m.mode, wanted),
-        par.control.adjuster,
+        gap_adjusting.State(m.applied, m.wide, m.teeth),
+        gap_adjusting.Input(m.theta_c, m.mode, wanted),
+        own,
     )
     return m._replace(
-        adjusting=out.mode, clicks=m.clicks + out.turned, gap_hat=out.gap, **x._asdict()
+        adjusting=out.mode,
+        click_rate=out.turned / own.T_adjust,
+        meant_rate=out.teeth / own.T_adjust,
+        clicks=m.clicks + out.turned,
+        gap_hat=out.gap,
+        **x._asdict(),
     )
 
 

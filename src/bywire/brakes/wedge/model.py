@@ -141,7 +141,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         w.heart.u = brake_heart.Input(
             k * left.theta, k * right.theta, x.x, k * left.omega, k * right.omega, x.v
         )
-        w.adjuster.u = clearance_adjuster.Input(w.m.clicks)
+        w.adjuster.u = clearance_adjuster.Input(w.m.click_rate)
         taken = clearance_adjuster.moved(w.adjuster.xe, par.adjuster)
         w.caliper.u = wedge_caliper.Input(
             x=x.x,

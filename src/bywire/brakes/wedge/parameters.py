@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
+from pydantic import model_validator
+
 from bywire.brakes.wedge.elements import brake_heart, wedge, wedge_caliper, wedge_friction
 from bywire.brakes.wedge.laws import gap_adjusting, moment_control, screw_offset
 from bywire.brakes.wedge.rigs import rig_parameters
@@ -72,3 +74,13 @@ class WedgeParameters(ParameterSet):
     control: ControlParameters
     command: CommandParameters
     rig: rig_parameters.Parameters
+
+    @model_validator(mode="after")
+    def _follows_the_adjuster(self) -> WedgeParameters:
+        T, slow = self.control.adjuster.T_adjust, self.control.T_slow
+        if self.adjuster.law != "none" and abs(T / slow - round(T / slow)) > 1e-6:
+            raise ValueError(
+                f"control.adjuster.T_adjust = {T:g} s must be a whole number of "
+                f"control.T_slow = {slow:g} s: the moment control follows what turns in a sample"
+            )
+        return self

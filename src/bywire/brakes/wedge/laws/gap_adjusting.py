@@ -1,7 +1,7 @@
 """The wedge brake's adjuster in its ECU: it reads the gap from the moment control, which it tells.
 
-The way from parking to contact is what the moment control believes. What the adjuster takes away
-comes off that, so that the next application does not creep over a gap that is there no more.
+The way from parking to contact is what the moment control believes. What the adjuster means to take
+away comes off that, so that the next application does not creep through a gap that is gone.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Parameters(wear_adjuster.Parameters):
     """The adjuster's law, when it runs, and what it believes."""
 
     T_adjust: Duration
-    """sample time"""
+    """sample time, in which all teeth turn that are due"""
     gap_slope_hat: Slope
     """clearance per motor angle, as it believes it"""
     T_disc_hat: Temperature
@@ -44,24 +44,25 @@ class Parameters(wear_adjuster.Parameters):
 
 
 class State(NamedTuple):
-    """What the adjuster remembers, and the contact of the moment control."""
+    """What the adjuster remembers."""
 
     applied: Annotated[float, Signal("1", "the brake was applied since it was parked last")]
     wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
     teeth: Annotated[float, Signal("1", "teeth turned, as the adjuster counts them", 3.0)]
-    theta_c: Annotated[float, Signal("rad", "contact position, estimated", 1.7)]
 
 
 class Input(NamedTuple):
-    """What the moment control is at, and whether it is to brake."""
+    """Contact and mode of the moment control, and whether it is to brake."""
 
+    theta_c: Annotated[float, Signal("rad", "contact position, estimated", 1.7)]
     mode: Annotated[float, Signal("1", "mode of the moment control", 3.0)]
     wanted: Annotated[float, Signal("1", "braking is demanded")]
 
 
 class Output(NamedTuple):
-    """Teeth that turn now, mode, and the clearance of the cold brake behind them."""
+    """Teeth that it means to turn, and that do; mode; clearance of the cold brake behind them."""
 
+    teeth: wear_adjuster.Teeth
     turned: wear_adjuster.Teeth
     mode: Annotated[float, Signal("1", "adjuster: 0 waits, 1 brake applied, 2 turns", 2.0)]
     gap: Annotated[float, Signal("m", "clearance as the adjuster believes it", 2e-4)]
@@ -70,13 +71,22 @@ class Output(NamedTuple):
 def output(x: State, u: Input, par: Parameters) -> tuple[State, Output]:
     """Advance the adjuster by one sample."""
     seen = wear_adjuster.Input(
-        gap=par.gap_slope_hat * x.theta_c,
+        gap=par.gap_slope_hat * u.theta_c,
         T=par.T_disc_hat,
         touching=ops.where((u.mode - moment_control.MOMENT) ** 2 < 0.25, 1.0, 0.0),
         parked=ops.where(u.mode < 0.5, 1.0, 0.0),
         wanted=u.wanted,
     )
-    own, out = wear_adjuster.output(wear_adjuster.State(x.applied, x.wide, x.teeth), seen, par)
-    theta_c = x.theta_c - par.tooth / par.gap_slope_hat * out.teeth
-    gap = wear_adjuster.cold_gap(seen._replace(gap=par.gap_slope_hat * theta_c), par)
-    return State(*own, theta_c), Output(out.turned, out.mode, gap)
+    own, out = wear_adjuster.output(wear_adjuster.State(*x), seen, par)
+    gap = wear_adjuster.cold_gap(seen, par) - par.tooth * out.teeth
+    return State(*own), Output(out.teeth, out.turned, out.mode, gap)
+
+
+def contact(
+    theta_c: Annotated[float, Signal("rad", "contact position, estimated", 1.7)],
+    rate: Annotated[float, Signal("1/s", "teeth that are meant to turn in a second", 50.0)],
+    T: Annotated[float, Signal("s", "sample time of the moment control", 1e-3)],
+    par: Parameters,
+) -> Annotated[float, Signal("rad", "contact position, estimated", 1.7)]:
+    """Return where the moment control believes the pads to touch, a sample of turning later."""
+    return theta_c - par.tooth / par.gap_slope_hat * rate * T

@@ -22,7 +22,7 @@ LAW: Mapping[str, Cited] = MappingProxyType({
 IN_ECU: Mapping[str, Cited] = MappingProxyType({
     "adjuster.law": chosen("none", "the paper wants one for its next prototype"),
     "adjuster.tooth": LAW["tooth"],
-    "adjuster.tau_turn": chosen(5e-3, "a tooth in some 30 ms, a small geared motor's"),
+    "adjuster.tau_turn": chosen(3e-3, "a small geared motor's, short beside a sample of its law"),
     **{f"control.adjuster.{name}": value for name, value in LAW.items()},
     "control.adjuster.T_adjust": chosen(0.02, "short beside an application, and time for a tooth"),
     "control.adjuster.ways": chosen("both", "clearance taken in error is given back"),
