@@ -43,6 +43,8 @@ def page() -> str:
             for row, v in zip(rows, values, strict=True) if not row.agrees(v)
         )  # fmt: skip
         lines += ["", "Why some do not agree:", "", *apart, ""] if apart else [""]
+        notes = [f"- `{row.fault}`, {row.what}: {row.note}." for row in rows if row.note]
+        lines += ["What explains others:", "", *notes, ""] if notes else []
     return "\n".join(lines)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -11,6 +12,7 @@ import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import as_run
+from bywire.bench.faults.injected import with_faults
 from bywire.bench.recording import record
 from bywire.bench.running import run
 from bywire.brakes.motorcycle.case import case_from_rest
@@ -86,13 +88,29 @@ def figure(name: str, fault: str, value: Any = None, factor: float = 1.0) -> Cal
 
 
 @cache
-def frozen() -> tuple[float, ...]:
-    """Return where the pads stand 1.1 s after the ECU froze, at seven phases of the dither."""
-    return tuple(
-        float(np.interp(t + 1.1, found["time"].values, bars(found)))
-        for t in (ONSET + 3e-3 * k for k in range(7))
-        for found in (recording(one("ecu.frozen", onset=t)),)
-    )
+def frozen(ahead: float = 0.0) -> tuple[float, ...]:
+    """Return where the pads stand 1.1 s after the ECU froze, at seven phases of the dither [bar].
+
+    ``ahead``: share of a period by which the dither runs ahead of our own.
+    """
+    bench = Bench("hard-braking", SET, options=dict(HOLD))
+    (case,) = bench.cases()
+    begun = replace(case, memory=case.memory._replace(dit_phase=ahead), start=None)
+    found = []
+    for t in (ONSET + 3e-3 * k for k in range(7)):
+        (faulty,) = with_faults([begun], [{"fault": "ecu.frozen", "onset": t}])
+        own = as_run(faulty, bench.step)
+        rows = record(own, simulate(own), faulty.settle, faulty.keep, {})
+        found.append(float(np.interp(t + 1.1, rows["time"].values, bars(rows))))
+    return tuple(found)
+
+
+def late_with_less() -> float:
+    """Return the deviation of the current of a late bridge with less integral gain [A]."""
+    less = {"ecu.current.k_i": "-17 %"}
+    late = [{"fault": "bridge.late", "value": 5, "onset": ONSET}]
+    found = run(Bench("hard-braking", SET, less, options=dict(HOLD), faults=late)).recording
+    return float(found["i"].values[-1000:].std())
 
 
 def peak_time() -> float:

@@ -27,6 +27,8 @@ class Row:
         Runs our bench.
     because
         Why the two disagree; empty where they agree.
+    note
+        What explains a figure that agrees, or of which none is stated.
     daily
         Whether it is cheap enough for every run of the tests.
     """
@@ -37,6 +39,7 @@ class Row:
     unit: str
     computed: Callable[[], float]
     because: str = ""
+    note: str = ""
     daily: bool = False
 
     def agrees(self, value: float) -> bool:

@@ -73,6 +73,8 @@ WEDGE: list[tuple[dict[str, Any], Counts]] = [
      (1547, 1006, 450, (70,))),
     ({"motor_heat.law": "lumped", "control.derating.law": "current"},
      (1618, 1079, 477, (109, 158))),
+    ({"adjuster.law": "screw", "control.adjuster.ways": "both",
+      "control.adjuster.fault": "none"}, (1561, 1021, 456, (114, 72, 98))),
     ({"command.mode": "current"}, (1541, 1000, 450, (3,))),
 ]
 RIGS: list[tuple[type[Model], dict[str, Any], Counts]] = [
@@ -90,8 +92,8 @@ RIGS: list[tuple[type[Model], dict[str, Any], Counts]] = [
     (DrivenShaft, {"screw.law": "drive"}, (88, 67, 0, (0,))),
 ]
 VEHICLES: list[tuple[type[Model], str, Counts]] = [
-    (TwoWheelerByWire, "sport600", (1314, 1499, 411, (276,))),
-    (TwoWheelerWholeRear, "sport600-whole-rear", (1544, 2766, 547, (276, 144))),
+    (TwoWheelerByWire, "sport600", (1321, 1041, 411, (276,))),
+    (TwoWheelerWholeRear, "sport600-whole-rear", (1554, 1239, 547, (276, 144))),
 ]
 CASES = [
     *((MotorcycleBrake, "dardanelli2010", changes, counts) for changes, counts in MOTORCYCLE),

@@ -263,6 +263,16 @@ def test_campaigns_of_brakes_can_be_read_and_others_are_not_known():
         read_campaign("motorcycel")
 
 
+def test_faults_of_what_a_bench_lacks_are_left_out():
+    without, adjusted = (
+        {each.mode.name for each in read_campaign("wedge", changes).faults}
+        for changes in ({}, {"adjuster.law": "screw"})
+    )
+    assert not [name for name in without if "adjuster" in name]
+    assert "control.adjuster.stuck" in adjusted
+    assert {name.partition(".")[0] for name in adjusted - without} == {"control", "adjuster"}
+
+
 def test_double_faults_stand_beside_the_latent_one(tmp_path):
     text = SMALL.replace('present =', 'latent = ["seal.swollen"]\npresent =').replace(
         "healthy = 8", "healthy = 4"

@@ -52,6 +52,8 @@ TRIALS = (
            settle="10 ms"),
     _trial("moment-release", _WEDGE, settle="60 ms", duration="40 ms"),
     _trial("power-off-hold", _WEDGE, settle="60 ms", duration="40 ms"),
+    _trial("gap-adjusting", _WEDGE, applications="1", t_hold="60 ms", t_pause="20 ms",
+           settle="10 ms"),
     _trial("current-loop", _WEDGE, duration="4 ms"),
     _trial("run-down", _WEDGE, t_spin="20 ms", duration="40 ms"),
     _trial("step", _WEDGE, input="M_set", duration="50 ms"),

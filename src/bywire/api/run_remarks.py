@@ -7,6 +7,7 @@ import math
 from bywire.api.run_changes import parameter_changes
 from bywire.bench.kpis.registry import FAMILIES
 from bywire.bench.result import Result
+from bywire.core.model import ASSEMBLIES
 from bywire.report.wording import amount
 
 _MOST = {"share_stuck": 0.5, "share_sat_current": 0.1, "share_sat_duty": 0.1}
@@ -18,14 +19,14 @@ def remarks(result: Result) -> list[str]:
     """Return what was changed from the cited set, and what a run did instead of what was asked.
 
     A run is remarkable that is stuck more than half of its time, at a limit more than a tenth of
-    it, or that ends off its set point by more than a twentieth of the step.
+    it, or that ends off its set point by more than a twentieth of the step; what its model says is.
     """
     return [*_changes(result), *unexpected(result)]
 
 
 def unexpected(result: Result) -> list[str]:
     """Return the same without what was changed."""
-    return [*_faults(result), *_shares(result), *_set_point(result)]
+    return [*_faults(result), *_shares(result), *_set_point(result), *_of_models(result)]
 
 
 def _faults(result: Result) -> list[str]:
@@ -42,6 +43,18 @@ def _faults(result: Result) -> list[str]:
             f"{mode.summary}{unmet}"
         )
     return texts
+
+
+def _of_models(result: Result) -> list[str]:
+    """Return what the models say of their runs; the same of several of them once."""
+    texts: dict[str, None] = {}
+    for recording in result.recordings.values():
+        model = ASSEMBLIES.all().get(str(recording.attrs.get("model")))
+        text = recording.attrs.get("parameters")
+        if model is not None and text is not None and recording.sizes.get("time"):
+            par = type(result.bench.par).model_validate_json(text)
+            texts |= dict.fromkeys(model().remarks(recording, par))
+    return list(texts)
 
 
 def _changes(result: Result) -> list[str]:

@@ -80,7 +80,8 @@ def _plan(
     chosen = [v.name for v in varied if v.name in choice_fields(type(bench.par))]
     if chosen:
         raise ParameterError(f"[vary] {chosen[0]} is a choice: in a campaign only numbers vary")
-    modes = modes_of(case.model, case.par)
+    known = modes_of(case.model, case.par)
+    modes = {name: mode for name, mode in known.items() if not mode.lacks(case.par)}
     _require_known_values(content.get("values", {}), modes)
     section = content.get("campaign", {})
     for key in section:

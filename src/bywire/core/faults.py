@@ -35,6 +35,8 @@ class ParameterFault:
         Parameter that takes the fault's value; instead of ``scaled``.
     with_it
         Choices and further parameters that change as well.
+    needs
+        Choices of the assembly without which there is nothing to fail, by dotted name.
     """
 
     name: str
@@ -43,6 +45,7 @@ class ParameterFault:
     value: float = 1.0
     replaced: str = ""
     with_it: Mapping[str, Any] = field(default_factory=dict)
+    needs: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

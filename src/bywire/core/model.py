@@ -187,6 +187,20 @@ class Model(Protocol):
         """
         return []
 
+    def remarks(self, recording: Any, par: Any) -> list[str]:
+        """Return what stands above the key figures of a run: how its controllers fit it; nothing.
+
+        Unlike what ``watch`` says it is no warning, and studies do not ask for it.
+
+        Parameters
+        ----------
+        recording
+            An xarray.Dataset of at least one row, with all signals.
+        par
+            The run's parameters.
+        """
+        return []
+
     def watched(self, par: Any) -> tuple[str, ...] | None:
         """Return the recorded signals that ``watch`` looks at; None where that is not known.
 

@@ -118,6 +118,10 @@ class Wrapping(Model):
         """Return what the user should know of a recording."""
         return self.inner.watch(recording, par)
 
+    def remarks(self, recording: Any, par: Any) -> list[str]:
+        """Return what stands above the key figures of a run."""
+        return self.inner.remarks(recording, par)
+
     def watched(self, par: Any) -> tuple[str, ...] | None:
         """Return the signals that ``watch`` looks at."""
         return self.inner.watched(par)

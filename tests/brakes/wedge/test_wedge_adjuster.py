@@ -67,19 +67,39 @@ def test_heat_is_told_from_wear_unless_it_is_blind_to_it():
 
 def test_it_acts_when_parked_and_not_braking_alone():
     law = WEAR.adjuster
-    seen = Input(gap=0.5e-3, T=293.15, parked=0.0, wanted=1.0)
+    seen = Input(gap=0.5e-3, T=293.15, touching=0.0, parked=0.0, wanted=1.0)
     x, turned = State(0.0, 0.0, 0.0), []
-    for parked, wanted in [(0, 1), (0, 1), (0, 0), (1, 1), (1, 0), (1, 0), (1, 0)] * 4:
-        x, out = wear_adjuster.output(x, seen._replace(parked=parked, wanted=wanted), law)
+    # The brake is applied again before it is parked; left before the pads touch; and parked again.
+    crossing, pressing = (0, 0, 1), (1, 0, 1)
+    twice = [crossing, pressing, (0, 0, 0), crossing, pressing, (0, 0, 0), (0, 1, 1)]
+    for touching, parked, wanted in [*twice, (0, 1, 0), (0, 1, 0), crossing, (0, 1, 0)] * 4:
+        now = seen._replace(touching=touching, parked=parked, wanted=wanted)
+        x, out = wear_adjuster.output(x, now, law)
         turned.append((out.turned, parked, wanted))
     # Three applications, each counted once however long the brake is parked; then at once.
     assert [n for n, *_ in turned].count(3.0) == 1
-    assert turned.index((3.0, 1, 0)) == 2 * 7 + 4
+    assert turned.index((3.0, 1, 0)) == 2 * 11 + 7
     assert all(n == 0 for n, parked, wanted in turned if not parked or wanted)
 
 
-def test_it_never_turns_below_the_least_clearance():
-    law = WEAR.adjuster.replace({"gap_min": 0.25e-3})
+@pytest.mark.parametrize("ways", ["closing", "both"])
+def test_it_never_turns_below_the_least_clearance(ways):
+    law = WEAR.adjuster.replace({"gap_min": 0.25e-3, "ways": ways})
     for gap in np.linspace(0.1e-3, 2e-3, 500):
         left = gap - law.tooth * wear_adjuster.due(float(gap), law)
         assert left >= min(gap, 0.25e-3) - 1e-12
+        if ways == "both":  # as few teeth as make it up
+            assert 0.25e-3 - 1e-12 <= left < max(gap, 0.25e-3 + law.tooth + 1e-12)
+
+
+@pytest.mark.parametrize(("fault", "turned"), [("none", -2.0), ("one-way", 0.0), ("stuck", 0.0)])
+def test_too_little_clearance_is_given_back_where_it_turns_both_ways(fault, turned):
+    law = WEAR.adjuster.replace({"ways": "both", "fault": fault})
+    seen = Input(gap=0.04e-3, T=293.15, touching=0.0, parked=1.0, wanted=0.0)
+    x, acts = State(1.0, 0.0, 0.0), []
+    for _ in range(4):
+        x, out = wear_adjuster.output(x._replace(applied=1.0), seen, law)
+        acts.append((out.turned, x.wide, x.teeth))
+    assert acts == [(0.0, -1.0, 0.0), (0.0, -2.0, 0.0), (turned, 0.0, -2.0), (0.0, -1.0, -2.0)]
+    wide = seen._replace(gap=0.5e-3)  # a wide gap begins another row
+    assert wear_adjuster.output(x._replace(applied=1.0), wide, law)[0].wide == 1.0

@@ -108,6 +108,11 @@ def _read(
     if name not in modes:
         raise _unknown(name, modes)
     mode = modes[name]
+    for choice, wanted in mode.lacks(par).items():
+        raise ParameterError(
+            f"fault {name}: there is nothing to fail, as {choice} = {par.value(choice)!r}: set it "
+            f"to {wanted!r}, as with --set {choice}={wanted}"
+        )
     return Injection(mode, _value(where, section, mode), course, seed)
 
 

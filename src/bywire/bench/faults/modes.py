@@ -42,6 +42,8 @@ class Mode:
         What it does there: a function of `falsify`.
     task
         Controller that misses its ticks.
+    needs
+        Choices of the parameters without which there is nothing to fail.
     """
 
     name: str
@@ -52,11 +54,16 @@ class Mode:
     channel: Channel | None = None
     falsified: str = ""
     task: str = ""
+    needs: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     @property
     def place(self) -> str:
         """What fails: the name up to the last dot."""
         return self.name.rpartition(".")[0]
+
+    def lacks(self, par: ParameterSet) -> dict[str, Any]:
+        """Return the choices that parameters lack for it to be there, by dotted name."""
+        return {name: wanted for name, wanted in self.needs.items() if par.value(name) != wanted}
 
     def tap(self, value: float) -> Tap | None:
         """Return the tap that it takes; None where it falsifies no signal."""
@@ -152,7 +159,8 @@ def _of_element(place: str, fault: ParameterFault, par: ParameterSet) -> Mode:
         unit = leaf_fields(type(par))[f"{place}.{fault.replaced}"].unit.symbol
     elif not fault.scaled:
         unit = ""
-    return Mode(f"{place}.{fault.name}", fault.summary, unit, fault.value, changes)
+    name = f"{place}.{fault.name}"
+    return Mode(name, fault.summary, unit, fault.value, changes, needs=fault.needs)
 
 
 def _demands(model: Model, declared: Collection[str]) -> Iterator[Channel]:

@@ -12,6 +12,7 @@ from bywire.core.parts import Part
 from bywire.core.signals import zeros
 from bywire.plant import brake_disc, pressure_loop, road, road_wheel, wheel_encoder
 from bywire.vehicle.hot_brakes import HotBrakes, cold_start
+from bywire.vehicle.slip_remarks import far_from_peak
 from bywire.vehicle.two_wheeler import VehicleParameters, rolling_start
 
 Par = TwoWheelerParameters
@@ -57,6 +58,19 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
     def tasks(self, par: Par) -> tuple[Task, ...]:
         """Return the ECU's task."""
         return (Task("ecu", par.ecu.T_s, tick),)
+
+    def remarks(self, recording: Any, par: Par) -> list[str]:
+        """Return where slip alone is held that is far below that of the largest adhesion."""
+        if par.ecu.abs != "pi" or par.ecu.mix.alpha < 1.0:
+            return []
+        ways, x = par.vehicle.road, recording["x"].values
+        front, rear = par.ecu.front_slip.slip_set, par.ecu.rear_slip.slip_set
+        return [
+            *far_from_peak(x, recording["abs_f"].values, front, "ecu.front_slip.slip_set",
+                           par.vehicle.front_tyre, ways),
+            *far_from_peak(x - par.vehicle.body.L, recording["abs_r"].values, rear,
+                           "ecu.rear_slip.slip_set", par.vehicle.rear_tyre, ways),
+        ]  # fmt: skip
 
     def rest(self, par: Par) -> tuple[Any, ecu.Memory]:
         """Return the vehicle standing on its wheels, brakes open."""

@@ -1,10 +1,13 @@
-"""Controllers of the wedge brake at their sampling instants: moment at 1 kHz, position at 5 kHz."""
+"""Controllers of the wedge brake at their sampling instants: moment at 1 kHz, position at 5 kHz.
+
+And, of a brake that has one, the adjuster, which turns between two applications.
+"""
 
 from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from bywire.brakes.wedge.laws import moment_control, screw_offset
+from bywire.brakes.wedge.laws import gap_adjusting, moment_control, screw_offset
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.control import derating, position_pd
 from bywire.core import ops
@@ -49,6 +52,14 @@ class Memory(NamedTuple):
     rise_housing_2: derating.Rise
     i_most: Annotated[float, Signal("A", "limit of both current demands", 20.0)]
     derated: Annotated[float, Signal("1", "motors derated")]
+    adjusting: Annotated[float, Signal("1", "adjuster: 0 waits, 1 brake applied, 2 turns", 2.0)]
+    click_rate: Annotated[float, Signal("1/s", "teeth that the adjuster turns in a second", 50.0)]
+    meant_rate: Annotated[float, Signal("1/s", "teeth that it means to turn in a second", 50.0)]
+    clicks: Annotated[float, Signal("1", "teeth that the adjuster has turned", 3.0)]
+    gap_hat: Annotated[float, Signal("m", "clearance as the adjuster believes it", 2e-4)]
+    applied: Annotated[float, Signal("1", "the brake was applied since it was parked last")]
+    wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
+    teeth: Annotated[float, Signal("1", "teeth turned, as the adjuster counts them", 3.0)]
 
 
 class Readings(NamedTuple):
@@ -63,6 +74,9 @@ class Readings(NamedTuple):
 def moment_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
     """Run the moment control once: its output is the speed of the common angle reference."""
     control, T = par.control.moment, par.control.T_slow
+    if par.adjuster.law != "none":
+        contact = gap_adjusting.contact(m.theta_c, m.meant_rate, T, par.control.adjuster)
+        m = m._replace(theta_c=contact)
     rotation = ops.where(r.Omega < 0, -1.0, 1.0)
     direction = ops.where(m.mode < 0.5, rotation, m.direction)
     measured = rotation * r.M
@@ -116,6 +130,25 @@ def position_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> 
         speed_2=x_2.speed,
         i_1_ref=on * out_1.i,
         i_2_ref=on * out_2.i,
+    )
+
+
+def adjuster_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
+    """Run the adjuster once: what it turns takes it a sample, and the moment control follows."""
+    own = par.control.adjuster
+    wanted = ops.where(u.M_set > par.control.moment.M_on, 1.0, 0.0)
+    x, out = gap_adjusting.output(
+        gap_adjusting.State(m.applied, m.wide, m.teeth),
+        gap_adjusting.Input(m.theta_c, m.mode, wanted),
+        own,
+    )
+    return m._replace(
+        adjusting=out.mode,
+        click_rate=out.turned / own.T_adjust,
+        meant_rate=out.teeth / own.T_adjust,
+        clicks=m.clicks + out.turned,
+        gap_hat=out.gap,
+        **x._asdict(),
     )
 
 

@@ -13,9 +13,10 @@ import numpy as np
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCornerParameters
+from bywire.brakes.wedge.sets import adjuster
 from bywire.control import wear_adjuster
 from bywire.core.parameters import ParameterSet
-from bywire.core.provenance import chosen, derived
+from bywire.core.provenance import chosen
 from bywire.core.quantities import Length
 from bywire.core.typing import Array
 from bywire.life import warm_stops
@@ -86,7 +87,7 @@ def between(
     seen = z["clearance"] + readings["beyond"] - law.growth * (T - law.T_cold)
     state, out = wear_adjuster.output(
         wear_adjuster.State(applied=1.0, wide=z["wide"], teeth=z["counted"]),
-        wear_adjuster.Input(gap=seen, T=T, parked=1.0, wanted=0.0), law,
+        wear_adjuster.Input(gap=seen, T=T, touching=0.0, parked=1.0, wanted=0.0), law,
     )  # fmt: skip
     return {
         **z,
@@ -128,14 +129,8 @@ WEDGE_PADS = Life(
         "disc.C_d": chosen(3.4e3, "7 kg of cast iron"),
         "disc.tau_d": chosen(300.0, "minutes, in the wind of driving"),
         "mechanism": chosen("teeth", "without one the travel ends after some 280 stops"),
-        "adjuster.gap_nominal": chosen(0.2e-3, "the clearance of the new brake"),
-        "adjuster.band": chosen(0.1e-3, "7 ms more until the pads touch"),
-        "adjuster.gap_min": chosen(0.13e-3, "what a disc 400 K hotter takes away"),
-        "adjuster.tooth": chosen(0.08e-3, "below the band: it never turns too far"),
-        "adjuster.applications": chosen(3.0, "a single odd application does not turn it"),
-        "adjuster.growth": derived(12e-6 * 28e-3, "12e-6 1/K of cast iron, a disc of 28 mm"),
-        "adjuster.T_cold": chosen(293.15, "20 degC"),
-        "adjuster.fault": chosen("none", "sound"),
+        **{f"adjuster.{name}": value for name, value in adjuster.LAW.items()},
+        "adjuster.ways": chosen("closing", "wear alone moves the clearance"),
         "h_new": chosen(10e-3, "front pads of a mid-size car"),
         "h_min": chosen(2e-3, "usual limit of wear"),
         "M_full": chosen(950.0, "the largest moment that the paper shows"),

@@ -18,6 +18,7 @@ from bywire.core.model import Bounds, Task
 from bywire.core.parts import Integral, Part, Shown, Wire
 from bywire.core.signals import Role
 from bywire.plant import (
+    clearance_adjuster,
     current_drive,
     drive_supply,
     end_stop,
@@ -57,6 +58,9 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     )
     W_disc = Integral("J", "work of the disc on the wedge", role=Role("source", "disc on wedge"))
     W_runout = Integral("J", "work of the run-out on the caliper", role=Role("source", "run-out"))
+    W_adjuster = Integral(
+        "J", "work of the adjuster on the caliper", role=Role("source", "adjuster")
+    )
     W_brake = Integral("J", "energy taken from the disc", role=_DISC)
     drive_1 = Part(current_drive, par="drive", suffix="_1")
     motor_1 = Part(servo_motor, suffix="_1", fixed=("theta",), loss=LOSSES)
@@ -69,6 +73,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     heart = Part(brake_heart, output=("f_1", "f_2", "f_12", "F_M"), work="W_heart", loss="E_heart")
     body = Part(wedge, par="wedge")
     caliper = Part(wedge_caliper, output=("F_N",), work="W_caliper", loss="E_caliper")
+    adjuster = Part(clearance_adjuster)
     stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
     t_stuck = Integral("s", "time in which shafts and wedge stick", role=Role("standstill"))
     disc = Part(flywheel, par="flywheel", outside=True)
@@ -98,6 +103,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     P_meas = Shown("W", "power at the drives' input, filtered", 50.0)
     E_source = Shown("J", "energy in: electrical, disc on wedge, run-out")
     U_caliper = Shown("J", "energy of the caliper")
+    clearance = Shown("m", "clearance, both pads, the wedge centered", 2e-4)
     E_warming = Shown("J", "copper loss of the motors that warm up", role=motor_heat.COPPER)
     E_winding = Shown("J", "heat in the motors' windings", role=motor_heat.WINDING)
     E_housing = Shown("J", "heat in the motors' housings", role=motor_heat.HOUSING)
@@ -109,7 +115,8 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         "F_N", "F_end", "T_fr_1", "T_fr_2", "F_fr", "Omega", "phi", "contacts", "stuck", "P_in",
         "P_meas", "E_source", "E_copper", "E_damping", "E_shaft", "E_wedge", "E_heart",
         "E_caliper", "E_stop", "E_stored", "U_caliper", "W_supply", "W_electric", "W_disc",
-        "W_runout", "W_brake", "t_stuck", "T_winding_1", "T_winding_2", "T_housing_1",
+        "W_runout", "W_adjuster", "W_brake", "t_stuck", "clearance", "taken", "clicks",
+        "teeth", "gap_hat", "adjusting", "T_winding_1", "T_winding_2", "T_housing_1",
         "T_housing_2", "derated", "E_warming", "E_winding", "E_housing", "E_motor_air",
     )  # fmt: skip
 
@@ -134,6 +141,8 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         w.heart.u = brake_heart.Input(
             k * left.theta, k * right.theta, x.x, k * left.omega, k * right.omega, x.v
         )
+        w.adjuster.u = clearance_adjuster.Input(w.m.click_rate)
+        taken = clearance_adjuster.moved(w.adjuster.xe, par.adjuster)
         w.caliper.u = wedge_caliper.Input(
             x=x.x,
             v=x.v,
@@ -141,6 +150,8 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
             tan_alpha=wedge.slope(par.wedge),
             runout=flywheel.runout(w.disc.xe, par.flywheel),
             runout_rate=flywheel.runout_rate(w.disc.xe, par.flywheel),
+            taken=taken.taken,
+            taking=taken.taking,
         )
         w.stop.u = end_stop.Input(x.x, x.v, -par.wedge.x_stop, par.wedge.x_stop)
         w.disc.u = flywheel.Input(self.disc_torque(w))
@@ -176,6 +187,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
             "W_electric": motors,
             "W_disc": wedge.pad_power(w.body.x, w.body.u, w.body.par),
             "W_runout": w.caliper.f.F_N * w.caliper.u.runout_rate,
+            "W_adjuster": w.caliper.f.F_N * w.caliper.u.taking,
             "W_brake": -moment * w.disc.x.Omega,
             "E_shaft": -(friction_1 * w.motor_1.x.omega + friction_2 * w.motor_2.x.omega),
             "E_wedge": -friction * w.body.x.v,
@@ -187,8 +199,10 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         motors = drive_train.power(w.motor_1) + drive_train.power(w.motor_2)
         heat_1 = motor_heat.stored(w.heat_1.x, w.heat_1.par)
         heat_2 = motor_heat.stored(w.heat_2.x, w.heat_2.par)
-        # Motors that stay cold keep what they give to the air, nothing: it costs no operation.
+        # What is off costs no operation: motors that stay cold keep what they give to the air.
         cold, none = w.par.motor_heat.law == "off", w.flow.E_motor_air
+        given = w.flow.W_electric + w.flow.W_disc + w.flow.W_runout
+        adjusts = w.par.adjuster.law != "none"
         return {
             "voltage_1": w.motor_1.u.v,
             "voltage_2": w.motor_2.u.v,
@@ -200,7 +214,9 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
             "stuck": _stuck(w),
             "P_in": drive_supply.power(motors, w.supply.par),
             "P_meas": w.supply.x.P,
-            "E_source": w.flow.W_electric + w.flow.W_disc + w.flow.W_runout,
+            "E_source": given + w.flow.W_adjuster if adjusts else given,
+            "W_adjuster": w.flow.W_adjuster if adjusts else 0.0,
+            "clearance": w.caliper.par.clearance - w.caliper.u.taken,
             "U_caliper": wedge_caliper.energy(w.caliper.u, w.caliper.par),
             "E_warming": none if cold else w.flow.E_copper,
             "E_winding": none if cold else heat_1.winding + heat_2.winding,
@@ -215,13 +231,19 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         position = Task("position", T.T_fast, self._position)
         if par.command.mode == "position":
             return (position,)
-        return (Task("moment", T.T_slow, self._moment), position)
+        moment = Task("moment", T.T_slow, self._moment)
+        if par.adjuster.law == "none":
+            return (moment, position)
+        return (moment, Task("adjuster", T.adjuster.T_adjust, self._adjuster), position)
 
     def _moment(self, x: Any, m: control.Memory, u: control.Stimulus, par: Par) -> control.Memory:
         return control.moment_tick(readings(x, par), m, u, par)
 
     def _position(self, x: Any, m: control.Memory, u: control.Stimulus, par: Par) -> control.Memory:
         return control.position_tick(readings(x, par), m, u, par)
+
+    def _adjuster(self, x: Any, m: control.Memory, u: control.Stimulus, par: Par) -> control.Memory:
+        return control.adjuster_tick(m, u, par)
 
     def _current(self, x: Any, m: control.Memory, u: control.Stimulus, par: Par) -> control.Memory:
         return control.current_tick(m, u, par)

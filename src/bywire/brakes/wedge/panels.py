@@ -12,6 +12,12 @@ _WINDINGS = Panel(
     "windings", (Trace("T_winding_1"), Trace("T_winding_2", Role.SECOND)),
     saturation="derated", saturated="derated",
 )  # fmt: skip
+_MODE = Panel("mode", (Trace("mode"),), levels=("parked", "gap", "moment", "retracting"))
+_ADJUSTER = (
+    Panel("gap", (Trace("gap_hat"), Trace("taken", Role.SECOND))),
+    Panel("teeth", (Trace("clicks"),)),
+    Panel("adjuster", (Trace("adjusting"),), levels=("waits", "applied", "turns")),
+)
 
 BRAKING = Panels(
     "wedge",
@@ -32,8 +38,9 @@ BRAKING = Panels(
         # The rig shows the filtered power; the peaks of the raw one would hide it.
         Panel("power", (Trace("P_meas"), Trace("P_in", Role.SECOND))),
         Panel("force", (Trace("F_M"),)),
-        Panel("mode", (Trace("mode"),), levels=("parked", "gap", "moment", "retracting")),
+        _MODE,
         _WINDINGS,
+        *_ADJUSTER,
     ),
 )
 """moment, speed, current and power as in Figs. 7 to 9 of Roberts et al. (2003), and more"""
@@ -50,7 +57,9 @@ CORNER = Panels(
         *BRAKING.panels[:2],
         Panel("normal force", (Trace("F_N"),)),
         Panel("heat", (Trace("T_disc"), Trace("T_pads", Role.SECOND))),
-        *BRAKING.panels[-2:],
+        _MODE,
+        _WINDINGS,
+        *_ADJUSTER,
     ),
 )
 """the vehicle above, its brake below"""

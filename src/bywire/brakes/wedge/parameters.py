@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from typing import Literal
 
+from pydantic import model_validator
+
 from bywire.brakes.wedge.elements import brake_heart, wedge, wedge_caliper, wedge_friction
-from bywire.brakes.wedge.laws import moment_control, screw_offset
+from bywire.brakes.wedge.laws import gap_adjusting, moment_control, screw_offset
 from bywire.brakes.wedge.rigs import rig_parameters
 from bywire.control import derating, position_pd
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.plant import (
     axial_bearing,
+    clearance_adjuster,
     current_drive,
     drive_supply,
     end_stop,
@@ -46,6 +49,7 @@ class ControlParameters(ParameterSet):
     derating: derating.Parameters
     offset: screw_offset.Parameters
     moment: moment_control.Parameters
+    adjuster: gap_adjusting.Parameters
 
 
 class WedgeParameters(ParameterSet):
@@ -63,9 +67,20 @@ class WedgeParameters(ParameterSet):
     wedge_friction: wedge_friction.Parameters
     stop: end_stop.Parameters
     caliper: wedge_caliper.Parameters
+    adjuster: clearance_adjuster.Parameters
     flywheel: flywheel.Parameters
     moment_sensor: moment_sensor.Parameters
     encoder: shaft_encoder.Parameters
     control: ControlParameters
     command: CommandParameters
     rig: rig_parameters.Parameters
+
+    @model_validator(mode="after")
+    def _follows_the_adjuster(self) -> WedgeParameters:
+        T, slow = self.control.adjuster.T_adjust, self.control.T_slow
+        if self.adjuster.law != "none" and abs(T / slow - round(T / slow)) > 1e-6:
+            raise ValueError(
+                f"control.adjuster.T_adjust = {T:g} s must be a whole number of "
+                f"control.T_slow = {slow:g} s: the moment control follows what turns in a sample"
+            )
+        return self

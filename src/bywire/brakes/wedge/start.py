@@ -33,10 +33,12 @@ def memory_at(x: float, par: Par) -> Memory:
     k = roller_screw.slope(par.screw)
     delta = par.control.offset.delta_preload
     both = screw_offset.output(x / k, delta, par.control.offset)
+    adjusts = par.adjuster.law != "none"
     return zeros(Memory)._replace(
         on=1.0,
         direction=ops.where(par.flywheel.Omega_0 < 0, -1.0, 1.0),
         theta_c=contact_angle(par),
+        gap_hat=par.control.adjuster.gap_slope_hat * contact_angle(par) if adjusts else 0.0,
         theta_ref=x / k,
         delta=delta,
         theta_1_ref=both.theta_1,

@@ -314,6 +314,8 @@ static void record(const Plant *k, const Saved *z, double *o)
     o[O_Omega] = b->Om, o[O_phi] = b->phi;
     o[O_T_winding_1] = o[O_T_winding_2] = k->T_a; /* motors that stay cold */
     o[O_T_housing_1] = o[O_T_housing_2] = k->T_a;
+    o[O_clearance] = k->clear, o[O_taken] = 0.0; /* without adjuster */
+    o[O_clicks] = o[O_teeth] = o[O_gap_hat] = o[O_adjusting] = o[O_W_adjuster] = 0.0;
     o[O_contacts] = (t.f.f_1 > 0.0) + 2.0 * (t.f.f_2 > 0.0) + 4.0 * (t.f.f_12 > 0.0);
     o[O_stuck] = a->om == 0.0 && c->om == 0.0 && b->v == 0.0;
     o[O_P_in] = k->standby + V_1 * a->i + V_2 * c->i, o[O_P_meas] = b->y_P;

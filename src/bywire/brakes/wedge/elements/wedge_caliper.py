@@ -86,7 +86,7 @@ def _require_rising(name: str, unit: str, nodes: Nodes) -> None:
 
 
 class Input(NamedTuple):
-    """Wedge, its slope and side, and the disc's run-out."""
+    """Wedge, its slope and side, the disc's run-out, and what an adjuster took away."""
 
     x: Annotated[float, Signal("m", "wedge travel", 5e-3)]
     v: Annotated[float, Signal("m/s", "wedge velocity", 0.02)]
@@ -94,6 +94,8 @@ class Input(NamedTuple):
     tan_alpha: Annotated[float, Signal("1", "slope of the wedge", 0.4)]
     runout: Annotated[float, Signal("m", "run-out", 4e-6)]
     runout_rate: Annotated[float, Signal("m/s", "rate of the run-out", 2e-4)]
+    taken: Annotated[float, Signal("m", "clearance that an adjuster took away", 1e-4)]
+    taking: Annotated[float, Signal("m/s", "speed of the adjuster", 2e-4)]
 
 
 class InputRate(NamedTuple):
@@ -103,6 +105,7 @@ class InputRate(NamedTuple):
     side: Annotated[float, Signal("1/s", "rate of the side")]
     tan_alpha: Annotated[float, Signal("1/s", "rate of the slope")]
     runout: Annotated[float, Signal("m/s", "rate of the run-out", 2e-4)]
+    taken: Annotated[float, Signal("m/s", "speed of the adjuster", 2e-4)]
 
 
 class Forces(NamedTuple):
@@ -112,13 +115,16 @@ class Forces(NamedTuple):
 
 
 def depth(u: Input, par: Parameters) -> Overlap:
-    r"""Return the overlap, :math:`n = |x| \tan\alpha - c + \text{run-out}`; negative in the gap."""
-    return u.side * u.x * u.tan_alpha - par.clearance + u.runout
+    r"""Return the overlap; negative in the gap.
+
+    .. math:: n = |x| \tan\alpha - (c - c_{taken}) + \text{run-out}
+    """
+    return u.side * u.x * u.tan_alpha - par.clearance + u.runout + u.taken
 
 
 def closing(u: Input) -> Annotated[float, Signal("m/s", "rate of the overlap", 5e-3)]:
     """Return the rate of the overlap."""
-    return u.side * u.v * u.tan_alpha + u.runout_rate
+    return u.side * u.v * u.tan_alpha + u.runout_rate + u.taking
 
 
 def overlaps(u: Input, par: Parameters) -> Overlap:
@@ -189,8 +195,8 @@ def moment(
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return how wedge and disc move."""
-    return InputRate(x=u.v, side=0.0, tan_alpha=0.0, runout=u.runout_rate)
+    """Return how wedge, disc and adjuster move."""
+    return InputRate(x=u.v, side=0.0, tan_alpha=0.0, runout=u.runout_rate, taken=u.taking)
 
 
 def energy(u: Input, par: Parameters) -> Energy:
@@ -206,7 +212,7 @@ def energy(u: Input, par: Parameters) -> Energy:
 
 
 def power_in(u: Input, f: Forces) -> Work:
-    """Return the work of wedge and run-out on the caliper."""
+    """Return the work of wedge, run-out and adjuster on the caliper."""
     return f.F_N * closing(u)
 
 

@@ -22,6 +22,7 @@ from bywire.plant import flywheel, road, wheel_encoder
 from bywire.vehicle import corner_slip
 from bywire.vehicle.corner import WheelSpeed, rolling_states
 from bywire.vehicle.hot_corner import HotCorner, HotCornerParameters, warm_disc
+from bywire.vehicle.slip_remarks import far_from_peak
 from bywire.vehicle.two_wheeler import BOOK
 
 
@@ -92,6 +93,14 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
     def _moment(self, x: Any, m: Any, u: control.Stimulus, par: Any) -> Any:
         left = u if par.ecu.abs == "off" else u._replace(M_set=m.M_left)
         return super()._moment(x, _contact_tracked(x, m, par), left, par)
+
+    def remarks(self, recording: Any, par: Any) -> list[str]:
+        """Return where a slip is held that is far below that of the largest adhesion."""
+        if par.ecu.abs != "pi":
+            return []
+        return far_from_peak(recording["s"].values, recording["abs"].values,
+                             par.ecu.slip.slip_set, "ecu.slip.slip_set", par.corner.tyre,
+                             par.corner.road)  # fmt: skip
 
     def rest(self, par: Any) -> tuple[Any, Any]:
         """Return the vehicle standing, the brake parked."""

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.sets import adjuster
 from bywire.core.catalog import CitedSet
 from bywire.core.provenance import Cited, calibrated, chosen, derived, paper
 
@@ -170,6 +171,7 @@ _CONTROL = {
     "control.moment.M_on": chosen(5.0, "below the contact threshold"),
     "control.moment.M_contact": chosen(12.0, "above the sensor's offset"),
     "control.moment.Omega_still": chosen(0.5, "a twelfth of a revolution per second"),
+    "control.adjuster.gap_slope_hat": derived(_SLOPE * math.tan(_ALPHA), "L/2pi tan(alpha)"),
     "command.mode": chosen("moment", "the experiment decides"),
 }
 
@@ -193,6 +195,7 @@ _VALUES = {
     **_MECHANICAL,
     **_STAND,
     **_CONTROL,
+    **adjuster.IN_ECU,
     **_RIG,
 }
 
@@ -206,6 +209,7 @@ _STEEP = {
     "wedge.x_stop": chosen(2.5e-3, "twice the travel of 1.23 mm at 950 N m"),
     "control.offset.law": chosen("scheduled", "far from the neutral point both motors push"),
     "control.moment.slope_hat": _moment_slope(_MU_B, _ALPHA_STEEP),
+    "control.adjuster.gap_slope_hat": derived(_SLOPE * math.tan(_ALPHA_STEEP), "L/2pi tan(alpha)"),
 }
 
 

@@ -1,0 +1,115 @@
+"""Gap adjusting: some applications with more clearance than there should be, and an adjuster.
+
+Roberts et al. (2003) want an adjustment mechanism for their next prototype; the maneuver is ours.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.wedge.case import case_from_parked, first, steps
+from bywire.brakes.wedge.laws.moment_control import SomeMoment
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.rows import along_disc
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Unit
+
+Count = Annotated[int, Unit("1", 5.0), Field(ge=1, le=100)]
+Growth = Annotated[float, Unit("m", 2e-4), Field(ge=-1e-2, le=1e-2, allow_inf_nan=False)]
+
+FIGURES = Figures(
+    clicks=("1", "Teeth that the adjuster has turned."),
+    teeth_counted=("1", "Teeth that it believes to have turned: its log of the wear."),
+    turned_after=("1", "Applications before it turns for the first time."),
+    clearance_start=("m", "Clearance at the start."),
+    clearance_end=("m", "Clearance at the end."),
+    gap_error=("m", "Clearance as the adjuster believes it at the end, less what it is."),
+    contact_first=("s", "Time until the pads press, first application."),
+    contact_last=("s", "Time until the pads press, last application."),
+    adjuster_work=("J", "Work of the adjuster on the caliper: 0 where it turns in the gap."),
+    undefined="the pads do not press, or nothing turns",
+)  # fmt: skip
+
+
+class Options(ParameterSet):
+    """The maneuver."""
+
+    M_brake: SomeMoment
+    """moment of every application"""
+    more: Growth
+    """clearance beyond the bench's own, as wear leaves it; the brake knows where its pads touch"""
+    applications: Count
+    """number of applications"""
+    t_hold: Duration
+    """length of each"""
+    t_pause: Duration
+    """time to the next, and after the last one"""
+    settle: Duration
+    """time parked before the first"""
+
+
+def _begins(options: Options) -> list[float]:
+    return [k * (options.t_hold + options.t_pause) for k in range(options.applications)]
+
+
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
+    """Return the one run; the disc is driven, so that every application is like the last."""
+    begins = _begins(options)
+    levels = {begin: options.M_brake for begin in begins}
+    levels |= {begin + options.t_hold: 0.0 for begin in begins}
+    changes = {
+        "adjuster.law": "screw", "flywheel.law": "driven",
+        "caliper.clearance": par.caliper.clearance + options.more,
+    }  # fmt: skip
+    return (
+        case_from_parked(
+            par, lambda t: {"M_set": steps(t, levels)},
+            begins[-1] + options.t_hold + options.t_pause, changes,
+            settle=options.settle, keep=options.settle,
+        ),
+    )  # fmt: skip
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return what the adjuster turned, and what that makes of the clearance."""
+    run = along_disc(recordings["run"])
+    after = run.sel(time=slice(-1e-9, None))
+    clicks, clearance = after["clicks"].values, after["clearance"].values
+    begins = _begins(options)
+    turned = np.flatnonzero(after["adjusting"].values > 1.5)
+    until = after["time"].values[turned[0]] if turned.size else np.nan
+    contacts = [
+        first(after.sel(time=slice(begin, begin + options.t_hold)), "F_N", 0.0) - begin
+        for begin in (begins[0], begins[-1])
+    ]
+    return FIGURES(
+        clicks=clicks[-1],
+        teeth_counted=after["teeth"].values[-1],
+        turned_after=np.searchsorted(begins, until) if turned.size else np.nan,
+        clearance_start=clearance[0],
+        clearance_end=clearance[-1],
+        gap_error=after["gap_hat"].values[-1] - clearance[-1],
+        contact_first=contacts[0],
+        contact_last=contacts[1],
+        adjuster_work=after["W_adjuster"].values[-1],
+    )
+
+
+EXPERIMENT = Experiment(
+    name="gap-adjusting",
+    assembly="wedge-brake",
+    summary="applications with 0.25 mm too much clearance, which the adjuster takes away",
+    options=Options,
+    defaults=Options(
+        M_brake=200.0, more=0.25e-3, applications=5, t_hold=0.25, t_pause=0.25, settle=0.05
+    ),
+    cases=cases,
+    judge=judge,
+    kpis=FIGURES.units,
+    figures=("time-traces", "energy-balance"),
+)

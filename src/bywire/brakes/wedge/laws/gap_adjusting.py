@@ -1,0 +1,92 @@
+"""The wedge brake's adjuster in its ECU: it reads the gap from the moment control, which it tells.
+
+The way from parking to contact is what the moment control believes. What the adjuster means to take
+away comes off that, so that the next application does not creep through a gap that is gone.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
+
+from bywire.brakes.wedge.laws import moment_control
+from bywire.control import wear_adjuster
+from bywire.core import ops
+from bywire.core.faults import ParameterFault
+from bywire.core.quantities import Duration, Temperature, Unit
+from bywire.core.signals import Signal
+
+Slope = Annotated[float, Unit("m/rad", 1e-4), Field(gt=0, allow_inf_nan=False)]
+
+NEEDS = {"adjuster.law": "screw"}
+FAULTS = tuple(
+    ParameterFault(name, f"adjuster {what}", with_it={"fault": name}, needs=NEEDS)
+    for name, what in (
+        ("stuck", "turns nothing, and counts on"),
+        ("one-way", "gives no clearance back, and counts on"),
+        ("slips", "slips on every second tooth, and counts on"),
+        ("over-adjusts", "turns one tooth too many"),
+        ("blind-to-heat", "takes a hot disc for a cold one"),
+    )
+)
+
+
+class Parameters(wear_adjuster.Parameters):
+    """The adjuster's law, when it runs, and what it believes."""
+
+    T_adjust: Duration
+    """sample time, in which all teeth turn that are due"""
+    gap_slope_hat: Slope
+    """clearance per motor angle, as it believes it"""
+    T_disc_hat: Temperature
+    """temperature for which it takes the disc"""
+
+
+class State(NamedTuple):
+    """What the adjuster remembers."""
+
+    applied: Annotated[float, Signal("1", "the brake was applied since it was parked last")]
+    wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
+    teeth: Annotated[float, Signal("1", "teeth turned, as the adjuster counts them", 3.0)]
+
+
+class Input(NamedTuple):
+    """Contact and mode of the moment control, and whether it is to brake."""
+
+    theta_c: Annotated[float, Signal("rad", "contact position, estimated", 1.7)]
+    mode: Annotated[float, Signal("1", "mode of the moment control", 3.0)]
+    wanted: Annotated[float, Signal("1", "braking is demanded")]
+
+
+class Output(NamedTuple):
+    """Teeth that it means to turn, and that do; mode; clearance of the cold brake behind them."""
+
+    teeth: wear_adjuster.Teeth
+    turned: wear_adjuster.Teeth
+    mode: Annotated[float, Signal("1", "adjuster: 0 waits, 1 brake applied, 2 turns", 2.0)]
+    gap: Annotated[float, Signal("m", "clearance as the adjuster believes it", 2e-4)]
+
+
+def output(x: State, u: Input, par: Parameters) -> tuple[State, Output]:
+    """Advance the adjuster by one sample."""
+    seen = wear_adjuster.Input(
+        gap=par.gap_slope_hat * u.theta_c,
+        T=par.T_disc_hat,
+        touching=ops.where((u.mode - moment_control.MOMENT) ** 2 < 0.25, 1.0, 0.0),
+        parked=ops.where(u.mode < 0.5, 1.0, 0.0),
+        wanted=u.wanted,
+    )
+    own, out = wear_adjuster.output(wear_adjuster.State(*x), seen, par)
+    gap = wear_adjuster.cold_gap(seen, par) - par.tooth * out.teeth
+    return State(*own), Output(out.teeth, out.turned, out.mode, gap)
+
+
+def contact(
+    theta_c: Annotated[float, Signal("rad", "contact position, estimated", 1.7)],
+    rate: Annotated[float, Signal("1/s", "teeth that are meant to turn in a second", 50.0)],
+    T: Annotated[float, Signal("s", "sample time of the moment control", 1e-3)],
+    par: Parameters,
+) -> Annotated[float, Signal("rad", "contact position, estimated", 1.7)]:
+    """Return where the moment control believes the pads to touch, a sample of turning later."""
+    return theta_c - par.tooth / par.gap_slope_hat * rate * T
