@@ -18,7 +18,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.simulation.contact_set import overlaps, stiffness, violations
 from bywire.simulation.elimination import Reduced, eliminate
 from bywire.simulation.linear_form import Form, forms
-from bywire.simulation.set_valued import Projection, project_fast, sliding
+from bywire.simulation.set_valued import Problem, Projection, project_fast, sliding
 from bywire.simulation.symbols import SX, column, nonlinear, scalars, symbol_tuple
 
 NEVER = 1e30  # bound of a one-sided limit's reaction
@@ -37,25 +37,6 @@ class Symbols:
     m: Any
     p: Any
     h: Any
-
-
-@dataclass(frozen=True)
-class Problem:
-    """What set-valued forces of an exact pass must solve, and the symbols of their solution.
-
-    Parameters
-    ----------
-    matrix, start, low, high
-        S, c and bounds of `set_valued.project_exact`, shapes (m, m) and (m,).
-    solution
-        Velocities and forces, shape (m,) each, and whether they failed.
-    """
-
-    matrix: Any
-    start: Any
-    low: Any
-    high: Any
-    solution: Projection
 
 
 @dataclass(frozen=True)

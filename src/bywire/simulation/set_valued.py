@@ -31,6 +31,25 @@ class Projection:
     failed: Any
 
 
+@dataclass(frozen=True)
+class Problem:
+    """What set-valued forces of an exact pass must solve, and the symbols of their solution.
+
+    Parameters
+    ----------
+    matrix, start, low, high
+        S, c and bounds, shapes (m, m) and (m,).
+    solution
+        Velocities and forces, shape (m,) each, and whether they failed.
+    """
+
+    matrix: Any
+    start: Any
+    low: Any
+    high: Any
+    solution: Projection
+
+
 def _within(force: Any, low: Any, high: Any) -> Any:
     return ca.fmin(ca.fmax(force, low), high)
 

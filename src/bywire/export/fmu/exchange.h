@@ -71,9 +71,8 @@ static void refresh(run *r) {
   r->is_stale = 0;
 }
 
-/* Take the modes that state and inputs ask for; 1 where a solver must begin anew: a state was set to
- * zero, or its rate may jump, by a mode or an input, behind which some clients' solvers go on as
- * if nothing had happened unless states are said to have changed. */
+/* Take the modes that state and inputs ask for; 1 where a state was set to zero or a rate may jump:
+ * some clients' solvers begin anew only where states are said to have changed. */
 static int settle(run *r) {
   double balance[STATES], mass[STATES], low[MODAL + 1], high[MODAL + 1];
   double pressed[CONTACTS + 1], lack[CONTACTS + 1], mode[MODAL + 1], closed[CONTACTS + 1];

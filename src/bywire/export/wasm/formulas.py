@@ -12,6 +12,7 @@ import struct
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from bywire.core.errors import CompilerError
 from bywire.simulation.expressions import needed
@@ -30,7 +31,7 @@ _MOST = 0xFFFF  # lengths and names have two bytes
 _EITHER = frozenset({"add", "mul", "eq", "ne", "and", "or"})  # operands may change places
 
 Places = Mapping[tuple[str, int], int]
-_Value = tuple[object, ...]
+_Value = tuple[Any, ...]
 _Token = tuple[str, int, bool]  # operation, which operands have names, whether it gets one
 
 
