@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -19,7 +18,7 @@ from bywire.simulation.compiler import IN_TURN, VECTOR, Compiler, find_compiler,
 from bywire.simulation.engine import CUDA, Prepared, built_once, engine_names
 from bywire.simulation.kernel_cache import load
 from bywire.simulation.layout import Layout
-from bywire.simulation.native import plan_array, pointer
+from bywire.simulation.native import Ends, plan_array, pointer
 from bywire.simulation.schedule import Schedule
 
 if TYPE_CHECKING:
@@ -29,22 +28,6 @@ if TYPE_CHECKING:
 
 PAIRED = 32
 """cases from which on kernels may carry on two vectors in turn: with fewer, lanes would be idle"""
-
-
-@dataclass(frozen=True)
-class Ends:
-    """Where the signals recorded at both ends of the rows alone go.
-
-    Parameters
-    ----------
-    values
-        Shape (signals, cases, 2), those of a signal in one piece.
-    frames
-        Those of the first and the last row.
-    """
-
-    values: Array
-    frames: tuple[int, int]
 
 
 class CaseKernel(Protocol):

@@ -9,7 +9,6 @@ from __future__ import annotations
 import copy
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,13 +18,10 @@ from bywire.simulation.cuda_device import CudaDevice, find_device
 from bywire.simulation.emission import layout_of, leaf_count
 from bywire.simulation.emit_cuda import ENTRY, THREADS, emit_cuda
 from bywire.simulation.layout import Layout
-from bywire.simulation.native import Request, plan_array
+from bywire.simulation.native import Ends, Request, plan_array
 from bywire.simulation.program import Program
 from bywire.simulation.schedule import Schedule
 from bywire.simulation.stages import Stages, build_stages
-
-if TYPE_CHECKING:
-    from bywire.simulation.case_kernels import Ends
 
 MOST = 2**15
 """cases of a batch: as many threads as the largest processors hold at once"""

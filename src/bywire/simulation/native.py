@@ -40,6 +40,22 @@ class Request:
     selection: NDArray[np.int32]
 
 
+@dataclass(frozen=True)
+class Ends:
+    """Where the signals recorded at both ends of the rows alone go.
+
+    Parameters
+    ----------
+    values
+        Shape (signals, cases, 2), those of a signal in one piece.
+    frames
+        Those of the first and the last row.
+    """
+
+    values: Array
+    frames: tuple[int, int]
+
+
 def plan_array(schedule: Schedule, begin: int, end: int, selected: int) -> NDArray[np.int64]:
     """Return the kernel's plan for frames begin..end; the row of the last frame at the end."""
     return np.array(

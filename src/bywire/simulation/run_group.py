@@ -20,9 +20,10 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
-from bywire.simulation.case_kernels import CaseKernel, Ends, case_kernel, is_side_by_side
+from bywire.simulation.case_kernels import CaseKernel, case_kernel, is_side_by_side
 from bywire.simulation.changes import energies, pieces, put_in_signals
 from bywire.simulation.engine import CUDA, prepare, structure_of
+from bywire.simulation.native import Ends
 from bywire.simulation.run import (
     Run,
     Trajectory,
