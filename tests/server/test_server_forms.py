@@ -35,7 +35,7 @@ LEFT_OUT = {
     "identify": {"study"},
     "design": {"requirements", "free_derivative", "vary", "drawn", "probability", "seed"},
     "page": {"vary", "set"},
-    "study": {"workers", "cluster"},
+    "study": {"workers", "cluster", "engine"},
 }
 """options without a field"""
 OWN_WORDS = {

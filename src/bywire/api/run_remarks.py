@@ -46,12 +46,17 @@ def _faults(result: Result) -> list[str]:
 
 
 def _of_models(result: Result) -> list[str]:
-    """Return what the models say of their runs; the same of several of them once."""
+    """Return what the models say of their runs; the same of several of them once.
+
+    Not of recordings that hold other things than the model's signals.
+    """
     texts: dict[str, None] = {}
     for recording in result.recordings.values():
         model = ASSEMBLIES.all().get(str(recording.attrs.get("model")))
         text = recording.attrs.get("parameters")
-        if model is not None and text is not None and recording.sizes.get("time"):
+        if model is None or text is None or not recording.sizes.get("time"):
+            continue
+        if all(name in recording for name in model.Output._fields):
             par = type(result.bench.par).model_validate_json(text)
             texts |= dict.fromkeys(model().remarks(recording, par))
     return list(texts)

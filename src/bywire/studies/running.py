@@ -9,6 +9,8 @@ from functools import partial
 from bywire.bench import running
 from bywire.bench.result import Result
 from bywire.core.typing import Progress
+from bywire.simulation.cuda_device import find_device
+from bywire.simulation.engine import CUDA
 from bywire.studies.executor import executor_of
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.rare_failures import rare_failures
@@ -64,10 +66,14 @@ def complete(
         When the folder is another study's, or cannot be written.
     RunError
         When the bench itself fails, or the workers are lost.
+    DeviceError
+        When the bench wants a graphics processor and there is none.
     KeyboardInterrupt
         When interrupted; what is finished stays.
     """
     until = time.monotonic() + plan.time
+    if plan.bench.engine == CUDA:
+        find_device()  # else there would be a folder without a study
     store.open(plan, origin)
     damaged = store.drop_damaged()
     itself = partial(running.run, plan.bench, estimate_error=True)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import bywire
+from bywire.bench.bench_file import read
 
 
 @pytest.fixture(scope="module")
@@ -95,11 +96,22 @@ def test_without_it_the_wheel_locks_and_slides_as_far_as_the_trial_says():
     assert result.kpi("locked_time").value > 4.0
 
 
+def stops_by_rules(surface, duration):
+    """Return stops from speeds next to each other: by rules a single one tells little."""
+    bench = read(
+        "corner-panic",
+        {"ecu.abs": "rules", "options.surface": surface, "options.duration": duration},
+    )
+    return bywire.simulate_ensemble(
+        bench, {"options.v_0": 100.0 / 3.6 + np.linspace(-0.02, 0.02, 16)}
+    )
+
+
 def test_rules_and_a_step_of_half_the_length_on_the_corner():
-    rules = bywire.run("corner-panic", {"ecu.abs": "rules"}, estimate_error=False)
-    assert rules.kpi("braking_efficiency").value >= 85.0
-    assert rules.kpi("locked_time").value == 0.0
-    assert set(np.unique(rules.recording["phase_x"])) == {0.0, 1.0, 2.0, 3.0}
+    rules = stops_by_rules("wet-asphalt", "9 s")
+    assert rules.kpi("braking_efficiency").mean() >= 85.0
+    assert rules.kpi("locked_time").max() == 0.0
+    assert set(np.unique(rules["phase_x"])) == {0.0, 1.0, 2.0, 3.0}
     at = [
         bywire.run("corner-panic", {"simulation.step": step}, estimate_error=False)
         .kpi("stopping_distance").value
@@ -110,18 +122,21 @@ def test_rules_and_a_step_of_half_the_length_on_the_corner():
 
 @pytest.mark.parametrize(
     ("surface", "pi", "rules"),
-    [("dry-asphalt", 84.0, 85.0), ("wet-cobble", 95.0, 85.0), ("dry-cobble", 58.0, 85.0)],
+    [("dry-asphalt", 84.0, 85.0), ("wet-cobble", 95.0, 85.0), ("dry-cobble", 58.0, 78.0)],
 )
 def test_no_wheel_of_a_corner_locks_on_any_surface(surface, pi, rules):
-    # A slip of 0.105 is far below the peak of dry cobble: see docs/vehicle-trust.md.
-    for law, least in (("pi", pi), ("rules", rules)):
-        result = bywire.run(
-            "corner-panic",
-            {"options.surface": surface, "ecu.abs": law, "options.duration": "14 s"},
-            estimate_error=False,
-        )
-        assert result.kpi("braking_efficiency").value >= least
-        assert result.kpi("locked_time").value == 0.0
+    # On dry cobble a slip of 0.105 is far below the peak, and rules scatter: see
+    # docs/vehicle-trust.md.
+    result = bywire.run(
+        "corner-panic",
+        {"options.surface": surface, "options.duration": "14 s"},
+        estimate_error=False,
+    )
+    assert result.kpi("braking_efficiency").value >= pi
+    assert result.kpi("locked_time").value == 0.0
+    stops = stops_by_rules(surface, "14 s")
+    assert stops.kpi("braking_efficiency").mean() >= rules
+    assert stops.kpi("locked_time").max() == 0.0
 
 
 def test_slip_control_hurries_below_its_slip_on_dry_road():

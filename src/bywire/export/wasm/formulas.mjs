@@ -8,7 +8,7 @@ const TRUTHS = new Set(["lt", "le", "eq", "ne", "not", "and", "or"]);
 const PLAIN = { add: 0xa0, sub: 0xa1, mul: 0xa2, neg: 0x9a, fabs: 0x99, sqrt: 0x9f, floor: 0x9c,
   ceil: 0x9b, copysign: 0xa6, lt: 0x63, le: 0x65, eq: 0x61, ne: 0x62 };
 const GET = 0x20, SET = 0x21, TEE = 0x22, LOAD = 0x2b, STORE = 0x39, I32 = 0x7f, F64 = 0x7c;
-const NEAR = 64; // values back that a byte of an operand reaches
+const REACH = 64; // values back that a byte of an operand reaches
 
 /** Return a number as the format writes it: seven bits a byte. */
 function leb(number) {
@@ -28,7 +28,7 @@ function counted(...parts) {
 
 const section = (id, items) => [[id], counted(leb(items.length), ...items)];
 
-const named = (name) => [name.length, ...new TextEncoder().encode(name)];
+const inBytes = (name) => [name.length, ...new TextEncoder().encode(name)];
 
 /** Return values (inputs, constants, operations with their operands) and formulas. */
 function readTable(buffer) {
@@ -51,7 +51,7 @@ function readTable(buffer) {
   const names = values.map((_, k) => k), stack = [];
   const operand = () => {
     const byte = bytes[at++];
-    return names[byte === 0 ? number() : byte > NEAR ? often[byte - NEAR - 1] : names.length - byte];
+    return names[byte === 0 ? number() : byte > REACH ? often[byte - REACH - 1] : names.length - byte];
   };
   for (let k = 0; k < count; ++k) {
     const kind = kinds[bytes[6 + k]], op = OPERATIONS[kind >> 4];
@@ -179,10 +179,10 @@ async function functionsOf(buffer, exported, base) {
     [0, 0x61, 0x73, 0x6d, 1, 0, 0, 0],
     ...section(1, [[0x60, 0, 0], [0x60, 1, I32, 1, I32], [0x60, 1, F64, 1, F64],
       [0x60, 2, F64, F64, 1, F64]]),
-    ...section(2, [...CALLED.map((op) => [...named("m"), ...named(op), 0, op === "pow" ? 3 : 2]),
-      [...named("m"), ...named("memory"), 2, 0, 1]]),
+    ...section(2, [...CALLED.map((op) => [...inBytes("m"), ...inBytes(op), 0, op === "pow" ? 3 : 2]),
+      [...inBytes("m"), ...inBytes("memory"), 2, 0, 1]]),
     ...section(3, formulas.map(({ again }) => [again ? 1 : 0])),
-    ...section(7, formulas.map((_, k) => [...named(`${k}`), 0, ...leb(CALLED.length + k)])),
+    ...section(7, formulas.map((_, k) => [...inBytes(`${k}`), 0, ...leb(CALLED.length + k)])),
     ...section(10, bodies),
   ];
   const bytes = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
