@@ -14,6 +14,7 @@ from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.compiler import SINGLE, compile_library, find_compiler
 from bywire.simulation.rare_text import PROJECTION
 from bywire.simulation.set_valued import (
+    FITTING,
     NEVER,
     NOTHING,
     RESIDUAL,
@@ -50,6 +51,7 @@ enum {{ SETS = {m} }};
 #define NEVER {NEVER}
 #define NOTHING {NOTHING}
 #define RESIDUAL {RESIDUAL}
+#define FITTING {FITTING}
 {PROJECTION}
 void each(int count, const double *posed, double *w, double *failed) {{
   double force[SETS];

@@ -17,7 +17,7 @@ from bywire.simulation.layout import ATTEMPTS, CAP, CLOSE, EDGE, NEAR, STILL, mo
 from bywire.simulation.operation import Node
 from bywire.simulation.quadrature import Levels
 from bywire.simulation.rare_text import CUT, PROJECTION
-from bywire.simulation.set_valued import NEVER, NOTHING, RESIDUAL
+from bywire.simulation.set_valued import FITTING, NEVER, NOTHING, RESIDUAL
 from bywire.simulation.stages import STATE, Stages
 
 APART = "__attribute__((noinline))"  # but fast: what is cold is compiled to be short
@@ -57,6 +57,7 @@ enum {{ NX = {nx}, FLOW = {2 * nx + nr}, FLOWS = {nq}, VELOCITIES = {len(velocit
 #define NEVER {NEVER}
 #define NOTHING {NOTHING}
 #define RESIDUAL {RESIDUAL}
+#define FITTING {FITTING}
 static const int velocity[] = {{{", ".join(map(str, velocities or (0,)))}}};"""
 
 

@@ -51,12 +51,24 @@ static inline double misfit(const double *S, const double *c, const double *low,
   return total;
 }
 
-// Try every combination of signs and take the one that fits best; return whether it fails.
+// Take the signs of rows by themselves where they fit; else try every combination and take the one
+// that fits best. Return whether it fails.
 static APART int project(const double *posed, double *w, double *force) {
   const double *S = posed, *c = S + SETS * SETS, *low = c + SETS, *high = low + SETS;
-  double best = NEVER, tried[SETS];
-  int sign[SETS] = {0}, k = 0;
-  memset(w, 0, SETS * sizeof(double));
+  double best = 0.0, tried[SETS];
+  int sign[SETS], k = 0;
+  for (int i = 0; i < SETS; ++i) {
+    sign[i] = (c[i] + low[i] > 0.0) - (c[i] + high[i] < 0.0);
+    best += !sign[i] && low[i] >= high[i];
+  }
+  with_signs(S, c, low, high, sign, w);
+  best += misfit(S, c, low, high, w);
+  if (best <= FITTING) k = -1;
+  else {
+    best = NEVER;
+    memset(w, 0, SETS * sizeof(double));
+    memset(sign, 0, sizeof(sign));
+  }
   while (k >= 0) {
     with_signs(S, c, low, high, sign, tried);
     double total = misfit(S, c, low, high, tried);

@@ -15,6 +15,7 @@ import casadi as ca
 
 NEVER = 1e30  # more than any misfit
 NOTHING = 1e-318  # makes exactly zero of a misfit below 1e-6
+FITTING = 1e-12  # share of a row's own scale below which signs that were guessed are taken
 RESIDUAL = 1e-9  # share of a row's own scale above which a projection counts as failed
 
 

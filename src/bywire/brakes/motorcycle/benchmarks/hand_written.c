@@ -71,7 +71,7 @@ typedef struct { Sim s; double m[M_COUNT], e[E_COUNT]; } Saved;
 
 /* Which of the stops push, as stiffnesses, and whether the chamber is held at zero pressure. */
 typedef struct { bool touching, held; double k_near, k_far; } Sides;
-typedef struct { double om, i, dpm, dpd, impulse, way, load, limit; } Pass;
+typedef struct { double om, i, dpm, dpd, impulse; } Pass;
 
 INLINE double max2(double a, double b) { return a > b ? a : b; }
 INLINE double min2(double a, double b) { return a < b ? a : b; }
@@ -168,7 +168,6 @@ INLINE Pass solve(const Plant *k, const Held *u, const Sim *s, Sides side)
     Pass q;
     q.impulse = -copysign(s->om == 0.0 && fabs(c) < limit ? fabs(c) : limit, way);
     q.om = (c + q.impulse) * (1.0 / S);
-    q.way = way, q.load = load, q.limit = limit;
     const double both = s->om + q.om;
     q.i = u->alpha * s->i + u->drive - u->gamma * both;
     q.dpm = side.held ? -s->pm : r * (k->a * both - k->two_g * drop);
@@ -266,14 +265,14 @@ static void try_part(Part *y, const Plant *k, double duty, const Sim *s, double 
 
 /* By how much half an increment of the speed is less behind a zero: friction jumps, and opposes the
  * other direction, or holds. */
-static double jump(const Part *y)
+static __attribute__((noinline, cold)) double jump(const Part *y)
 {
     const Plant *k = &y->k;
-    const double om = y->s.om + y->s.dom, speed = fabs(om);
+    const double speed = fabs(y->s.om + y->s.dom), load = max2(y->s.pm + y->s.dpm, 0.0);
     const double decay = speed < k->still ? exp(-k->c * speed) : 0.0;
-    const double coulomb = k->T_pr + (y->q.way > 0.0 ? k->f_n : k->f_p) * y->q.load;
-    const double peak = coulomb * (y->q.way > 0.0 ? k->brk_n : k->brk_p);
-    return 0.5 * (y->q.limit + (coulomb + k->mu * speed) + peak * decay) / k->M;
+    const double ahead = (k->T_pr + k->f_p * load) * (1.0 + k->brk_p * decay);
+    const double back = (k->T_pr + k->f_n * load) * (1.0 + k->brk_n * decay);
+    return (0.5 * (ahead + back) + k->mu * speed) / k->M;
 }
 
 /* Shorten a part of length t to where the speed is zero: by the parabola through three lengths,
@@ -319,7 +318,7 @@ static double shorten(Part *y, const Plant *k, double duty, const Sim *s, double
 /* A substep near a stop, with the pressure about to fall below zero, or in which the speed passes
  * zero: there it is cut, for friction jumps, and the shaft rests or turns on as friction decides,
  * from whose jump the midpoint behind the cut is predicted. */
-static void careful(const Plant *k, double duty, Sim *s)
+static __attribute__((noinline, cold)) void careful(const Plant *k, double duty, Sim *s)
 {
     double left = k->h;
     bool settled = true;
