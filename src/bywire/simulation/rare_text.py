@@ -51,18 +51,24 @@ static inline double misfit(const double *S, const double *c, const double *low,
   return total;
 }
 
-// Take the signs of rows by themselves where they fit; else try every combination and take the one
-// that fits best. Return whether it fails.
+// Take signs that rows give each other in turn, if they fit; else try every combination and take the
+// one that fits best. Return whether it fails.
 static APART int project(const double *posed, double *w, double *force) {
   const double *S = posed, *c = S + SETS * SETS, *low = c + SETS, *high = low + SETS;
-  double best = 0.0, tried[SETS];
+  double best = NEVER, tried[SETS];
   int sign[SETS], k = 0;
-  for (int i = 0; i < SETS; ++i) {
-    sign[i] = (c[i] + low[i] > 0.0) - (c[i] + high[i] < 0.0);
-    best += !sign[i] && low[i] >= high[i];
+  memset(w, 0, SETS * sizeof(double));
+  for (int turn = 0; turn < 4 && best > FITTING; ++turn) {
+    best = 0.0;
+    for (int i = 0; i < SETS; ++i) {
+      double z = c[i];
+      for (int j = 0; j < SETS; ++j) z -= j == i ? 0.0 : S[i * SETS + j] * w[j];
+      sign[i] = (z + low[i] > 0.0) - (z + high[i] < 0.0);
+      best += !sign[i] && low[i] >= high[i];
+    }
+    with_signs(S, c, low, high, sign, w);
+    best += misfit(S, c, low, high, w);
   }
-  with_signs(S, c, low, high, sign, w);
-  best += misfit(S, c, low, high, w);
   if (best <= FITTING) k = -1;
   else {
     best = NEVER;
