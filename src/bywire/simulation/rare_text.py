@@ -51,8 +51,8 @@ static inline double misfit(const double *S, const double *c, const double *low,
   return total;
 }
 
-// Take signs that rows give each other in turn, if they fit; else try every combination and take the
-// one that fits best. Return whether it fails.
+// Take signs that rows give each other in turn, if they fit; else try every combination, and take
+// the one that fits best. Return whether it fails.
 static APART int project(const double *posed, double *w, double *force) {
   const double *S = posed, *c = S + SETS * SETS, *low = c + SETS, *high = low + SETS;
   double best = NEVER, tried[SETS];
