@@ -51,8 +51,9 @@ def _of_models(result: Result) -> list[str]:
     Not of recordings that hold other things than the model's signals.
     """
     texts: dict[str, None] = {}
+    models = ASSEMBLIES.beside(type(result.bench.par))
     for recording in result.recordings.values():
-        model = ASSEMBLIES.all().get(str(recording.attrs.get("model")))
+        model = models.get(str(recording.attrs.get("model")))
         text = recording.attrs.get("parameters")
         if model is None or text is None or not recording.sizes.get("time"):
             continue

@@ -142,12 +142,13 @@ STATED_FIGURES = Kind(
 
 def stated_for(bench: Bench) -> list[StatedLevel | StatedRange]:
     """Return what sources state for a bench's signals, as far as its options are theirs."""
-    return _holding(bench, STATED.all().values())
+    return _holding(bench, STATED.beside(type(bench.par)).values())
 
 
 def stated_figures(bench: Bench) -> dict[str, StatedFigure]:
     """Return what sources state for a bench's key figures, by figure, likewise."""
-    return {each.figure: each for each in _holding(bench, STATED_FIGURES.all().values())}
+    statements = STATED_FIGURES.beside(type(bench.par)).values()
+    return {each.figure: each for each in _holding(bench, statements)}
 
 
 def _holding(bench: Bench, statements: Iterable[S]) -> list[S]:

@@ -133,6 +133,15 @@ class Kind(Generic[T]):
         owner = next((brake for brake in brakes().values() if brake.module == module), None)
         return {thing.name: thing for thing, _ in _declared(self, owner)} if owner else {}
 
+    def beside(self, cls: type) -> Mapping[str, T]:
+        """Return the things of the brake in which a class stands; all, if it stands in none.
+
+        Nothing of other brakes is loaded for it.
+        """
+        where = cls.__module__ + "."
+        homes = [b.module for b in brakes().values() if where.startswith(f"{b.module}.")]
+        return self.of(max(homes, key=len)) if homes else self.all()
+
     def owner(self, name: str) -> str:
         """Return the module of the brake that brings a thing; empty for a general one."""
         return next((owner for thing, owner in _all(self) if thing.name == name), "")

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 from bywire.core.callers import in_callers_words
 from bywire.report.document import Document, FigureBlock, TableBlock
 from bywire.report.result_folder import ResultFolder, result_folder
-from bywire.report.side_by_side import drawn_side_by_side
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -145,6 +144,8 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
         *([document.page_name] if document.is_paged else []),
         *([document.record] if document.record else []),
     ]
+    from bywire.report.side_by_side import drawn_side_by_side  # loads what starts processes
+
     with drawn_side_by_side(shown):
         for each in document.attachments:
             if each.after_record and document.record:

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.control import abs_rules, lift_pi, mixed_slip, slip_pi, vehicle_speed, wheel_speed
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant, Unit
@@ -74,5 +75,23 @@ class TwoWheelerParameters(ParameterSet):
     vehicle: VehicleParameters
     front: HotBrakeParameters
     rear: HotBrakeParameters
+    sensors: SensorParameters
+    ecu: EcuParameters
+
+
+class WholeBrakeParameters(ParameterSet):
+    """A brake with all of its actuator, the disc, and its heat."""
+
+    actuator: MotorcycleParameters
+    disc: brake_disc.Parameters
+    heat: disc_heat.Parameters
+
+
+class WholeRearParameters(ParameterSet):
+    """The vehicle with the whole brake by wire at its rear wheel."""
+
+    vehicle: VehicleParameters
+    front: HotBrakeParameters
+    rear: WholeBrakeParameters
     sensors: SensorParameters
     ecu: EcuParameters

@@ -8,11 +8,8 @@ import xarray as xr
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.two_wheeler.case import Demand, RidingSpeed, on_surface, rolling_case
-from bywire.brakes.two_wheeler.rigs.whole_rear import (
-    TwoWheelerWholeRear,
-    WholeRearParameters,
-    at_speed,
-)
+from bywire.brakes.two_wheeler.parameters import WholeRearParameters
+from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear, at_speed
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.core.typing import Array

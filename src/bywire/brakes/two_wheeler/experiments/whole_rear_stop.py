@@ -14,11 +14,8 @@ from bywire.bench.kpis.registry import units_of
 from bywire.bench.kpis.vehicle_stop import standstill
 from bywire.brakes.two_wheeler.case import JUDGE, locked_stop, on_surface, rolling_case
 from bywire.brakes.two_wheeler.experiments.straight_stop import Options
-from bywire.brakes.two_wheeler.rigs.whole_rear import (
-    TwoWheelerWholeRear,
-    WholeRearParameters,
-    at_speed,
-)
+from bywire.brakes.two_wheeler.parameters import WholeRearParameters
+from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear, at_speed
 
 FIGURES = Figures(
     rear_energy=("J", "Energy that the rear brake draws until the vehicle stands."),

@@ -11,41 +11,16 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 from bywire.brakes.motorcycle.model import MotorcycleBrake
-from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import memory_at, resting_at
 from bywire.brakes.two_wheeler import ecu
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire, awake, tick
-from bywire.brakes.two_wheeler.parameters import (
-    EcuParameters,
-    HotBrakeParameters,
-    SensorParameters,
-)
+from bywire.brakes.two_wheeler.parameters import WholeRearParameters
 from bywire.core.model import Task
-from bywire.core.parameters import ParameterSet
 from bywire.core.parts import Part, Wire
 from bywire.core.subassembly import Sub
-from bywire.plant import brake_disc, disc_heat, pressure_loop, wheel_encoder
+from bywire.plant import brake_disc, pressure_loop, wheel_encoder
 from bywire.vehicle.hot_brakes import HotBrakes, cold_start
-from bywire.vehicle.two_wheeler import VehicleParameters, rolling_start
-
-
-class RearParameters(ParameterSet):
-    """The rear brake: all of its actuator, the disc, and its heat."""
-
-    actuator: MotorcycleParameters
-    disc: brake_disc.Parameters
-    heat: disc_heat.Parameters
-
-
-class WholeRearParameters(ParameterSet):
-    """The whole vehicle."""
-
-    vehicle: VehicleParameters
-    front: HotBrakeParameters
-    rear: RearParameters
-    sensors: SensorParameters
-    ecu: EcuParameters
-
+from bywire.vehicle.two_wheeler import rolling_start
 
 Par = WholeRearParameters
 

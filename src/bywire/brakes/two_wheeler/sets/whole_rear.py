@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bywire.brakes.motorcycle.sets import dardanelli2010
-from bywire.brakes.two_wheeler.rigs.whole_rear import WholeRearParameters
+from bywire.brakes.two_wheeler.parameters import WholeRearParameters
 from bywire.brakes.two_wheeler.sets import sport600
 from bywire.core.catalog import CitedSet
 
