@@ -39,8 +39,8 @@ FEWER = {  # of experiments of many runs, which tests of their brakes run as the
 }  # fmt: skip
 LARGE = (
     "bandwidths", "corner-panic", "corner-stop", "disc-stop", "force-cycle", "friction-ramp",
-    "friction-sweep", "moment-pulse-950", "position-step", "rear-lift", "repeated-stops",
-    "slope-hold", "slow-stop", "static-force", "stiffness",
+    "friction-sweep", "moment-pulse-950", "position-step", "rear-drag", "rear-lift",
+    "repeated-stops", "slope-hold", "slow-stop", "static-force", "stiffness",
 )  # fmt: skip
 """kernels in lanes that no other test needs, and long runs; other experiments of the same models
 have their figures computed in the same way, and all that are computed by families are left"""
