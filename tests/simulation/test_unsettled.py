@@ -94,11 +94,14 @@ def test_unsettled_substeps_are_counted_alike() -> None:
 
 def test_stiff_undamped_wall_is_doubted() -> None:
     """It can return more energy than it took in while every substep settles: the run says so."""
-    stiff = rig(0.06, record=1e-3, tau_wall=0.0, mu=0.0, **STIFF)
-    result = simulate(stiff)
-    gained = result["E_stored"] + result["E_friction"] + result["E_damping"] - result["E_source"]
-    assert gained.max() > 0.02 * result["E_source"].max()  # else the doubt were for nothing
-    assert result.status == "unsettled" or "swings at" in result.doubt
+    shares = []
+    for share in (0.8, 1.0, 1.2):  # how much is chance
+        wall = share * STIFF["k_wall"]
+        result = simulate(rig(0.06, record=1e-3, tau_wall=0.0, mu=0.0, k_wall=wall))
+        gained = result["E_stored"] + result["E_friction"] + result["E_damping"]
+        shares.append((gained - result["E_source"]).max() / result["E_source"].max())
+        assert result.status == "unsettled" or "swings at" in result.doubt
+    assert max(shares) > 0.3  # else the doubt were for nothing
 
 
 @pytest.mark.parametrize(

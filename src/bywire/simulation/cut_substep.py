@@ -1,6 +1,6 @@
 """A substep that is cut where velocities pass zero, for the virtual machine.
 
-The same as the functions of ``emit_rare``, which says why.
+The same as the functions of ``rare_text``; ``emit_rare`` says why.
 """
 
 from __future__ import annotations
@@ -110,7 +110,8 @@ class CutSubstep:
             low, high = (t, high) if w * x[turns] > 0.0 else (low, t)
             slope = (w - at_P) / (t - P) + (w - at_Q) / (t - Q) - (at_Q - at_P) / (Q - P)
             following = t - w / slope
-            if abs(w) <= NEAR * change and before is not None:
+            is_near = abs(w) <= NEAR * change and first < following < final
+            if is_near and before is not None:
                 # The rest is on the line through two attempts.
                 share = (following - t) / (t - before[0])
                 moved = [now + share * (now - was) for now, was in zip(o, before[1], strict=True)]

@@ -51,6 +51,8 @@ static inline double misfit(const double *S, const double *c, const double *low,
   return total;
 }
 
+enum { GUESSES = 4 }; // a row's sign follows from the others' velocities, so often at most
+
 // Take signs that rows give each other in turn, if they fit; else try every combination, and take
 // the one that fits best. Return whether it fails.
 static APART int project(const double *posed, double *w, double *force) {
@@ -58,7 +60,7 @@ static APART int project(const double *posed, double *w, double *force) {
   double best = NEVER, tried[SETS];
   int sign[SETS], k = 0;
   memset(w, 0, SETS * sizeof(double));
-  for (int turn = 0; turn < 4 && best > FITTING; ++turn) {
+  for (int turn = 0; turn < GUESSES && best > FITTING; ++turn) {
     best = 0.0;
     for (int i = 0; i < SETS; ++i) {
       double z = c[i];
@@ -180,7 +182,8 @@ static APART int locate(const double *c, double h, double *t, const double *m, c
     const double slope = (at_N - at_P) / (N - P) + (at_N - at_Q) / (N - Q)
         - (at_Q - at_P) / (Q - P);
     const double next = N - at_N / slope;
-    if (fabs(at_N) <= NEAR * change && before > 0.0) { // the rest on the line through two attempts
+    const int is_near = fabs(at_N) <= NEAR * change && next > first && next < final;
+    if (is_near && before > 0.0) { // the rest on the line through two attempts
       const double share = (next - N) / (N - before);
 #ifdef TURNS // lanes: where compilers know what that means
       #pragma omp simd

@@ -297,7 +297,7 @@ static double shorten(Part *y, const Plant *k, double duty, const Sim *s, double
         const double slope = (at_N - at_P) / (N - P) + (at_N - at_Q) / (N - Q)
                              - (at_Q - at_P) / (Q - P);
         const double next = N - at_N / slope;
-        if (fabs(at_N) <= NEAR * change && before > 0.0) {
+        if (fabs(at_N) <= NEAR * change && before > 0.0 && next > first && next < final) {
             const double share = (next - N) / (N - before);
             y->q.om += share * (y->q.om - was.om), y->q.i += share * (y->q.i - was.i);
             y->q.dpm += share * (y->q.dpm - was.dpm), y->q.dpd += share * (y->q.dpd - was.dpd);
