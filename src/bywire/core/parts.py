@@ -103,6 +103,26 @@ class PartOptions(TypedDict, total=False):
 OPTIONS = tuple(PartOptions.__annotations__)
 
 
+def parameters_at(path: str, par: Any, where: str, declaration: str) -> Any:
+    """Return the parameters at a dotted path of those of an assembly.
+
+    ``where``: whose they are; ``declaration``: how one says where they stand.
+
+    Raises
+    ------
+    ModelError
+        When there are none.
+    """
+    value = par
+    for name in path.split("."):
+        value = getattr(value, name, None)
+    if value is None:
+        raise ModelError(
+            f"{where}: the parameters have no {path!r}: say where they stand, {declaration}"
+        )
+    return value
+
+
 class Part(Generic[X, U, F, P]):
     """An element of an assembly.
 
@@ -272,15 +292,7 @@ class Part(Generic[X, U, F, P]):
         ModelError
             When there are none where it looks for them.
         """
-        value = par
-        for name in self.path.split("."):
-            value = getattr(value, name, None)
-        if value is None:
-            raise ModelError(
-                f"{self.where}: the parameters have no {self.path!r}: say where they stand, "
-                f"Part({self.kind}, par='...')"
-            )
-        return value
+        return parameters_at(self.path, par, self.where, f"Part({self.kind}, par='...')")
 
     def state_at(self, instant: Instant, fixed: tuple[str, ...] | None) -> Any:
         """Return its state; ``fixed`` are those taken value-only, None for all."""

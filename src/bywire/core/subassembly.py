@@ -13,6 +13,7 @@ from typing import Any, Generic, Self, TypeVar, overload
 
 from bywire.core.errors import ModelError, unknown_name
 from bywire.core.model import Task
+from bywire.core.parts import parameters_at
 from bywire.core.seen import Seen
 from bywire.core.signals import Role, Signal, signals_of
 from bywire.core.wired import Instant, instant_of
@@ -190,15 +191,8 @@ class Sub(Generic[A]):
         ModelError
             When there are none where it looks for them.
         """
-        value = par
-        for name in self.path.split("."):
-            value = getattr(value, name, None)
-        if value is None:
-            raise ModelError(
-                f"{self.where}: the parameters have no {self.path!r}: say where they stand, "
-                f"Sub({type(self.assembly).__name__}, par='...')"
-            )
-        return value
+        declaration = f"Sub({type(self.assembly).__name__}, par='...')"
+        return parameters_at(self.path, par, self.where, declaration)
 
     # Tasks.
 
