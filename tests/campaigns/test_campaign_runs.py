@@ -21,6 +21,7 @@ from bywire.campaigns.residual import NEVER, detected, threshold
 from bywire.campaigns.simulating import faulty_traces, healthy_traces
 from bywire.campaigns.store import CampaignStore
 from bywire.core.errors import DeviceError, FileError, InputError
+from bywire.simulation.cuda_device import find_device
 
 SMALL = """
 bench = "hard-braking"
@@ -221,6 +222,7 @@ def test_what_does_not_fit_is_refused(tmp_path, right, wrong, message):
 
 def test_a_campaign_is_computed_by_the_engine_of_its_bench(campaign, monkeypatch):
     monkeypatch.setitem(sys.modules, "cuda.bindings.driver", None)
+    find_device.cache_clear()
     plan = campaign.findings.plan
     with pytest.raises(DeviceError, match="engine 'cuda' takes"):
         healthy_traces(replace(plan, bench=replace(plan.bench, engine="cuda")))
