@@ -231,6 +231,7 @@ def test_choosing_a_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
             with pytest.raises(CompilerError, match="BYWIRE_CC_QUICK = 'very' is not admissible"):
                 find_compiler()
         find_compiler.cache_clear()
+        monkeypatch.delenv("BYWIRE_CC_QUICK")
         monkeypatch.setenv("BYWIRE_CC", str(tmp_path / "missing"))
         with pytest.raises(CompilerError, match="missing' names no program"):
             find_compiler()
