@@ -22,6 +22,8 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.text import Text
 
+from bywire.report.lean_ticks import lean_ticks
+
 _COMPRESSION = 4
 """zlib's default of 6 takes a third longer for a whole figure, to save 3 %"""
 _FONTS = "'DejaVu Sans', 'Bitstream Vera Sans', Verdana, sans-serif"
@@ -50,8 +52,9 @@ def drawn(figure: Figure, dpi: float) -> tuple[bytes, bytes]:
         try:
             figure.dpi = dpi
             both = _Canvas(figure).get_renderer()
-            settle(figure)
-            figure.draw(both)
+            with lean_ticks(figure):
+                settle(figure)
+                figure.draw(both)
         finally:
             figure.dpi = resolution
             figure.set_canvas(canvas)
@@ -131,8 +134,9 @@ class _Both(RendererBase):
         self._agg, self.vector = agg, _Vector(agg.width, agg.height, agg.dpi)
         self._image: Any = None
         self.width, self.height, self.dpi = agg.width, agg.height, agg.dpi
-        for name in ("new_gc", "points_to_pixels", "get_text_width_height_descent",
-                     "get_canvas_width_height", "get_image_magnification", "flipy"):  # fmt: skip
+        self._sizes: dict[tuple[str, int, Any], tuple[float, float, float]] = {}
+        for name in ("new_gc", "points_to_pixels", "get_canvas_width_height",
+                     "get_image_magnification", "flipy"):  # fmt: skip
             setattr(self, name, getattr(agg, name))
         for name in ("draw_path", "draw_markers", "draw_path_collection", "draw_quad_mesh",
                      "draw_image", "draw_gouraud_triangles"):  # fmt: skip
@@ -148,8 +152,17 @@ class _Both(RendererBase):
         angle: float, ismath: Any = False, mtext: Text | None = None,
     ) -> None:  # fmt: skip
         self._agg.draw_text(gc, x, y, s, prop, angle, ismath, mtext)
-        width, _, _ = self._agg.get_text_width_height_descent(s, prop, ismath)
+        width, _, _ = self.get_text_width_height_descent(s, prop, ismath)
         self.vector.draw_text(gc, x, y, s, prop, angle, ismath, mtext, width)
+
+    def get_text_width_height_descent(
+        self, s: str, prop: FontProperties, ismath: Any
+    ) -> tuple[float, float, float]:
+        """Return the size of a text on pixels, measured when it is laid out and not again."""
+        key = s, hash(prop), ismath
+        if key not in self._sizes:
+            self._sizes[key] = self._agg.get_text_width_height_descent(s, prop, ismath)
+        return self._sizes[key]
 
     def _twice(self, name: str) -> Any:
         on_pixels, as_vectors = getattr(self._agg, name), getattr(self.vector, name)
