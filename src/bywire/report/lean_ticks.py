@@ -8,6 +8,7 @@ to draw it. Together that was a third of the time that a figure took.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -17,6 +18,7 @@ from matplotlib.figure import Figure
 _COMPUTED = ("_update_ticks", "_get_ticklabel_bboxes")
 _MADE = ("_get_tick", "_copy_tick_props")
 _PARTS = ("gridline", "tick1line", "tick2line", "label1", "label2")
+_LABELS = ("label1", "label2")
 _LISTS = ("majorTicks", "minorTicks")
 
 
@@ -46,6 +48,7 @@ class _Axis:
     def __init__(self, axis: Any) -> None:
         self._axis, self._place = axis, ()
         self._known: dict[object, Any] = {}
+        self._layouts: dict[object, Any] = defaultdict(dict)
         self._counts = {name: len(vars(axis).get(name, ())) for name in _LISTS}
         self._compute, self._measure, self._make = (
             getattr(axis, name) for name in (*_COMPUTED, _MADE[0])
@@ -106,7 +109,22 @@ class _Axis:
         tick = _twin(same[0])
         for name in _PARTS:
             setattr(tick, name, _twin(getattr(tick, name)))
+        for name in _LABELS:
+            _remember_layout(getattr(tick, name), self._layouts[major, name])
         return tick
+
+
+def _remember_layout(label: Any, known: dict[object, Any]) -> None:
+    """Have a label lay out its text once for all labels that look like it."""
+    lay_out = type(label)._get_layout
+
+    def layout(renderer: Any) -> Any:
+        looks = label.get_text(), label.get_rotation()
+        if looks not in known:
+            known[looks] = lay_out(label, renderer)
+        return known[looks]
+
+    label._get_layout = layout
 
 
 def _twin(artist: Any) -> Any:
