@@ -231,7 +231,7 @@ def _png(pixels: _Pixels, dpi: float = 0.0) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + b"".join([
         _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, kind, 0, 0, 0)),
         size,
-        _chunk(b"IDAT", zlib.compress(rows, _COMPRESSION)),
+        _chunk(b"IDAT", zlib.compress(rows.data, _COMPRESSION)),
         _chunk(b"IEND", b""),
     ])
 

@@ -13,13 +13,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 _COMPUTED = ("_update_ticks", "_get_ticklabel_bboxes")
 _MADE = ("_get_tick", "_copy_tick_props")
 _PARTS = ("gridline", "tick1line", "tick2line", "label1", "label2")
 _LABELS = ("label1", "label2")
 _LISTS = ("majorTicks", "minorTicks")
+_IS_KNOWN = all(hasattr(Axis, name) for name in (*_COMPUTED, *_MADE)) and hasattr(
+    Text, "_get_layout"
+)
+"""whether this is a matplotlib whose axes compute as those that were read; else they do alone"""
 
 
 @contextmanager
@@ -34,7 +40,9 @@ def lean_ticks(figure: Figure) -> Iterator[None]:
     figure
         Figure whose axes they are.
     """
-    known = [_Axis(axis) for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)]
+    # Ticks around a circle turn their texts by transforms that copies would share.
+    straight = [axes for axes in figure.axes if axes.name == "rectilinear" and _IS_KNOWN]
+    known = [_Axis(axis) for axes in straight for axis in (axes.xaxis, axes.yaxis)]
     try:
         yield
     finally:
@@ -46,7 +54,8 @@ class _Axis:
     """An axis whose methods compute only when its place has changed."""
 
     def __init__(self, axis: Any) -> None:
-        self._axis, self._place = axis, ()
+        self._axis = axis
+        self._place: tuple[Any, ...] = ()
         self._known: dict[object, Any] = {}
         self._layouts: dict[object, Any] = defaultdict(dict)
         self._counts = {name: len(vars(axis).get(name, ())) for name in _LISTS}
@@ -76,7 +85,7 @@ class _Axis:
             self._place, self._known = place, {}
         return self._known
 
-    def _drawn(self) -> list[Any]:
+    def _drawn(self) -> Any:
         known = self._at_place()
         if "drawn" not in known:
             known["drawn"] = self._compute()
