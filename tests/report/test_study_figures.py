@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
 from matplotlib.text import Text
 
+from bywire.core.typing import Array
 from bywire.report.study.convergence import convergence
 from bywire.report.study.histograms import Spread, histograms
 from bywire.report.study.readable_axis import scale_of
@@ -52,6 +55,11 @@ def assert_readable(figure: Figure) -> None:
         assert len(labels(axes)) <= 5
         assert not axes.xaxis.get_offset_text().get_text()
         assert not axes.yaxis.get_offset_text().get_text()
+
+
+def segments(drawn: object) -> list[Array]:
+    assert isinstance(drawn, LineCollection)
+    return drawn.get_segments()
 
 
 def entries(figure: Figure) -> list[str]:
@@ -160,6 +168,18 @@ def test_a_convergence_holds_its_estimate_and_what_is_wanted(
         assert low < 100.0 * value < high
 
 
+def test_the_outline_of_a_histogram_holds_all_cases() -> None:
+    values = RNG.normal(size=CASES)
+    axes = histograms({"overshoot": Spread(values, "%", 0.0)}, has_band=False).axes[0]
+    (outline,) = (each for each in axes.patches if isinstance(each, Polygon))
+    corners = outline.get_xy()
+    widths, heights = np.diff(corners[:, 0]), corners[1:, 1]
+    assert np.sum((widths * heights)[:-1]) / np.max(widths) == pytest.approx(CASES)
+    (low, high), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    assert low < np.min(values) < np.max(values) < high
+    assert bottom == 0.0 < np.max(corners[:, 1]) < top
+
+
 def test_parallel_coordinates_say_what_lines_are_and_where_limits_lie() -> None:
     met = ERROR.values <= 300.0
     rise = Axis("rise_time", "s", 0.06 + 0.01 * UNIT)
@@ -172,8 +192,9 @@ def test_parallel_coordinates_say_what_lines_are_and_where_limits_lie() -> None:
     mark = next(line for line in axes.lines if line.get_zorder() == 4.0)
     least, most = np.min(ERROR.values), np.max(ERROR.values)
     np.testing.assert_allclose(mark.get_ydata(), (300.0 - least) / (most - least))
-    lines = [line for line in axes.lines if len(line.get_xdata()) == 5]  # type: ignore[arg-type]
-    top = max(float(np.max(line.get_ydata())) for line in lines)
+    lines = [line for drawn in axes.collections for line in segments(drawn)]
+    assert len(lines) == CASES
+    top = max(float(np.max(line[:, 1])) for line in lines)
     for text in axes.texts:
         assert not 0.0 <= text.get_position()[1] <= top, "a line crosses what is written"
         assert text.get_bbox_patch() is not None

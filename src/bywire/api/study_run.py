@@ -112,6 +112,11 @@ class StudyRun(Answer):
     @property
     def warnings(self) -> list[str]:
         """What the runs warned of, cases without a result, and what is still to be computed."""
+        return list(self._warnings)
+
+    @cached_property
+    def _warnings(self) -> list[str]:
+        """The warnings, for which all cases are gone through once."""
         said = warned(self.findings, self.nominal.warnings)
         if self.status == "unfinished":
             resume = f"bywire study resume {self.folder}"

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, Polygon
 
 from bywire.core.typing import Array
 from bywire.report import style
@@ -68,8 +69,7 @@ def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
         style.dress(axes)
         scale = scale_of(spread.values, spread.unit)
         values = scale.factor * spread.values[np.isfinite(spread.values)]
-        axes.hist(values, bins=_bins(values), color=style.BLUE, alpha=0.75,
-                  histtype="stepfilled")  # fmt: skip
+        _draw_counts(axes, values)
         if has_band:
             axes.axvspan(*np.quantile(values, (0.05, 0.95)), color=style.SHADE, zorder=0)
         for at, look in ((spread.nominal, own), (spread.limit, bound)):
@@ -103,6 +103,22 @@ def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
     figure.legend(handles=lines, loc="outside upper left", ncols=3, frameon=False,
                   fontsize=style.TEXT_SIZE)  # fmt: skip
     return figure
+
+
+def _draw_counts(axes: Axes, values: Array) -> None:
+    """Fill the outline of the counts of values.
+
+    As a patch, its limits would be sought like those of curves: half as long as to lay out and
+    draw the panel.
+    """
+    counts, edges = np.histogram(values, _bins(values))
+    heights = np.concatenate([[0.0], np.repeat(counts, 2), [0.0]])
+    outline = np.column_stack([np.repeat(edges, 2), heights])
+    area = Polygon(outline, facecolor=style.BLUE, alpha=0.75)
+    area.sticky_edges.y.append(0.0)
+    axes.add_artist(area)
+    axes.update_datalim(outline)
+    axes.autoscale_view()
 
 
 def _bins(values: Array) -> int:

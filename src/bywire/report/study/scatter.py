@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
@@ -143,8 +145,8 @@ def parallel_coordinates(
          "misses a requirement"),
     ):  # fmt: skip
         if rows.size:
-            axes.plot(places, scaled[:, rows[:: max(1, rows.size // _LINES)]], color=color,
-                      alpha=opacity, linewidth=0.6)  # fmt: skip
+            shown = rows[:: max(1, rows.size // _LINES)]
+            _draw_lines(axes, scaled[:, shown], color, opacity)
             entries.append(Line2D([], [], color=color, label=text))
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
     is_inside = False
@@ -176,6 +178,15 @@ def parallel_coordinates(
     axes.spines[["left", "bottom"]].set_visible(False)
     _legend(figure, entries)
     return figure
+
+
+def _draw_lines(axes: Axes, ordinates: Array, color: str, opacity: float) -> None:
+    """Draw a line for each column, all as one artist: an artist each takes three times as long."""
+    lines = np.stack(np.broadcast_arrays(np.arange(len(ordinates)), ordinates.T), axis=-1)
+    axes.add_collection(LineCollection(
+        list(lines), colors=color, alpha=opacity, linewidths=0.6, capstyle="projecting",
+        joinstyle="round", zorder=2.0,
+    ))  # fmt: skip
 
 
 def _legend(figure: Figure, entries: Sequence[Artist]) -> None:
