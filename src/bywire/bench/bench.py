@@ -267,7 +267,7 @@ class Bench:
         following = self.definition.following
         if not options and (following is None or following(par) == self._following):
             known["chosen_options"] = self.chosen_options
-        made.cases()
+        known["_cases"] = made._made(self.definition.cases)
         return made
 
     @cached_property

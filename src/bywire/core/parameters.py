@@ -22,7 +22,7 @@ from bywire.core.errors import ModelError, ParameterError, place_of, unknown_nam
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
 from bywire.core.refusals import refusals
-from bywire.core.replacement import Places, fields_of, read
+from bywire.core.replacement import KNOWN, Places, fields_of, read
 from bywire.core.units import Written
 
 T = TypeVar("T", bound="ParameterSet")
@@ -73,9 +73,10 @@ class ParameterSet(BaseModel):
         chosen = {name: value for name, value in given.items() if type(value) is str}
         if (len(new) + len(chosen) == len(given)
             and new.keys() <= numbers.keys() and chosen.keys() <= choices.keys()):  # fmt: skip
-            known = made._known
-            known["numbers", ""] = numbers | new
-            known["choices", ""] = choices | chosen if chosen else choices
+            made.__dict__[KNOWN] = {
+                ("numbers", ""): numbers | new,
+                ("choices", ""): choices | chosen if chosen else choices,
+            }
         return made
 
     def flat(self) -> dict[str, Any]:
@@ -125,8 +126,8 @@ class ParameterSet(BaseModel):
     def with_leaves(self, values: Mapping[str, Any]) -> Self:
         """Return a set of the same structure that carries other objects as its numbers.
 
-        The objects (symbols, quantities with units) are not validated: for evaluating
-        equations, not for building parameter sets.
+        What is not named stays. The objects (symbols, quantities with units) are not validated: for
+        evaluating equations, not for building parameter sets.
         """
         return cast(Self, _with_objects(_rebuilt(self, "", values)))
 
@@ -227,16 +228,19 @@ def _is_number(value: Any) -> bool:
 
 
 def _rebuilt(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> ParameterSet:
-    fields: dict[str, Any] = {}
-    for name in type(node).model_fields:
-        value = getattr(node, name)
+    """Return a set of objects; groups of which none is given are those that there are."""
+    fields = fields_of(node)
+    for name, value in fields.items():
         dotted = f"{prefix}{name}"
         if isinstance(value, ParameterSet):
-            fields[name] = _rebuilt(value, f"{dotted}.", values)
+            if any(each.startswith(f"{dotted}.") for each in values):
+                fields[name] = _rebuilt(value, f"{dotted}.", values)
         elif isinstance(value, tuple):
-            fields[name] = tuple(values[f"{dotted}.{k}"] for k in range(len(value)))
-        else:
-            fields[name] = values[dotted] if _is_number(value) else value
+            fields[name] = tuple(
+                values.get(f"{dotted}.{k}", there) for k, there in enumerate(value)
+            )
+        elif _is_number(value):
+            fields[name] = values.get(dotted, value)
     return type(node).model_construct(**fields)
 
 
