@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from bywire.api.new import NewBrake, new
     from bywire.api.overview import overview
     from bywire.api.page import BenchPage, page
-    from bywire.api.replay import Replay, replay
+    from bywire.api.replay import replay
+    from bywire.api.replay_answer import Replay
     from bywire.api.reproduce import reproduce
     from bywire.api.run import BenchResult, run
     from bywire.api.run_faults import run_faults
@@ -81,7 +82,7 @@ _HOMES = {
     "compare": "api.compare",
     "Question": "identification.fitting.question",
     "Identification": "api.identification",
-    "Replay": "api.replay",
+    "Replay": "api.replay_answer",
     "Run": "simulation.run",
     "Sensitivity": "simulation.sensitivity",
     "Trajectory": "simulation.run",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import threading
 from dataclasses import replace
 
@@ -19,7 +20,8 @@ from bywire.campaigns.lasting import first_time, least_of_the_last, mean_of_the_
 from bywire.campaigns.residual import NEVER, detected, threshold
 from bywire.campaigns.simulating import faulty_traces, healthy_traces
 from bywire.campaigns.store import CampaignStore
-from bywire.core.errors import FileError, InputError
+from bywire.core.errors import DeviceError, FileError, InputError
+from bywire.simulation.cuda_device import find_device
 
 SMALL = """
 bench = "hard-braking"
@@ -216,6 +218,14 @@ def test_what_does_not_fit_is_refused(tmp_path, right, wrong, message):
     (tmp_path / "bad.toml").write_text(SMALL.replace(right, wrong, 1))
     with pytest.raises(InputError, match=message):
         read_campaign(tmp_path / "bad.toml")
+
+
+def test_a_campaign_is_computed_by_the_engine_of_its_bench(campaign, monkeypatch):
+    monkeypatch.setitem(sys.modules, "cuda.bindings.driver", None)
+    find_device.cache_clear()
+    plan = campaign.findings.plan
+    with pytest.raises(DeviceError, match="engine 'cuda' takes"):
+        healthy_traces(replace(plan, bench=replace(plan.bench, engine="cuda")))
 
 
 def test_a_campaign_that_does_not_fit_into_memory_is_refused(tmp_path):

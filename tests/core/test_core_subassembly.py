@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 from functools import partial
-from typing import Annotated, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,143 +15,18 @@ from bywire.bench.recording import record
 from bywire.contracts.run_energy import closes_its_energy
 from bywire.contracts.start import Start
 from bywire.contracts.trial import Trial
-from bywire.core import ops
 from bywire.core.assembly import Assembly
 from bywire.core.connections import Node, network
-from bywire.core.errors import ModelError
-from bywire.core.model import Task
 from bywire.core.parameters import ParameterSet
-from bywire.core.parts import Integral, Part, Wire
-from bywire.core.quantities import Length, Stiffness, Torque
-from bywire.core.signals import Role, Signal, signals_of, zeros
+from bywire.core.quantities import Stiffness
+from bywire.core.signals import signals_of, zeros
 from bywire.core.subassembly import Sub
-from bywire.core.wires import Port
-from bywire.core.wiring_check import check_wiring
-from bywire.plant import ball_screw_gear, current_sensor, dc_motor, end_stop
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.model_check import check_model
 from bywire.simulation.run import Run, simulate
+from systems.ram_pair import BOTH, PAR, Coupled, Pair, PairParameters, Ram
 
 needs_a_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
-
-
-class Parameters(ParameterSet):
-    """A motor on a screw between two stops, with dry friction."""
-
-    motor: dc_motor.Parameters
-    gear: ball_screw_gear.Parameters
-    stop: end_stop.Parameters
-    sensor: current_sensor.Parameters
-    stroke: Length
-    T_dry: Torque
-
-
-class Held(NamedTuple):
-    """What the controller holds."""
-
-    v: Annotated[float, Signal("V", "voltage", 6.0)]
-    x_seen: Annotated[float, Signal("m", "travel as sampled", 1e-3, set_point_of="theta")]
-
-
-class Demand(NamedTuple):
-    """What is demanded."""
-
-    v_set: Annotated[float, Signal("V", "demanded voltage", 6.0)]
-    noise_v: Annotated[float, Signal("1", "noise of the voltage")]
-
-
-def sampled(x: Any, m: Held, u: Demand, par: Parameters) -> Held:
-    return Held(u.v_set + 0.1 * u.noise_v - 0.2 * m.v, par.gear.k_g * x.theta)
-
-
-class Ram(Assembly[Parameters, Held]):
-    """A small actuator with all that an assembly can have, but for a limit."""
-
-    name = "ram"
-    Memory, Stimulus = Held, Demand
-    frictions: Any = ("omega",)
-    motor = Part(dc_motor, loss="E_copper")
-    gear = Part(ball_screw_gear, output={"x": "x"})
-    stop = Part(end_stop, work="W_stop", loss="E_stop")
-    sensor = Part(current_sensor)
-    E_source = Integral("J", "energy of the source", role=Role("source", "source"))
-    W_load = Integral("J", "work on the load", role=Role("sink", "load"))
-    E_dry = Integral("J", "dry friction", role=Role("sink", "dry friction"))
-    load = Port("N", "load from without", 10.0)
-    torque = Wire("N*m", "torque of the motor", 0.1)
-
-    def wire(self, w):
-        w.torque = dc_motor.output(w.motor.x, w.motor.par).torque
-        piston = ball_screw_gear.output(w.gear.x, w.gear.par)
-        w.stop.u = end_stop.Input(piston.x, piston.v, 0.0, w.par.stroke)
-        w.motor.u = dc_motor.Input(w.m.v, w.gear.x.omega)
-        force = end_stop.load(w.stop.f) + w.load
-        w.gear.u = ball_screw_gear.Input(w.torque, force, 0.0)
-        w.sensor.u = current_sensor.Input(w.motor.xe.i)
-
-    def friction(self, w):
-        return ((-w.par.T_dry, 0.5 * w.par.T_dry),)
-
-    def power(self, w):
-        (friction,) = w.reaction
-        speed = w.par.gear.k_g * w.gear.x.omega
-        return {"E_source": w.m.v * w.motor.x.i, "W_load": w.load * speed,
-                "E_dry": -friction * w.gear.x.omega}  # fmt: skip
-
-    def tasks(self, par):
-        return (Task("source", 1e-3, sampled),)
-
-    def rest(self, par):
-        return self.state(gear=ball_screw_gear.State(theta=1.0, omega=0.0)), zeros(Held)
-
-
-PAR = Parameters(
-    motor=dc_motor.Parameters(R_m=0.35, L_m=1e-4, K_e=0.03),
-    gear=ball_screw_gear.Parameters(k_g=3e-4, eta_g=1.0, law="directional", J_mot=3e-5, M_mc=0.1),
-    stop=end_stop.Parameters(k_stop=1e6, tau_stop=1e-4),
-    sensor=current_sensor.Parameters(i_low=-30.0, i_high=30.0),
-    stroke=1e-3,
-    T_dry=0.02,
-)
-
-
-class PairParameters(ParameterSet):
-    """Two rams, and a spring between their pistons."""
-
-    left: Parameters
-    right: Parameters
-    k: Stiffness
-
-
-class Pair(Assembly[PairParameters, Any]):
-    """Two of a kind, each with a demand of its own."""
-
-    name = "pair"
-    left = Sub(Ram, prefix="left_")
-    right = Sub(Ram, prefix="right_", label="the other one")
-
-    def wire(self, w):
-        w.left.load, w.right.load = 0.0, 0.0
-
-
-class Coupled(Pair):
-    """The same with a spring between both pistons."""
-
-    name = "coupled"
-    E_spring = Integral("J", "energy in the spring", role=Role("sink", "spring"))
-    force = Wire("N", "force of the spring", 10.0)
-
-    def wire(self, w):
-        stretched = w.par.k * (w.left.gear.x.theta - w.right.gear.x.theta)
-        w.force = stretched * w.left.gear.par.k_g
-        w.left.load, w.right.load = w.force, -1.0 * w.force
-
-    def power(self, w):
-        moved = w.left.gear.x.omega - w.right.gear.x.omega
-        return {"E_spring": w.force * moved * w.left.gear.par.k_g}
-
-
-BOTH = PairParameters(left=PAR, right=PAR.replace({"motor.R_m": 0.5, "T_dry": 0.03}), k=2e3)
 
 
 def test_signals_get_prefix_label_and_book() -> None:
@@ -373,111 +248,3 @@ def test_its_network_shows_it_as_one_box() -> None:
     assert {each.name for each in found.sources(left, "load")} == {"force"}
     assert found.sources(left, "v") == [Node("task", "left_source")]
     assert {n.name for n in found.sources(Node("wire", "force"))} == {"left", "right"}
-
-
-class NoWire(Assembly[PairParameters, Any]):
-    left = Sub(Ram, prefix="left_")
-    more = Wire("A", "current")
-
-
-class UnsetPort(Pair):
-    def wire(self, w):
-        w.left.load = 0.0
-
-
-class EarlyRead(Pair):
-    def wire(self, w):
-        w.left.load, w.right.load = w.right.torque, 0.0
-
-
-class WrongPort(Pair):
-    def wire(self, w):
-        w.left.load, w.right.load = w.left.motor.x.i, 0.0
-
-
-class PortTwice(Pair):
-    def wire(self, w):
-        super().wire(w)
-        w.left.load = 0.0
-
-
-class NoSuchPort(Pair):
-    def wire(self, w):
-        w.left.laod = 0.0
-
-
-class Assigned(Pair):
-    def wire(self, w):
-        w.left = 0.0
-
-
-class NoTask(Pair):
-    def tasks(self, par):
-        return super().tasks(par)[:1]
-
-
-class WrongFeed(Pair):
-    left = Sub(Ram, prefix="left_", feeds={"v_set": "right_x_seen"})
-
-
-class Nowhere(Pair):
-    left = Sub(Ram, prefix="left_", par="lft")
-
-
-@pytest.mark.parametrize(
-    ("model", "message"),
-    [
-        (NoWire, r"Ram.load is read before the holder sets it"),
-        (UnsetPort, r"Ram.load is read before the holder sets it: assign w.NAME.load"),
-        (EarlyRead, r"Ram.load is read before the holder sets it"),
-        (WrongPort, r"a quantity in N and one in A cannot be added"),
-        (PortTwice, r"Ram.load: .* sets it a second time"),
-        (NoSuchPort, r"unknown part or wire 'laod': did you mean 'load'"),
-        (Assigned, r"Pair.left is an assembly: set its ports"),
-        (NoTask, r"the task right_source of right never runs: add \*super\(\).tasks\(par\)"),
-        (WrongFeed, r"WrongFeed.left: its v_set is in V, but is fed by right_x_seen in m"),
-        (Nowhere, r"Nowhere.left: the parameters have no 'lft'"),
-    ],
-)
-def test_mistakes_are_said_with_their_place(model: type[Pair], message: str) -> None:
-    with pytest.raises(ModelError, match=message):
-        check_wiring(model(), BOTH)
-
-
-def test_a_class_without_wire_is_named_where_it_stands() -> None:
-    class Alone(Assembly[PairParameters, Any]):
-        Memory = Stimulus = Held
-        more = Wire("A", "current")
-
-    with pytest.raises(ModelError, match=r"Alone, .*test_core_subassembly.py, line \d+: the wire"):
-        check_wiring(Alone(), BOTH)
-
-
-def declare(**body: Any) -> type[Any]:
-    return type("Wrong", (Assembly,), {"name": "wrong", **body})
-
-
-@pytest.mark.parametrize(
-    ("body", "message"),
-    [
-        (lambda: {"a": Sub(Ram, prefix="2_")}, r"Sub\(Ram\): the prefix '2_' makes no names"),
-        (lambda: {"a": Sub(Ram, prefix="a_"), "b": Sub(Ram, prefix="a_")},
-         r"Wrong.b: there is a signal 'a_i' already: give it another prefix"),
-        (lambda: {"a": Sub(Ram, prefix="a_", feeds={"v_st": "x"})},
-         r"feeds names an unknown stimulus 'v_st': did you mean 'v_set'"),
-        (lambda: {"a": Sub(Ram, prefix="a_", feeds={"v_set": "a_vv"})},
-         r"Wrong.a: v_set is fed by an unknown signal 'a_vv': did you mean 'a_v'"),
-        (lambda: {"a": Sub(Held, prefix="a_")}, r"Sub\(Held\): it is no assembly"),
-    ],
-)  # fmt: skip
-def test_mistakes_of_a_declaration_are_said(body: Any, message: str) -> None:
-    with pytest.raises(ModelError, match=message):
-        declare(**body())
-
-
-def test_a_held_one_is_evaluated_at_the_instant_of_its_holder_alone() -> None:
-    x, m = zeros(Pair.State), zeros(Pair.Memory)
-    w = Pair().at(x, m, BOTH)
-    with pytest.raises(ModelError, match="asked for another state than its holder's"):
-        w.left.at(zeros(Ram.State), zeros(Held), PAR)
-    assert ops.fabs(w.left.torque) == 0.0

@@ -222,10 +222,16 @@ def test_choosing_a_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
         assert "-Og" in quick.flags(VECTOR)
         assert "-O2" not in quick.flags(VECTOR)
         find_compiler.cache_clear()
+        monkeypatch.setenv("BYWIRE_CC_QUICK", "")
+        assert find_compiler() == usual
         monkeypatch.setenv("BYWIRE_CC_QUICK", "very")
-        with pytest.raises(CompilerError, match="BYWIRE_CC_QUICK = 'very' is not admissible"):
-            find_compiler()
+        for command in (str(named), ""):  # also where compilers that do not work are passed over
+            find_compiler.cache_clear()
+            monkeypatch.setenv("BYWIRE_CC", command)
+            with pytest.raises(CompilerError, match="BYWIRE_CC_QUICK = 'very' is not admissible"):
+                find_compiler()
         find_compiler.cache_clear()
+        monkeypatch.delenv("BYWIRE_CC_QUICK")
         monkeypatch.setenv("BYWIRE_CC", str(tmp_path / "missing"))
         with pytest.raises(CompilerError, match="missing' names no program"):
             find_compiler()

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from scipy import stats
@@ -55,13 +52,3 @@ def test_scores_and_ranks_are_those_of_scipy():
     np.testing.assert_array_equal(ranked(values), stats.rankdata(values))
     shares = np.linspace(0.001, 0.999, 501)
     np.testing.assert_array_equal(normal_quantile(shares), stats.norm.ppf(shares))
-
-
-def test_a_study_loads_neither_statistics_nor_searches_that_it_has_no_use_for():
-    """Each takes as long to load as all else that a study begins with."""
-    code = """
-import sys, bywire.api.run_study
-print({"scipy.stats", "scipy.optimize"} & {*sys.modules})
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "set()"

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -102,3 +105,20 @@ def test_what_figures_depend_on_tells_studies_apart(study):
     ]  # fmt: skip
     digests = {read_study(study(other)).digest for other in others}
     assert len(digests | {digest}) == len(others) + 1
+
+
+def test_a_study_loads_neither_libraries_nor_brakes_that_it_has_no_use_for(tmp_path):
+    """Statistics, searches, or other brakes take as long to load as all else it begins with."""
+    code = """
+import sys
+from bywire.api.run_study import read_study
+read_study(sys.argv[1]).digest
+unused = {"scipy.stats", "scipy.optimize", "bywire.brakes.wedge.model"}
+print(unused & {*sys.modules}, "bywire.brakes.motorcycle.model" in sys.modules)
+"""
+    path = tmp_path / "study.toml"
+    path.write_text('bench = "hard-braking"\n[vary]\n"motor.R_m" = "+-5 %"\n')
+    done = subprocess.run(
+        [sys.executable, "-c", code, path], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "set() True"

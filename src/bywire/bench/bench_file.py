@@ -133,7 +133,9 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 def names_experiment(source: str | Path) -> bool:
     """Return whether a text is the bare name of an experiment, of a brake or of any."""
     name = str(source)
-    return bool(_NAME.fullmatch(name)) and (name in EXPERIMENTS.all() or name in _any_brake())
+    if not _NAME.fullmatch(name):
+        return False
+    return EXPERIMENTS.get(name) is not None or name in _any_brake()
 
 
 def _of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, Any]:
@@ -141,7 +143,7 @@ def _of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, Any]:
     name = str(file)
     if not _NAME.fullmatch(name) or file.is_file():
         return {}
-    definition = EXPERIMENTS.guess(name) or EXPERIMENTS.all().get(name)
+    definition = EXPERIMENTS.get(name)
     if definition is None and name not in _any_brake():
         return {}
     if "parameters" in changes:

@@ -110,7 +110,7 @@ def _traces(plan: CampaignPlan, cases: Sequence[Case], samples: Sequence[int]) -
             for case, sample in zip(cases, samples, strict=True)]  # fmt: skip
     computed: list[Trajectory] = []
     for first in range(0, len(runs), LANES):
-        computed += _computed(runs[first : first + LANES], plan.signals)
+        computed += _computed(runs[first : first + LANES], plan.signals, bench.engine)
     case = cases[0].aligned(bench.step, bench.record)
     time = computed[0].time - case.settle
     begin = int(np.searchsorted(time, -case.keep - 1e-9))
@@ -121,10 +121,12 @@ def _traces(plan: CampaignPlan, cases: Sequence[Case], samples: Sequence[int]) -
     return Traces(time, signals)
 
 
-def _computed(runs: Sequence[Run], signals: Sequence[str]) -> Sequence[Trajectory]:
-    if len(runs) > 1 and fit_lanes(runs):
-        return simulate_group(runs, signals)
-    return [simulate(run, signals) for run in runs]
+def _computed(
+    runs: Sequence[Run], signals: Sequence[str], engine: str
+) -> Sequence[Trajectory]:
+    if len(runs) > 1 and fit_lanes(runs, engine):
+        return simulate_group(runs, signals, engine=engine)
+    return [simulate(run, signals, engine=engine) for run in runs]
 
 
 def _missed(case: Case, task: str, time: Array) -> Array:

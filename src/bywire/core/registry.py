@@ -84,6 +84,10 @@ class Kind(Generic[T]):
         thing: T = _found(self, name, tuple(brakes().values()))
         return thing
 
+    def get(self, name: str) -> T | None:
+        """Return the thing of a name; None where there is none. See `guess`."""
+        return self.guess(name) or self.all().get(name)
+
     def unknown(self, name: str, *others: Kind[Any]) -> UnknownNameError:
         """Return the error of a name that nothing of this kind, nor of the others, answers to.
 
@@ -143,8 +147,18 @@ class Kind(Generic[T]):
         return self.of(max(homes, key=len)) if homes else self.all()
 
     def owner(self, name: str) -> str:
-        """Return the module of the brake that brings a thing; empty for a general one."""
-        return next((owner for thing, owner in _all(self) if thing.name == name), "")
+        """Return the module of the brake that brings a thing; empty for a general one.
+
+        Brakes are asked in turn, and the rest is not loaded.
+        """
+        for brake in brakes().values():
+            try:
+                if any(thing.name == name for thing, _ in _declared(self, brake)):
+                    return brake.module
+            except ModelError:
+                if not is_foreign(brake):
+                    raise
+        return ""
 
     def place(self, name: str) -> tuple[str, int]:
         """Return file and line where the thing of a name is declared; line 0 where nobody knows."""

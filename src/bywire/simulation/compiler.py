@@ -93,8 +93,9 @@ def find_compiler() -> Compiler | None:
     wanted = os.environ.get("BYWIRE_CC", "")
     if wanted == "none":
         return None
+    is_quick = _is_quick()
     if wanted and shutil.which(wanted):
-        return _labeled((str(shutil.which(wanted)),))
+        return _labeled((str(shutil.which(wanted)),), is_quick)
     if wanted:
         raise CompilerError(
             f"BYWIRE_CC = {wanted!r} names no program: "
@@ -107,11 +108,25 @@ def find_compiler() -> Compiler | None:
         commands.append((sys.executable, "-m", "ziglang", "cc"))
     for command in commands:
         with contextlib.suppress(CompilerError):  # a broken one must not hide the next
-            return _labeled(command)
+            return _labeled(command, is_quick)
     return None
 
 
-def _labeled(command: tuple[str, ...]) -> Compiler:
+def _is_quick() -> bool:
+    """Return whether kernels shall be compiled quickly.
+
+    Raises
+    ------
+    CompilerError
+        When ``BYWIRE_CC_QUICK`` says something else than 0 or 1.
+    """
+    quick = os.environ.get("BYWIRE_CC_QUICK") or "0"
+    if quick not in ("0", "1"):
+        raise CompilerError(f"BYWIRE_CC_QUICK = {quick!r} is not admissible: set it to 0 or 1")
+    return quick == "1"
+
+
+def _labeled(command: tuple[str, ...], is_quick: bool) -> Compiler:
     try:
         done = subprocess.run(
             [*command, "--version"], capture_output=True, text=True, timeout=60, check=False
@@ -124,11 +139,8 @@ def _labeled(command: tuple[str, ...]) -> Compiler:
         what = f"the C compiler {command[0]} does not tell its version"
         raise CompilerError(f"{what}: {_OTHERWISE}")
     first = (done.stdout.splitlines() or [Path(command[0]).name])[0].strip()
-    quick = os.environ.get("BYWIRE_CC_QUICK", "0")
-    if quick not in ("0", "1"):
-        raise CompilerError(f"BYWIRE_CC_QUICK = {quick!r} is not admissible: set it to 0 or 1")
     # Said in the label, by which kept kernels and recordings tell compilers apart.
-    return Compiler(command, f"{first}, quick" if quick == "1" else first, quick == "1")
+    return Compiler(command, f"{first}, quick" if is_quick else first, is_quick)
 
 
 def load_library(

@@ -236,15 +236,15 @@ class _Watch:
 def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
     """Return the rows of the stimuli of runs, shape (rows, nu, width); (rows, nu) of equal ones."""
     t = schedule.stimulus_times
-    rows = np.zeros((t.size, len(group[0].model.Stimulus._fields), width))
+    signals = np.zeros((width, len(group[0].model.Stimulus._fields), t.size))  # each in one piece
     for lane, run in enumerate(group):
-        put_into(rows[:, :, lane], run, t)
-    rows[:, :, len(group) :] = rows[:, :, len(group) - 1 : len(group)]
-    if not np.isfinite(rows).all():
+        put_into(signals[lane].T, run, t)
+    signals[len(group) :] = signals[len(group) - 1]
+    if not np.isfinite(signals).all():
         for run in group:
             sampled_stimulus(run, schedule)  # says which and when
-    is_shared = bool((rows == rows[:, :, :1]).all())
-    return rows[:, :, 0].copy() if is_shared else rows
+    is_shared = all(np.array_equal(signals[0], other) for other in signals[1:])
+    return (signals[0].T if is_shared else signals.transpose(2, 1, 0)).copy()
 
 
 class _Carried:
