@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import pydantic
 import pytest
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.core.field_notes import field_notes
@@ -88,6 +88,71 @@ def test_groups_that_hold_no_changed_value_are_kept():
     before = made()
     assert before.replace({"share": 0.5}).inner is before.inner
     assert before.replace({"inner.R": 0.4}).inner is not before.inner
+
+
+class Pair(ParameterSet):
+    """Two parts, judged by a rule between them."""
+
+    left: Inner
+    """the first"""
+    right: Inner
+    """the second"""
+
+    @model_validator(mode="after")
+    def _left_is_less(self) -> Pair:
+        if self.left.R >= self.right.R:
+            raise ValueError("left must be less than right")
+        return self
+
+
+class Doubled(Pair):
+    """Two parts, of which one is not taken as it is given."""
+
+    @field_validator("right")
+    @classmethod
+    def _is_doubled(cls, right: Inner) -> Inner:
+        return Inner(R=2.0 * right.R, law=right.law)
+
+
+PAIR = {"left.R": 1.0, "left.law": "paper", "right.R": 2.0, "right.law": "paper"}
+
+
+@pytest.mark.parametrize("changes", [
+    {"left.R": 1.5}, {"left.R": 1.5, "right.R": 3.0}, {"left.law": "directional"},
+    {"right.R": 4.0, "right.law": "directional"},
+])  # fmt: skip
+def test_a_set_of_which_parts_change_is_as_if_built_anew(changes):
+    replaced, built = Pair.create(PAIR).replace(changes), Pair.create(PAIR | changes)
+    assert replaced == built
+    assert list(replaced.leaves().items()) == list(built.leaves().items())
+    assert replaced.choices() == built.choices()
+    assert replaced.model_dump_json() == built.model_dump_json()
+    assert replaced.model_fields_set == built.model_fields_set
+
+
+def test_rules_between_parts_are_asked_when_a_part_changes():
+    with pytest.raises(ParameterError, match="left must be less than right"):
+        Pair.create(PAIR).replace({"left.R": 3.0})
+    with pytest.raises(ParameterError) as failed:  # all at once, as when it is built
+        Pair.create(PAIR).replace({"left.R": -1.0, "right.R": -2.0})
+    assert [line.split(" = ")[0] for line in str(failed.value).split("\n")] == ["left.R", "right.R"]
+
+
+def test_a_class_that_does_more_than_judge_is_asked_to():
+    assert Doubled.create(PAIR).replace({"left.R": 1.5, "right.R": 3.0}).right.R == 6.0
+
+
+def test_what_a_set_replaced_holds_is_what_it_says_by_name():
+    before = made()
+    before.leaves(), before.choices()  # which are kept
+    other = before.replace({"inner.R": 0.4, "inner.law": "directional"})
+    assert other.flat() == VALUES | {"inner.R": 0.4, "inner.law": "directional"}
+    assert other.leaves() == before.leaves() | {"inner.R": 0.4}
+    assert other.choices() == before.choices() | {"inner.law": "directional"}
+    assert before.replace({"n": 4.0}).leaves()["n"] == 4.0
+    assert before.replace({"inner.R": 0.35}) is before
+    assert not before.has_choices_of(other)
+    assert before.has_choices_of(before.replace({"share": 0.5}))
 
 
 def test_nothing_can_be_assigned_or_added():
@@ -202,6 +267,10 @@ def test_leaves_can_be_put_back_as_anything():
     assert symbols.inner.law == "paper"
     assert symbols.on is True
     assert made().with_leaves(names) == made()
+    before = made()
+    some = before.with_leaves({"share": "<share>", "table.1": "<table.1>"})
+    assert (some.share, some.table, some.long) == ("<share>", (0.0, "<table.1>", 2e5), 2.0)
+    assert some.inner is before.inner
 
 
 def test_fields_know_unit_range_and_description():

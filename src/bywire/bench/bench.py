@@ -88,6 +88,8 @@ class Bench:
     faults: Sequence[Mapping[str, Any]] = ()
     engine: str = "auto"
 
+    _is_driven_known = False  # whether the experiment drives what its model has a stimulus for
+
     def __post_init__(self) -> None:
         for key in ("experiment", "parameters", "name", "assembly"):
             if not isinstance(getattr(self, key), str):
@@ -166,8 +168,7 @@ class Bench:
     @cached_property
     def chosen_options(self) -> ParameterSet:
         """Validated options of the experiment."""
-        chosen = self.definition
-        following = {} if chosen.following is None else chosen.following(self.par)
+        chosen, following = self.definition, self._following or {}
         values = parsed(chosen.options, self.options, f"option of {chosen.name}")
         return chosen.defaults.replace({**following, **values})
 
@@ -203,7 +204,7 @@ class Bench:
     def _made(self, make: Cases) -> tuple[Case, ...]:
         """Return cases, or refuse overrides without effect and steps that do not divide."""
         cases = self.cases_with(self.par, self.chosen_options, make)
-        for case in cases:
+        for case in () if self._is_driven_known else cases:
             _check_driven(case, self.definition)
         is_changed = any(case.par is not self.par for case in cases)
         for name in self.overrides if is_changed else ():
@@ -256,17 +257,30 @@ class Bench:
         """
         made = object.__new__(type(self))
         known = made.__dict__
-        known |= self.__getstate__()
-        known |= {name: getattr(self, name) for name in ("definition", "system", "chosen_stimuli")}
+        known |= self._shared
         known["overrides"] = {**self.overrides, **overrides}
         known["options"] = {**self.options, **options}
         known["seed"] = self.seed if seed is None else seed
         known["par"] = par = self.par.replace(overrides)
+        # Numbers choose no signals: what a choice has an experiment drive is checked anew.
+        known["_is_driven_known"] = par.has_choices_of(self.par) and not options
         following = self.definition.following
-        if not options and (following is None or following(par) == following(self.par)):
+        if not options and (following is None or following(par) == self._following):
             known["chosen_options"] = self.chosen_options
-        made.cases()
+        known["_cases"] = made._made(self.definition.cases)
         return made
+
+    @cached_property
+    def _shared(self) -> dict[str, Any]:
+        """What a bench has in common with those that it is varied to."""
+        lasting = ("definition", "system", "chosen_stimuli")
+        return {**self.__getstate__(), **{name: getattr(self, name) for name in lasting}}
+
+    @cached_property
+    def _following(self) -> Mapping[str, Any] | None:
+        """The options that follow the parameters."""
+        following = self.definition.following
+        return None if following is None else following(self.par)
 
     def with_overrides(self, overrides: Mapping[str, Any]) -> Bench:
         """Return this bench with further parameters changed; shares are of what it has."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import overload
+from functools import lru_cache
+from typing import NamedTuple, overload
 
 import numpy as np
 import xarray as xr
@@ -18,7 +19,7 @@ from bywire.bench.side_by_side import rounds
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, unestimated
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.leaf import Leaf
-from bywire.core.parameters import choice_fields, leaf_fields
+from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
 from bywire.core.typing import Array
 from bywire.simulation import ensemble
 from bywire.simulation.ensemble import Ensemble
@@ -148,14 +149,38 @@ def varied_leaf(bench: Bench, name: str) -> Leaf:
     UnknownNameError
         With the nearest numbers of the bench.
     """
-    parameters = leaf_fields(type(bench.par))
+    return _varied_leaf(type(bench.par), type(bench.chosen_options), name)
+
+
+def _varied_leaf(of: type[ParameterSet], chosen: type[ParameterSet], name: str) -> Leaf:
+    parameters = leaf_fields(of)
     if name in parameters:
         return parameters[name]
-    options = leaf_fields(type(bench.chosen_options))
-    known = {f"{_OPTION}{option}": leaf for option, leaf in options.items()}
+    known = {f"{_OPTION}{option}": leaf for option, leaf in leaf_fields(chosen).items()}
     if name not in known:
         raise unknown_name("parameter or option to vary", name, {**parameters, **known})
     return known[name]
+
+
+class _Names(NamedTuple):
+    """Names of what is changed of a bench."""
+
+    parameters: tuple[str, ...]
+    options: tuple[tuple[str, str], ...]
+    """each with its name among the options"""
+
+
+@lru_cache(maxsize=64)  # the cases of a study all change the same
+def _names_within(
+    of: type[ParameterSet], chosen: type[ParameterSet], names: tuple[str, ...]
+) -> _Names:
+    """Return which names are of parameters and which of options, or refuse one that is of none."""
+    choices = choice_fields(of)
+    for name in names:
+        if name not in choices:
+            _varied_leaf(of, chosen, name)
+    options = tuple((n, n.removeprefix(_OPTION)) for n in names if n.startswith(_OPTION))
+    return _Names(tuple(n for n in names if not n.startswith(_OPTION)), options)
 
 
 def changed(
@@ -168,12 +193,9 @@ def changed(
     InputError
         When one is unknown or out of range, or contradicts another; the values are named.
     """
-    choices = choice_fields(type(bench.par))
-    for name in values:
-        if name not in choices:
-            varied_leaf(bench, name)
-    options = {n.removeprefix(_OPTION): v for n, v in values.items() if n.startswith(_OPTION)}
-    overrides = {n: v for n, v in values.items() if not n.startswith(_OPTION)}
+    names = _names_within(type(bench.par), type(bench.chosen_options), tuple(values))
+    overrides = {name: values[name] for name in names.parameters}
+    options = {within: values[name] for name, within in names.options}
     try:
         return bench.varied(overrides, options, seed)
     except InputError as error:

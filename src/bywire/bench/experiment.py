@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -86,19 +87,29 @@ class Case:
             multiple is out of all proportion to the run.
         """
         record = self.record if interval is None else interval
-        periods = {task.name: task.period for task in self.model.tasks(self.par)}
-        schedule = plan(self.settle + self.duration, step, periods, record)
-        common = math.lcm(schedule.record_frames, *schedule.task_frames) * schedule.frame
-        settle = float(f"{math.ceil(self.settle / common - 1e-9) * common:.12g}")
-        if settle > _LENGTHENED * (self.settle + self.duration):
-            raise StepError(
-                f"a run of {self.settle + self.duration:g} s would settle for {settle:g} s, in "
-                "which all sample times and recording intervals come out even: choose sample times "
-                "that are shorter and multiples of each other "
-                f"({', '.join(f'{name} {T:g} s' for name, T in periods.items())})"
-            )
+        periods = tuple((task.name, task.period) for task in self.model.tasks(self.par))
+        settle = _settling(self.settle, self.duration, periods, step, record)
         is_aligned = settle == self.settle and record == self.record
         return self if is_aligned else replace(self, settle=settle, record=record)
+
+
+@lru_cache(maxsize=256)  # the cases of a study ask for the same one
+def _settling(
+    settle: float, duration: float, periods: tuple[tuple[str, float], ...], step: float,
+    record: float,
+) -> float:  # fmt: skip
+    """Return a settling time after which all ticks and a row fall on zero; see `Case.aligned`."""
+    schedule = plan(settle + duration, step, dict(periods), record)
+    common = math.lcm(schedule.record_frames, *schedule.task_frames) * schedule.frame
+    settled = float(f"{math.ceil(settle / common - 1e-9) * common:.12g}")
+    if settled > _LENGTHENED * (settle + duration):
+        raise StepError(
+            f"a run of {settle + duration:g} s would settle for {settled:g} s, in "
+            "which all sample times and recording intervals come out even: choose sample times "
+            "that are shorter and multiples of each other "
+            f"({', '.join(f'{name} {T:g} s' for name, T in periods)})"
+        )
+    return settled
 
 
 @dataclass(frozen=True)

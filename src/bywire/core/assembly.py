@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cache
+from itertools import chain
 from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 
 from bywire.core.errors import ModelError, unknown_name
@@ -245,11 +246,9 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         ModelError
             When there is no such part, or the state is another element's.
         """
-        values: list[Any] = [0.0] * len(cls.State._fields)
-        for name, given in parts.items():
-            for place, value in zip(cls._places(name, type(given)), given, strict=True):
-                values[place] = value
-        return cls.State._make(values)
+        given = (0.0, *chain.from_iterable(parts.values()))
+        kinds = tuple((name, type(each)) for name, each in parts.items())
+        return cls.State._make(map(given.__getitem__, cls._sources(kinds)))
 
     @classmethod
     def memory(cls, own: NamedTuple | None = None, **subs: NamedTuple) -> Any:
@@ -271,6 +270,15 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
 
     @classmethod
     @cache  # studies begin thousands of runs a second
+    def _sources(cls, kinds: tuple[tuple[str, type], ...]) -> tuple[int, ...]:
+        """Return where each entry of the State is found in a zero and the states of parts."""
+        sources, place = [0] * len(cls.State._fields), 0
+        for name, kind in kinds:
+            for there in cls._places(name, kind):
+                sources[there] = place = place + 1
+        return tuple(sources)
+
+    @classmethod
     def _places(cls, name: str, kind: type) -> tuple[int, ...]:
         """Return where the states of a part, or of an assembly within, stand in the State."""
         fields: tuple[str, ...] = cls.State._fields

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import typing
 from collections.abc import Iterator, Mapping
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from types import MappingProxyType
 from typing import Any, Self, TypeVar, cast
 
@@ -22,11 +22,13 @@ from bywire.core.errors import ModelError, ParameterError, place_of, unknown_nam
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
 from bywire.core.refusals import refusals
+from bywire.core.replacement import KNOWN, Places, fields_of, read
 from bywire.core.units import Written
 
 T = TypeVar("T", bound="ParameterSet")
 
 
+_SIMPLE = {float, str}  # what is itself whatever it was written as
 _OBJECTS = "_carries_objects"  # in the dictionary of a set whose leaves need not be numbers
 
 
@@ -61,26 +63,21 @@ class ParameterSet(BaseModel):
         """
         if _OBJECTS in self.__dict__:
             return cast(Self, _as_given(self, "", values))
-        if all(self._has(name, value) for name, value in values.items()):
-            return self
-        made = _validated(type(self), _fields(self), values)
-        # All others are known: thousands of sets a second differ from one in few values.
         numbers, choices = self._by_name("numbers"), self._by_name("choices")
-        given = {name: made.value(name) for name in values}
-        new = {name: float(value) for name, value in given.items() if _is_number(value)}
-        chosen = {name: value for name, value in given.items() if name not in new}
-        has_tables = any(isinstance(value, tuple) for value in chosen.values())
-        if new.keys() <= numbers.keys() and chosen.keys() <= choices.keys() and not has_tables:
-            made._known["numbers", ""] = numbers | new
-            made._known["choices", ""] = choices | chosen if chosen else choices
+        if _are_there(values, numbers, choices):
+            return self
+        made = _exchanged(self, values)
+        # All others are known: thousands of sets a second differ from one in few values.
+        given = read(made, tuple(values))
+        new = {name: value for name, value in given.items() if type(value) is float}
+        chosen = {name: value for name, value in given.items() if type(value) is str}
+        if (len(new) + len(chosen) == len(given)
+            and new.keys() <= numbers.keys() and chosen.keys() <= choices.keys()):  # fmt: skip
+            made.__dict__[KNOWN] = {
+                ("numbers", ""): numbers | new,
+                ("choices", ""): choices | chosen if chosen else choices,
+            }
         return made
-
-    def _has(self, name: str, value: Any) -> bool:
-        """Return whether a plain number or text is what stands at a dotted name."""
-        if type(value) not in (float, str):
-            return False
-        known = self._by_name("numbers" if type(value) is float else "choices")
-        return bool(known.get(name) == value)
 
     def flat(self) -> dict[str, Any]:
         """Return all leaves and choices by dotted name."""
@@ -93,6 +90,11 @@ class ParameterSet(BaseModel):
     def choices(self) -> dict[str, Any]:
         """Return the structural choices by dotted name, with the length of every table."""
         return dict(self._by_name("choices"))
+
+    def has_choices_of(self, other: ParameterSet) -> bool:
+        """Return whether the structural choices are those of another set of this class."""
+        here, there = self._by_name("choices"), other._by_name("choices")
+        return here is there or here == there
 
     def value(self, name: str) -> Any:
         """Return a leaf or choice of a dotted name that there is; ``name.0`` of a table's nodes."""
@@ -113,7 +115,7 @@ class ParameterSet(BaseModel):
         known = self._known
         if (kind, prefix) not in known:
             named: dict[str, Any] = {}
-            for name, value in _fields(self).items():
+            for name, value in fields_of(self).items():
                 if isinstance(value, ParameterSet):
                     named.update(value._by_name(kind, f"{prefix}{name}."))
                 else:
@@ -124,8 +126,8 @@ class ParameterSet(BaseModel):
     def with_leaves(self, values: Mapping[str, Any]) -> Self:
         """Return a set of the same structure that carries other objects as its numbers.
 
-        The objects (symbols, quantities with units) are not validated: for evaluating
-        equations, not for building parameter sets.
+        What is not named stays. The objects (symbols, quantities with units) are not validated: for
+        evaluating equations, not for building parameter sets.
         """
         return cast(Self, _with_objects(_rebuilt(self, "", values)))
 
@@ -226,16 +228,19 @@ def _is_number(value: Any) -> bool:
 
 
 def _rebuilt(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> ParameterSet:
-    fields: dict[str, Any] = {}
-    for name in type(node).model_fields:
-        value = getattr(node, name)
+    """Return a set of objects; groups of which none is given are those that there are."""
+    fields = fields_of(node)
+    for name, value in fields.items():
         dotted = f"{prefix}{name}"
         if isinstance(value, ParameterSet):
-            fields[name] = _rebuilt(value, f"{dotted}.", values)
+            if any(each.startswith(f"{dotted}.") for each in values):
+                fields[name] = _rebuilt(value, f"{dotted}.", values)
         elif isinstance(value, tuple):
-            fields[name] = tuple(values[f"{dotted}.{k}"] for k in range(len(value)))
-        else:
-            fields[name] = values[dotted] if _is_number(value) else value
+            fields[name] = tuple(
+                values.get(f"{dotted}.{k}", there) for k, there in enumerate(value)
+            )
+        elif _is_number(value):
+            fields[name] = values.get(dotted, value)
     return type(node).model_construct(**fields)
 
 
@@ -244,7 +249,7 @@ def _as_given(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> Par
     fields: dict[str, Any] = {
         name: _as_given(value, f"{prefix}{name}.", values)
         if isinstance(value, ParameterSet) else values.get(prefix + name, value)
-        for name, value in _fields(node).items()
+        for name, value in fields_of(node).items()
     }  # fmt: skip
     return _with_objects(type(node).model_construct(**fields))
 
@@ -270,9 +275,33 @@ def _plain(name: str, value: Any, texts: dict[str, str]) -> Any:
     return value
 
 
-def _fields(node: ParameterSet) -> dict[str, Any]:
-    kept = node.__dict__
-    return {name: kept[name] for name in type(node).model_fields}
+def _are_there(
+    values: Mapping[str, Any], numbers: Mapping[str, float], choices: Mapping[str, Any]
+) -> bool:
+    """Return whether plain numbers and texts are what stands at these names."""
+    for name, value in values.items():
+        known = numbers if type(value) is float else choices if type(value) is str else {}
+        if name not in known or known[name] != value:
+            return False
+    return True
+
+
+@lru_cache(maxsize=256)  # the cases of a study all differ in the same ones
+def _places(cls: type[ParameterSet], names: tuple[str, ...]) -> Places:
+    """Return where values of dotted names go, or refuse a name that the class does not know."""
+    for name in names:
+        _require_known(cls, name)
+    return Places.of(names)
+
+
+def _exchanged(node: T, values: Mapping[str, Any]) -> T:
+    """Return a set with other values at dotted names; see `ParameterSet.replace`."""
+    if _SIMPLE.issuperset(map(type, values.values())):
+        try:
+            return _places(type(node), tuple(values)).filled(node, values)
+        except (ValueError, AssertionError):  # all that is refused is said at once, below
+            pass
+    return _validated(type(node), fields_of(node), values)
 
 
 def _validated(cls: type[T], tree: dict[str, Any], values: Mapping[str, Any]) -> T:
@@ -288,7 +317,7 @@ def _validated(cls: type[T], tree: dict[str, Any], values: Mapping[str, Any]) ->
         node = tree
         for group in groups:
             inner = node.get(group, {})
-            node[group] = _fields(inner) if isinstance(inner, ParameterSet) else inner
+            node[group] = fields_of(inner) if isinstance(inner, ParameterSet) else inner
             node = node[group]
         node[last] = _plain(name, value, texts)
     try:

@@ -89,7 +89,7 @@ def warnings_of(model: Any, recording: Any, par: Any) -> list[str]:
     felt = tuple(each for each in _felt(model, par) if each[0].name not in silent)
     if not felt:
         return []
-    return [text for _, texts in _said(model, felt, recording, (par,), par) for text in texts]
+    return [text for _, texts in _said(model, felt, recording, par) for text in texts]
 
 
 def silent_parts(model: Any, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
@@ -107,7 +107,7 @@ def silent_parts(model: Any, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
     silent = set()
     for each in felt:
         try:
-            ((part, texts),) = _said(model, (each,), rows, pars, joined)
+            ((part, texts),) = _said(model, (each,), rows, joined, len(pars) > 1)
         except (TypeError, ValueError):  # it asks or says something that is not one number here
             continue
         if not texts:
@@ -119,25 +119,24 @@ def _joined(pars: Sequence[Any]) -> Any:
     """Return sets of one structure as a single one: where they differ, with an array of all."""
     if len(pars) == 1:
         return pars[0]
+    names = tuple(pars[0].leaves())
     table = np.array([tuple(par.leaves().values()) for par in pars], dtype=np.float64)
-    differs = (table != table[0]).any(axis=0)
-    columns = zip(pars[0].leaves().items(), table.T, differs, strict=True)
-    return pars[0].with_leaves(
-        {name: column[:, None] if varies else value for (name, value), column, varies in columns}
-    )
+    differs = np.flatnonzero((table != table[0]).any(axis=0)).tolist()
+    return pars[0].with_leaves({names[k]: table[:, k : k + 1] for k in differs})
 
 
 def _said(
-    model: Any, felt: Felt, rows: Any, pars: Sequence[Any], joined: Any
+    model: Any, felt: Felt, rows: Any, par: Any, is_joined: bool = False
 ) -> Iterator[tuple[Any, list[str]]]:
     """Yield parts that watch and what they say of rows.
 
-    ``pars``: one set for all, or of each case; ``joined``: these as one.
+    ``is_joined``: whether ``par`` is the sets of several runs as one.
     """
     with np.errstate(all="ignore"):
-        values = computed(tuple(tuple(each.values()) for _, each in felt), _Given(rows, pars))
+        given = _Given(rows, par, is_joined)
+        values = computed(tuple(tuple(each.values()) for _, each in felt), given)
         for (part, names), each in zip(felt, values, strict=True):
-            wired: Any = Wired(part, Instant(None, None, None, joined, model.shared))
+            wired: Any = Wired(part, Instant(None, None, None, par, model.shared))
             more = dict(zip(names, each, strict=True))
             yield part, wired.call(part.element.watch, t=rows["time"].values, **more)
 
@@ -173,11 +172,11 @@ def _felt(model: Any, par: Any) -> Felt:
 class _Given(dict[str, Any]):
     """Rows of signals and values of parameters by name; of what is not recorded NaN."""
 
-    def __init__(self, recording: Any, pars: Sequence[Any]) -> None:
-        self._recording, self._pars = recording, pars
+    def __init__(self, recording: Any, par: Any, is_joined: bool) -> None:
+        self._recording, self._par, self._is_joined = recording, par, is_joined
 
     def __missing__(self, name: str) -> Any:
         if not name.startswith(_PARAMETER):
             return self._recording[name].values if name in self._recording else _NAN
-        each = [par.value(name[len(_PARAMETER) :]) for par in self._pars]
-        return each[0] if len(each) == 1 else np.array(each)[:, None]
+        value = self._par.value(name[len(_PARAMETER) :])
+        return np.asarray(value) if self._is_joined else value  # as of arrays, 1 / 0 is infinite

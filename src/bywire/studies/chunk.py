@@ -124,10 +124,10 @@ def _computed(
     count = len(numbers)
     benches: dict[int, Bench] = {}
     failures = [""] * count
-    for k in range(count):
-        given = {name: column[k].item() for name, column in values.items()}
+    rows = zip(*(column.tolist() for column in values.values()), strict=True)
+    for k, (number, row) in enumerate(zip(numbers.tolist(), rows, strict=True)):
         try:
-            benches[k] = case_bench(plan, int(numbers[k]), given)
+            benches[k] = case_bench(plan, number, dict(zip(values, row, strict=True)))
         except BywireError as error:
             failures[k] = str(error)
     names = plan.bench.definition.kpis_with(plan.bench.chosen_options)

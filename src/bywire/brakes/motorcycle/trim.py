@@ -38,6 +38,7 @@ _GAUSS = (
     (_OUTER, _SMALL),
 )
 _HALVINGS = 60
+_NOTHING = zeros(Memory)
 
 
 def travel_at(p: float, par: Par) -> float:
@@ -56,28 +57,35 @@ def travel_at(p: float, par: Par) -> float:
     The integral runs from node to node of the caliper's table, by Gauss: it never looks at a node,
     where the slope jumps.
     """
-    groups = (par.master_cylinder, par.fluid, par.port, par.caliper)
-    is_plain = type(p) is float and type(par.fluid.beta) is float
-    return _kept_travel(p, *groups) if is_plain else _travel(p, *groups)
-
-
-def _travel(
-    p: float, cylinder: master_cylinder.Parameters, fluid: brake_fluid.Parameters,
-    port: reservoir_port.Parameters, pads: caliper.Parameters,
-) -> float:  # fmt: skip
+    cylinder, fluid, port, pads = par.master_cylinder, par.fluid, par.port, par.caliper
     start = cylinder.x_rest + reservoir_port.closed_at(port)
     empty = cylinder.A_mc * (cylinder.s_mc - start) - brake_fluid.gas_volume(0.0, fluid)
+    is_plain = all(type(number) is float for number in (p, fluid.beta, *pads.p_table))
+    looked_at, decay = (_kept_nodes if is_plain else _nodes)(p, fluid.beta, pads.p_table)
     taken = 0.0
-    for low, high in pairwise((0.0, *(ops.clip(node, 0.0, p) for node in pads.p_table), p)):
-        for share, weight in _GAUSS:
-            at = 0.5 * (low + high) + 0.5 * (high - low) * share
-            slope = caliper.mass(caliper.State(at), pads, fluid)
-            taken += 0.5 * (high - low) * weight * slope * ops.exp((at - p) / fluid.beta)
-    left = empty * ops.exp(-p / fluid.beta) - taken
+    for at, width, left_of_it in looked_at:
+        taken += width * caliper.mass(at, pads, fluid) * left_of_it
+    left = empty * decay - taken
     return cylinder.s_mc - (left + brake_fluid.gas_volume(p, fluid)) / cylinder.A_mc
 
 
-_kept_travel = lru_cache(maxsize=64)(_travel)  # mostly, a study varies none of these groups
+def _nodes(
+    p: float, beta: float, table: tuple[float, ...]
+) -> tuple[tuple[tuple[caliper.State, float, float], ...], float]:
+    """Return where Gauss looks at the integral of `travel_at`, with width and exponential there.
+
+    And the exponential of the whole way.
+    """
+    looked_at = []
+    for low, high in pairwise((0.0, *(ops.clip(node, 0.0, p) for node in table), p)):
+        for share, weight in _GAUSS:
+            at = 0.5 * (low + high) + 0.5 * (high - low) * share
+            exponential = ops.exp((at - p) / beta)
+            looked_at.append((caliper.State(at), 0.5 * (high - low) * weight, exponential))
+    return tuple(looked_at), ops.exp(-p / beta)
+
+
+_kept_nodes = lru_cache(maxsize=64)(_nodes)  # mostly, a study varies nothing that they follow from
 
 
 def highest_pressure(par: Par) -> float:
@@ -154,7 +162,7 @@ def _resting_at(p: float, x: float, par: Par, current: float | None) -> Any:
 def memory_at(p: float, par: Par, current: float | None = None) -> Memory:
     """Return the memory in which every controller, or the ideal source, holds that state."""
     i = holding_current(p, par) if current is None else current
-    measured = zeros(Memory)._replace(p_meas=p, i_meas=i)
+    measured = _NOTHING._replace(p_meas=p, i_meas=i)
     if par.drive.mode == "voltage-source":
         return measured._replace(v_source=par.motor.R_m * i)
     if par.drive.mode == "current-source":
