@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 from dataclasses import replace
 
@@ -108,6 +109,23 @@ def test_key_figures_and_warnings_without_recordings_are_the_same():
         assert figures.kpis(k) == result.kpis
         assert list(figures.warnings[k]) == result.warnings
         assert any("retracted stop" in text for text in figures.warnings[k])
+
+
+def test_recordings_that_were_judged_are_let_go_at_once(bench):
+    """And not when Python looks for garbage: of few large arrays it takes long to."""
+    key_figures_of([bench])  # what is kept of the model
+    gc.collect()
+    gc.disable()
+    try:
+        key_figures_of([bench])
+        gc.set_debug(gc.DEBUG_SAVEALL)
+        gc.collect()
+        left = [each for one in gc.garbage for each in (one, *gc.get_referents(one))]
+        assert not [each for each in left if isinstance(each, np.ndarray)]
+    finally:
+        gc.set_debug(0)
+        gc.garbage.clear()
+        gc.enable()
 
 
 def test_warnings_of_cases_need_no_more_than_the_signals_that_are_watched(bench):

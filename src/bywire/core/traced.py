@@ -75,18 +75,21 @@ def names_in(values: Any, marks: Mapping[int, Any] | None = None) -> Iterator[An
 
 def computed(values: Any, given: Mapping[str, Any]) -> Any:
     """Return what a value, or a tuple of values, is where its names are given."""
-    known: dict[int, Any] = {}
+    return _computed(values, given, {})
 
-    def value(each: Any) -> Any:
-        if isinstance(each, tuple):
-            rows = [value(inner) for inner in each]
-            return each._make(rows) if hasattr(each, "_make") else tuple(rows)
-        if not isinstance(each, Traced):
-            return each
-        if each.operation is None:
-            return given[each.inputs[0]]
-        if id(each) not in known:
-            known[id(each)] = each.operation(*map(value, each.inputs))
-        return known[id(each)]
 
-    return value(values)
+def _computed(each: Any, given: Mapping[str, Any], known: dict[int, Any]) -> Any:
+    """Return a value; what shared operations gave is ``known`` by their identity."""
+    # A function within `computed` would refer to itself, and keep recordings until Python looks
+    # for garbage.
+    if isinstance(each, tuple):
+        rows = [_computed(inner, given, known) for inner in each]
+        return each._make(rows) if hasattr(each, "_make") else tuple(rows)
+    if not isinstance(each, Traced):
+        return each
+    if each.operation is None:
+        return given[each.inputs[0]]
+    if id(each) not in known:
+        inputs = [_computed(inner, given, known) for inner in each.inputs]
+        known[id(each)] = each.operation(*inputs)
+    return known[id(each)]

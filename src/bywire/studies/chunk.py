@@ -102,8 +102,7 @@ def computed_chunks(
 def _garbage_later() -> Iterator[None]:
     """Look for garbage once at the end, and not among all objects again and again meanwhile.
 
-    Models that were evaluated refer to themselves and to arrays: too few objects for Python to look
-    for them soon, and too many megabytes to wait.
+    Models that were evaluated refer to themselves.
     """
     was_enabled = gc.isenabled()
     gc.disable()
