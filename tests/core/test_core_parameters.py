@@ -291,6 +291,28 @@ def test_fields_know_unit_range_and_description():
     ]  # fmt: skip
 
 
+def test_notes_of_classes_within_others_and_in_conditions():
+    class Local(ParameterSet):
+        R: Resistance
+        """of a function"""
+
+    if Local:
+
+        class Conditional(Local):
+            x: Length
+            """of a condition"""
+
+    class Holder:
+        class Local(ParameterSet):
+            R: Resistance
+            """of a class"""
+
+    assert field_notes(Conditional) == {"R": "of a function", "x": "of a condition"}
+    assert field_notes(Holder.Local) == {"R": "of a class"}
+    silent = type("Silent", (ParameterSet,), {"__annotations__": {"R": Resistance}})
+    assert field_notes(silent) == {"R": ""}
+
+
 def test_fields_cannot_be_changed_by_who_reads_them():
     with pytest.raises(TypeError):
         leaf_fields(Outer)["x"] = leaf_fields(Outer)["n"]  # type: ignore[index]

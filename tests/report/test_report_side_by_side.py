@@ -8,6 +8,7 @@ from functools import partial
 import pytest
 from matplotlib.figure import Figure
 
+from bywire.core.copies import processes
 from bywire.report import side_by_side
 from bywire.report.document import FigureBlock
 from bywire.report.files import figure_bytes
@@ -47,6 +48,26 @@ def test_copies_draw_the_same():
             figure_bytes(theirs, k) for k in ("png", "svg")
         ]
     assert len({figure_bytes(figure) for figure, _ in shown}) == len(many)
+
+
+def test_what_is_long_is_begun_first(tmp_path, monkeypatch):
+    monkeypatch.setattr(side_by_side.os, "cpu_count", lambda: 9)
+    monkeypatch.setattr(side_by_side, "processes", lambda _, *rest, **is_copied: processes(
+        1, *rest, **is_copied
+    ))  # fmt: skip
+    begun = tmp_path / "begun"
+
+    def noted(k: int) -> Figure:
+        with begun.open("a") as stream:
+            stream.write(f"{k} ")
+        return line(k)
+
+    many = [FigureBlock(partial(noted, k), f"figure {k}", is_long=k in (1, 4)) for k in range(5)]
+    with drawn_side_by_side(many):
+        pass
+    assert begun.read_text() == "1 4 0 2 3 "
+    (alone, shown) = (inline_figures([(f, "")]) for f in (line(3), many[3].figure))
+    assert alone == shown
 
 
 def test_few_figures_are_not_worth_copies():

@@ -104,6 +104,8 @@ def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(
     assert workers
     computing.close()
     pd.testing.assert_frame_equal(alone.read(3), shared.read(3), check_exact=True)
+    anew = StudyStore(shared.folder)  # from its files
+    pd.testing.assert_frame_equal(alone.read(3), anew.read(3), check_exact=True)
     if sys.platform == "win32":
         return  # signals of POSIX
     until = time.monotonic() + 10.0  # the pool's own thread may wait for them too

@@ -7,13 +7,16 @@ from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
+from bywire.api.study_figures import load_drawing
 from bywire.api.study_run import StudyRun
 from bywire.bench import running
 from bywire.bench.requirements import status_of
 from bywire.bench.result import Result
 from bywire.bench.running import Progress
 from bywire.core.brake import loaded_files
+from bywire.core.callers import is_command_line
 from bywire.core.errors import FileError, InputError, ParameterError, quoted
+from bywire.core.field_notes import field_notes
 from bywire.core.typing import silent
 from bywire.report.answer import use_case
 from bywire.studies.findings import Findings
@@ -93,10 +96,17 @@ def _completed(
     progress: Progress | None,
 ) -> StudyRun:  # fmt: skip
     """Return a study with all of its cases, those that were missing computed."""
+
+    def ready() -> None:
+        if is_command_line():  # its report is drawn next; a program may want no figure
+            load_drawing()
+            field_notes(type(plan.bench.par))
+
     try:
         completed = complete(
-            plan, store, origin, workers=workers, cluster=cluster, progress=progress or silent
-        )
+            plan, store, origin, workers=workers, cluster=cluster, progress=progress or silent,
+            meanwhile=ready,
+        )  # fmt: skip
     except KeyboardInterrupt:
         of = "" if plan.sought is not None else f" of {plan.chunks}"
         raise KeyboardInterrupt(

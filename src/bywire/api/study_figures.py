@@ -29,6 +29,18 @@ _SHARES = 100  # points of a convergence, spaced by equal ratios
 Recordings = Callable[[], Mapping[str, Mapping[str, "xr.Dataset"]]]
 
 
+def load_drawing() -> None:
+    """Load what draws the figures of a study and writes its report, ahead of its findings."""
+    from bywire.data import netcdf  # noqa: F401
+    from bywire.report import overlaid_panels, page  # noqa: F401
+    from bywire.report.study import (  # noqa: F401
+        convergence,
+        histograms,
+        influence_bars,
+        scatter,
+    )
+
+
 def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
     """Return the figures of a study.
 
@@ -46,7 +58,7 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
         FigureBlock(
             partial(_histograms, findings),
             f"Spread of the key figures over the cases{band}. Dashed, the bench itself; dotted, "
-            "the limit.", "histograms",
+            "the limit.", "histograms", is_long=True,
         )
     ]  # fmt: skip
     figures = shown_figures(findings)
@@ -171,7 +183,7 @@ def _overlays(recordings: Recordings) -> list[Block]:
         FigureBlock(
             partial(_overlaid, each),
             f"The bench itself and the worst cases of each requirement (run: {label}).",
-            f"worst-{label}",
+            f"worst-{label}", is_long=True,
         )
         for label, each in recordings().items() if len(each) > 1
     ]  # fmt: skip

@@ -187,7 +187,7 @@ class StudyRun(Answer):
                 *([demands] if judged else []), spreads, *drivers[:3],
                 *([Listing(missing, "Cases without a result")] if missing else []),
             ]),
-            data=self._data(),
+            data=self._data,
             banner=self._banner(),
             attachments=self._shown.attachments(),
             record="report.json",

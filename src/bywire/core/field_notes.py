@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import ast
 import inspect
-import textwrap
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterator, Mapping
 from functools import cache
 from types import MappingProxyType
 
@@ -41,13 +41,37 @@ def field_notes(cls: type[ParameterSet], prefix: str = "") -> Mapping[str, str]:
     return MappingProxyType(notes)
 
 
-def _written_under_fields(cls: type) -> dict[str, str]:
+def _written_under_fields(cls: type) -> Mapping[str, str]:
     try:
-        source = textwrap.dedent(inspect.getsource(cls))
-    except (OSError, TypeError):  # typed into a console: no source to read
+        source = inspect.getsource(sys.modules[cls.__module__])
+    except (KeyError, OSError, TypeError):  # typed into a console: no source to read
         return {}
-    (definition,) = ast.parse(source).body
-    assert isinstance(definition, ast.ClassDef)
+    return _written_in(source).get(cls.__qualname__, {})
+
+
+@cache
+def _written_in(source: str) -> Mapping[str, Mapping[str, str]]:
+    """Return what stands under the fields of all classes of a file, by qualified name.
+
+    Read at once: `inspect` parses a whole file for the source of each class.
+    """
+    return {name: _texts(definition) for name, definition in _classes(ast.parse(source))}
+
+
+def _classes(node: ast.AST, prefix: str = "") -> Iterator[tuple[str, ast.ClassDef]]:
+    """Yield the classes below a node with their qualified names."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.ClassDef):
+            yield f"{prefix}{child.name}", child
+            yield from _classes(child, f"{prefix}{child.name}.")
+        elif isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield from _classes(child, f"{prefix}{child.name}.<locals>.")
+        elif not isinstance(child, ast.expr):  # a class may stand in a condition
+            yield from _classes(child, prefix)
+
+
+def _texts(definition: ast.ClassDef) -> Mapping[str, str]:
+    """Return the strings right below the fields of a class, by field."""
     notes: dict[str, str] = {}
     for field, below in zip(definition.body, definition.body[1:], strict=False):
         match field, below:

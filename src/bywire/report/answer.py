@@ -57,7 +57,7 @@ class Answer(ABC):
 
     def as_object(self) -> dict[str, Any]:
         """Return the JSON object: what the command prints with ``--json``, but for the files."""
-        shown: dict[str, Any] = finite(dict(self.document().data))
+        shown: dict[str, Any] = finite(dict(self.document().facts))
         return shown
 
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -151,6 +151,8 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
             if each.after_record and document.record:
                 _record(document, place, names)
             each.write(place.scratch / each.name)
+        if document.record:
+            document.facts  # noqa: B018 - made while copies draw
     if document.is_paged:
         from bywire.report.files import save_figure
         from bywire.report.page import write_page
@@ -175,7 +177,7 @@ def _record(document: Document, place: ResultFolder, names: list[str]) -> None:
 
 def with_files(document: Document, files: list[Path]) -> dict[str, Any]:
     """Return the JSON object of a document with the files that were written, its own among them."""
-    shown: dict[str, Any] = finite(dict(document.data))
+    shown: dict[str, Any] = finite(dict(document.facts))
     return {**shown, "files": [*shown.get("files", []), *map(str, files)]}
 
 

@@ -47,11 +47,15 @@ class FigureBlock:
         What it shows.
     name
         Its file in an output folder, without the ending; no file where it is empty.
+    is_long
+        Whether it takes much longer to draw than most, as one of many panels does: where figures
+        are drawn side by side it is begun first.
     """
 
     source: Figure | Callable[[], Figure]
     caption: str
     name: str = ""
+    is_long: bool = False
 
     @cached_property
     def figure(self) -> Figure | Picture:
@@ -165,7 +169,8 @@ class Document:
     brief
         What a terminal shows, a text or block each: mostly blocks that the page has as well.
     data
-        The JSON object, but for the files; NaN and infinite numbers become null.
+        The JSON object, but for the files, or what makes it, where that costs statistics; NaN and
+        infinite numbers become null.
     banner
         Outcome, above the contents of the page.
     attachments
@@ -192,7 +197,7 @@ class Document:
     summary: str
     sections: Sequence[Section] | Callable[[], Sequence[Section]]
     brief: Sequence[str | Flat]
-    data: Mapping[str, Any]
+    data: Mapping[str, Any] | Callable[[], Mapping[str, Any]]
     banner: Banner | None = None
     attachments: Sequence[Attachment] = ()
     record: str = ""
@@ -208,6 +213,11 @@ class Document:
     def page(self) -> Sequence[Section]:
         """The sections, made on first use."""
         return self.sections() if callable(self.sections) else self.sections
+
+    @cached_property
+    def facts(self) -> Mapping[str, Any]:
+        """The JSON object, made on first use."""
+        return self.data() if callable(self.data) else self.data
 
     def flat(self) -> Iterator[Flat]:
         """Yield the blocks of all sections, folded ones among them."""

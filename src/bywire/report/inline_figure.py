@@ -52,7 +52,8 @@ def _svg(figure: Figure | Picture, text: str, prefix: str) -> str:
     head, body = svg.split(">", 1)
     kept = " ".join(re.findall(r'(?:viewBox|font-family)="[^"]*"', head))
     body = re.sub(r"<[^>]*>", lambda tag: _tag(tag[0], prefix), body)
-    body = re.sub(r"\s*\n\s*", "\n", body)
+    # With a pattern that may begin with any blank this takes five times as long.
+    body = re.sub(r"\n\s+", "\n", body.replace(" \n", "\n"))
     return f'<svg {kept} role="img" aria-label="{_attribute(text)}"{axes_of(figure)}>{body}'
 
 
@@ -87,11 +88,10 @@ def _span(limits: tuple[float, float], scale: str) -> list[float | bool]:
 
 def _tag(tag: str, prefix: str) -> str:
     """Return a tag with ids of its own, and coordinates that are no finer than the eye."""
-    if "#" in tag or ' id="' in tag:
-        tag = re.sub(r'\bid="', f'id="{prefix}', tag.replace("xlink:href=", "href="))
-        tag = re.sub(r'(href="|url\()#', rf"\1#{prefix}", tag)
+    tag = tag.replace("xlink:href=", "href=").replace(' id="', f' id="{prefix}')
+    tag = tag.replace('href="#', f'href="#{prefix}').replace("url(#", f"url(#{prefix}")
     # Put together from what is kept, in half the time that it takes to replace the rest.
-    return re.sub(r'\bd="[^"]*"', lambda m: "".join(_DECIMALS.split(m[0])), tag)
+    return re.sub(r' d="[^"]*"', lambda m: "".join(_DECIMALS.split(m[0])), tag)
 
 
 def _png(figure: Figure | Picture, text: str) -> str:

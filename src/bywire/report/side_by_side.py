@@ -35,11 +35,13 @@ def drawn_side_by_side(blocks: Sequence[FigureBlock]) -> Iterator[None]:
 
     _blocks[:] = blocks
     with processes(min(cores, len(blocks)), list, is_copied=True) as pool:
-        drawn = [pool.submit(_picture, k) for k in range(len(blocks))]
+        # What is long is begun first: at the end it would have all but one copy wait.
+        order = sorted(range(len(blocks)), key=lambda k: not blocks[k].is_long)
+        drawn = {k: pool.submit(_picture, k) for k in order}
         yield
         try:
-            for block, each in zip(blocks, drawn, strict=True):
-                block.__dict__["figure"] = each.result()
+            for k, each in drawn.items():
+                blocks[k].__dict__["figure"] = each.result()
         except BrokenProcessPool:  # killed, most likely for want of memory: the rest is drawn here
             pass
     _blocks.clear()

@@ -179,16 +179,15 @@ def _computed(chunk: int | PlacedChunk) -> tuple[int, Columns]:
 def _as_completed(
     pool: ProcessPoolExecutor, ahead: int, chunks: Chunks
 ) -> Iterator[tuple[int, Columns]]:
-    """Yield what a pool has finished, with few jobs in flight."""
+    """Return what a pool finishes, with few jobs in flight; the first ones are begun at once."""
     left = iter(chunks)
-    running: set[Future[Any]] = set()
-    while True:
-        for chunk in left:
-            running.add(pool.submit(_computed, chunk))
-            if len(running) >= ahead:
-                break
-        if not running:
-            return
-        done, running = wait(running, return_when=FIRST_COMPLETED)
-        for each in done:
-            yield each.result()
+    running: set[Future[Any]] = {pool.submit(_computed, chunk) for chunk in islice(left, ahead)}
+
+    def finished(running: set[Future[Any]]) -> Iterator[tuple[int, Columns]]:
+        while running:
+            done, running = wait(running, return_when=FIRST_COMPLETED)
+            running |= {pool.submit(_computed, chunk) for chunk in islice(left, len(done))}
+            for each in done:
+                yield each.result()
+
+    return finished(running)

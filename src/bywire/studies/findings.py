@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -196,11 +197,11 @@ class Findings:
         ranked = [each.quantity for each in self.sensitivity(name).drivers]
         return [each for each in ranked if each in numbers]
 
-    @property
+    @cached_property
     def failures(self) -> Mapping[int, str]:
         """Row -> why the case has no result."""
-        texts = self.cases[FAILURE] if len(self.cases) else ()
-        return {k: str(text) for k, text in enumerate(texts) if text}
+        texts = self._texts(FAILURE)
+        return {k: texts[k] for k in np.flatnonzero(texts != "").tolist()}
 
     @property
     def reasons(self) -> Mapping[str, Sequence[int]]:
@@ -208,20 +209,23 @@ class Findings:
         said: dict[str, list[int]] = {}
         for row, text in self.failures.items():
             said.setdefault(_NUMBER.sub("#", text), []).append(row)
-        failures = self.failures
-        return {failures[rows[0]]: rows for rows in said.values()}
+        return {self.failures[rows[0]]: rows for rows in said.values()}
 
-    @property
+    @cached_property
     def warnings(self) -> Mapping[str, int]:
         """What runs warned of -> in how many cases; what differs in its numbers alone, once."""
-        said: dict[str, list[str]] = {}
-        for text in self.cases[WARNINGS] if len(self.cases) else ():
-            for each in filter(None, str(text).split("; ")):
-                said.setdefault(_NUMBER.sub("#", each), []).append(each)
+        said: dict[str, Counter[str]] = {}
+        for text, cases in Counter(self._texts(WARNINGS).tolist()).items():
+            for each in filter(None, text.split("; ")):
+                said.setdefault(_NUMBER.sub("#", each), Counter())[each] += cases
         return {
-            each[0] if len({*each}) == 1 else f"{each[0]}, and so on": len(each)
+            next(iter(each)) + ", and so on" * (len(each) > 1): each.total()
             for each in said.values()
         }
+
+    def _texts(self, column: str) -> NDArray[np.object_]:
+        """Return a text of every case, shape (cases,); pandas would be slow to hand over each."""
+        return np.asarray(self.cases[column] if len(self.cases) else (), dtype=object)
 
     def number(self, row: int) -> int:
         """Return the number of a case by its row."""

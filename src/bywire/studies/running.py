@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -43,6 +44,7 @@ def complete(
     workers: int | None = None,
     cluster: str = "",
     progress: Progress,
+    meanwhile: Callable[[], object] = tuple,
 ) -> Completed:
     """Compute the bench of a study itself, and the chunks that its folder lacks.
 
@@ -54,6 +56,8 @@ def complete(
         See `bywire.studies.executor.executor_of`.
     progress
         Called with a label and the finished share, 0 to 1.
+    meanwhile
+        Called once when the first chunks are begun, while this process would wait for them.
 
     Returns
     -------
@@ -94,7 +98,9 @@ def complete(
     executor = executor_of(workers, cluster, len(missing), engine=plan.bench.engine)
     with executor.opened(plan) as compute:
         nominal_run = compute.beside(itself)
-        for count, (chunk, columns) in enumerate(compute(missing), 1):
+        computed = compute(missing)
+        meanwhile()
+        for count, (chunk, columns) in enumerate(computed, 1):
             store.write(chunk, columns, plan.column_units)
             progress(label, (done + count) / plan.chunks)
             nominal_run.check()

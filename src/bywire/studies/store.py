@@ -61,6 +61,8 @@ class StudyStore:
     """
 
     folder: Path
+    # What was read or written here, so that nobody who judges a study waits for its files again.
+    _known: dict[int, Columns] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def open(self, plan: StudyPlan, origin: Origin) -> None:
         """Make the folder one of a study, or refuse that of another.
@@ -172,8 +174,9 @@ class StudyStore:
             When it cannot be written.
         """
         pa, parquet = library("pyarrow", *_WHAT), library("pyarrow.parquet", *_WHAT)
-        arrays = {name: pa.array(column.tolist() if column.dtype.kind in "OU" else column)
-                  for name, column in columns.items()}  # fmt: skip
+        texts = [name for name, column in columns.items() if column.dtype.kind in "OU"]
+        columns = {**columns, **{name: columns[name].astype(object) for name in texts}}
+        arrays = {name: pa.array(column) for name, column in columns.items()}
         fields = [
             pa.field(name, array.type, metadata={b"unit": units.get(name, "1").encode()})
             for name, array in arrays.items()
@@ -181,9 +184,11 @@ class StudyStore:
         table = pa.table(list(arrays.values()), schema=pa.schema(fields, self._marks(chunk)))
         try:
             with replacing(self.path(chunk)) as fresh:
-                parquet.write_table(table, fresh, write_page_checksum=True)
+                # A dictionary of numbers that all differ would be written in vain.
+                parquet.write_table(table, fresh, write_page_checksum=True, use_dictionary=texts)
         except OSError as error:
             raise _unwritable(self.path(chunk), error) from None
+        self._known[chunk] = columns
 
     def read(self, chunks: int) -> pd.DataFrame:
         """Return all cases of the first chunks that are there, in their order.
@@ -200,13 +205,19 @@ class StudyStore:
         return pd.DataFrame({n: np.concatenate([columns[n] for columns in each]) for n in names})
 
     def columns(self, chunk: int) -> Columns:
-        """Return the cases of a chunk that is there.
+        """Return the cases of a chunk that is there, as they were when it was read or written here.
 
         Raises
         ------
         FileError
             When its file is damaged.
         """
+        if chunk not in self._known:
+            self._known[chunk] = self._read(chunk)
+        return self._known[chunk]
+
+    def _read(self, chunk: int) -> Columns:
+        """Return what the file of a chunk holds; see `columns`."""
         parquet = library("pyarrow.parquet", *_WHAT)
         try:
             # Of one file: what reads folders of them takes three times as long, and loads more.
