@@ -12,7 +12,7 @@ from pydantic import Field, field_validator, model_validator
 
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.core.field_notes import field_notes
-from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
+from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields, leaf_table
 from bywire.core.quantities import Fraction, Length, Resistance, Unit
 from bywire.core.units import Written
 from bywire.report.wording import range_text
@@ -250,6 +250,14 @@ def test_leaves_spread_tables():
         "long": 2.0, "short": 1.0,
     }  # fmt: skip
     assert all(type(value) is float for value in made().leaves().values())
+
+
+def test_numbers_of_several_sets_are_a_table():
+    sets = [made(), made().replace({"inner.R": 0.5}), made(n=7.0)]
+    table = leaf_table(sets)
+    assert table.tolist() == [list(each.leaves().values()) for each in sets]
+    with pytest.raises((TypeError, ValueError)):
+        leaf_table([made(), made().with_leaves({"inner.R": "R"})])
 
 
 def test_choices_hold_the_length_of_tables():

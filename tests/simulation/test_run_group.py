@@ -88,6 +88,10 @@ def test_what_does_not_fit_is_refused(runs):
     assert not fit_lanes([runs[0], longer])
     assert not fit_lanes([runs[0], replace(runs[0], step=10e-6)])
     assert not fit_lanes([])
+    other_choice = runs[0].par.replace({"gear.law": "directional"})
+    assert not fit_lanes([runs[0], replace(runs[0], par=other_choice)])
+    other_period = runs[0].par.replace({"ecu.T_s": 2e-3})
+    assert not fit_lanes([runs[0], replace(runs[0], par=other_period)])
     with pytest.raises(ParameterError, match="side by side"):
         simulate_group([runs[0], longer])
     with pytest.raises(ParameterError, match="threads = 0"):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bywire.bench.kpis import hysteresis, sine_sweep, step_response, tracking
 from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.noise import put_noise
 from bywire.core.errors import StepError
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
@@ -236,9 +237,8 @@ class _Driven:
         """Put it into rows of zeros; see `bywire.simulation.run.put_into`."""
         given, drawn = driven_at(self.case, t - self.case.settle), 0
         for k, name in enumerate(self.case.model.Stimulus._fields):
-            if name.startswith("noise_"):  # as children of one sequence, quicker than spawned
-                child = np.random.SeedSequence(self.seed, spawn_key=(drawn,))
-                rows[:, k] = np.random.default_rng(child).standard_normal(t.size)
+            if name.startswith("noise_"):
+                put_noise(rows[:, k], self.seed, drawn)
                 drawn += 1
             elif name in given:
                 rows[:, k] = given[name]

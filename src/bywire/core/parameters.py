@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import math
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache, cached_property, lru_cache
+from itertools import chain
 from types import MappingProxyType
 from typing import Any, Self, TypeVar, cast
 
+import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
@@ -130,6 +133,19 @@ class ParameterSet(BaseModel):
         evaluating equations, not for building parameter sets.
         """
         return cast(Self, _with_objects(_rebuilt(self, "", values)))
+
+
+def leaf_table(pars: Sequence[ParameterSet]) -> NDArray[np.float64]:
+    """Return the numbers of sets of one structure, shape (sets, leaves); see `leaves`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Where they carry other objects than numbers.
+    """
+    each = [par._by_name("numbers").values() for par in pars]
+    shape = (len(each), len(each[0]))
+    return np.fromiter(chain.from_iterable(each), np.float64, math.prod(shape)).reshape(shape)
 
 
 @cache

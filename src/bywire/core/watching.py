@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from bywire.core.model import Model
+from bywire.core.parameters import leaf_table
 from bywire.core.traced import Traced, computed, names_in
 from bywire.core.wired import Instant, Wired
 
@@ -119,8 +120,7 @@ def _joined(pars: Sequence[Any]) -> Any:
     """Return sets of one structure as a single one: where they differ, with an array of all."""
     if len(pars) == 1:
         return pars[0]
-    names = tuple(pars[0].leaves())
-    table = np.array([tuple(par.leaves().values()) for par in pars], dtype=np.float64)
+    names, table = tuple(pars[0].leaves()), leaf_table(pars)
     differs = np.flatnonzero((table != table[0]).any(axis=0)).tolist()
     return pars[0].with_leaves({names[k]: table[:, k : k + 1] for k in differs})
 

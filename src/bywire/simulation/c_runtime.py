@@ -105,16 +105,12 @@ static inline B ONLY(int l) {
   m[l] = -1;
   return m;
 }
-static inline int ANY(B m) {
-  int64_t any = 0;
-  for (int l = 0; l < W; ++l) any |= m[l];
-  return any != 0;
-}
 /* The header of all instructions takes longer to read than a small kernel to compile: GCC's own
  * names, in functions as they stand there, do without it. */
 #if defined(__AVX2__) && defined(__GNUC__) && !defined(__clang__) && defined(__has_builtin)
 #if __has_builtin(__builtin_ia32_blendvpd256) && __has_builtin(__builtin_ia32_maxpd256) \
-    && __has_builtin(__builtin_ia32_roundpd256) && __has_builtin(__builtin_ia32_sqrtpd256)
+    && __has_builtin(__builtin_ia32_roundpd256) && __has_builtin(__builtin_ia32_sqrtpd256) \
+    && __has_builtin(__builtin_ia32_movmskpd256)
 #define NAMED
 #endif
 #endif
@@ -130,6 +126,7 @@ INLINE bw_sqrt(V a) { return (V)__builtin_ia32_sqrtpd256(a); }
 #define MIN(a, b) bw_min(a, b)
 #define FLOOR(a) bw_floor(a)
 #define SQRT(a) bw_sqrt(a)
+#define ANY(m) (__builtin_ia32_movmskpd256((V)(m)) != 0)
 #elif defined(__AVX2__)
 #include <immintrin.h>
 #define SELECT(m, a, b) _mm256_blendv_pd(b, a, (V)(m))
@@ -137,12 +134,18 @@ INLINE bw_sqrt(V a) { return (V)__builtin_ia32_sqrtpd256(a); }
 #define MIN(a, b) _mm256_min_pd(a, b)
 #define FLOOR(a) _mm256_floor_pd(a)
 #define SQRT(a) _mm256_sqrt_pd(a)
+#define ANY(m) (_mm256_movemask_pd((V)(m)) != 0)
 #else
 #define SELECT(m, a, b) ((V)(((I)(a) & (m)) | ((I)(b) & ~(m))))
 #define MAX(a, b) SELECT((a) > (b), a, b)
 #define MIN(a, b) SELECT((a) < (b), a, b)
 #define FLOOR(a) each(floor, a)
 #define SQRT(a) each(sqrt, a)
+static inline int ANY(B m) {
+  int64_t any = 0;
+  for (int l = 0; l < W; ++l) any |= m[l];
+  return any != 0;
+}
 #endif
 #endif
 #define FABS(a) ((V)((I)(a) & INT64_MAX))

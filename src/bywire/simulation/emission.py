@@ -110,12 +110,14 @@ def branching_statements(
     name: Namer,
     declare: str,
     dialect: Dialect = PLAIN_C,
+    later: Iterable[Node] = (),
 ) -> list[str]:
     """Return declarations in which costly functions stand inside the only branch that needs them.
 
-    Where the condition fails, the processor skips the function.
+    Where the condition fails, the processor skips the function. ``later``: nodes that read what is
+    declared here, too.
     """
-    uses = Counter(a for node in order for a in graph.arguments(node))
+    uses = Counter(a for node in (*order, *later) for a in graph.arguments(node))
     inside = {
         graph.nodes[node].args[1]
         for node in order

@@ -10,12 +10,12 @@ from collections.abc import Callable, Sequence
 
 from bywire.simulation.c_runtime import LANES
 from bywire.simulation.emission import indented, leaf_count
-from bywire.simulation.emit_rare import rare_roots, rare_substep
-from bywire.simulation.expressions import VECTOR_C, condition
+from bywire.simulation.emit_rare import rare_substep
+from bywire.simulation.lane_repeats import repeated_lanes, repeated_results, settling_function
 from bywire.simulation.lane_statements import Lanes
 from bywire.simulation.layout import Layout
 from bywire.simulation.operation import Node
-from bywire.simulation.stages import STATE, Stages
+from bywire.simulation.stages import Stages
 
 SIGNATURE = """int bw_lanes(void) { return TURNS * W; }
 
@@ -54,7 +54,7 @@ _SHORT = 160
 def takes_turns(stages: Stages) -> bool:
     """Return whether a substep is so short that two vectors in turn are quicker than one."""
     t = Lanes(stages)
-    return not t.mode.atoms and len(t.substep()) <= _SHORT
+    return not t.mode.atoms and len(t.lines(t.mode.rest)) <= _SHORT
 
 
 def emit_lanes(stages: Stages, in_turn: bool = False, ends: int = 0) -> str:
@@ -73,7 +73,7 @@ def emit_lanes(stages: Stages, in_turn: bool = False, ends: int = 0) -> str:
     return f"""{LANES}
 #define TURNS {len(turns)}
 {rare_substep(stages)}
-{_settle_lanes(t)}
+{settling_function(t)}
 {_PUT}
 {SIGNATURE} {{
   {PLAN.format(at=8 + len(stages.ticks))}
@@ -102,9 +102,9 @@ def emit_lanes(stages: Stages, in_turn: bool = False, ends: int = 0) -> str:
     {each(Lanes.framed, 4)}
     {each(lambda t: [f"V s{k}{t.mark} = SET(0.0);" for k in range(len(t.products))], 4)}
     for (int64_t s = 0; s < substeps; ++s) {{
-      {each(Lanes.substep, 6)}
-      {each(_new, 6)}
-      {each(_rare, 6)}
+      {each(Lanes.judged, 6)}
+      {each(repeated_lanes, 6)}
+      {each(Lanes.sums, 6)}
       {each(_commit, 6)}
     }}
     {each(_integrals, 4)}
@@ -146,26 +146,26 @@ def _ahead(t: Lanes) -> list[str]:
     return [f"y{k}{t.mark} = x{k}{t.mark} + d{k}{t.mark};" for k in t.carried.values()]
 
 
-def _new(t: Lanes) -> list[str]:
-    lines = [f"V {target}_{t.mark} = {t.number(n)};" for target, n in t.results.items()]
-    return lines + [f"V z{k}{t.mark} = {t.number(n)};" for k, n in enumerate(t.products)]
+def _commit(t: Lanes) -> list[str]:
+    """Return, in one piece, what takes over the results.
 
-
-def _rare(t: Lanes) -> list[str]:
-    """Return, in one piece, what becomes of lanes that raise their flag."""
-    flagged = f"flagged{t.mark}"
+    Those that no flag waits for are computed only here: nothing reads the values before them any
+    longer, so that each takes the place of its own. Earlier, both would have to be kept.
+    """
+    results = [
+        *t.finished(),
+        *(f"const V {name}_ = {t.number(n)};" for name, n in t.results.items()),
+        *(f"{name}{t.mark} = {name}_;" for name in t.results),
+        *_ahead(t),
+    ]
+    repeated = [*repeated_results(t), *_ahead(t)]
     return [
-        f"const B {flagged} = {condition(t.graph, t.flag, t.name, VECTOR_C)};\n"
-        f"      if (__builtin_expect(ANY({flagged}), 0)) {{\n"
-        f"        {indented(_repeat(t), 8)}\n"
+        f"if (__builtin_expect(!is_rare{t.mark}, 1)) {{\n"
+        f"        {indented(results, 8)}\n"
+        f"      }} else {{\n"
+        f"        {indented(repeated, 8)}\n"
         "      }",
     ]
-
-
-def _commit(t: Lanes) -> list[str]:
-    lines = [f"{target}{t.mark} = {target}_{t.mark};" for target in t.results]
-    lines += [f"s{k}{t.mark} += z{k}{t.mark};" for k in range(len(t.products))]
-    return lines + _ahead(t)
 
 
 def _integrals(t: Lanes) -> list[str]:
@@ -229,69 +229,3 @@ def _record_ends(t: Lanes, roots: Sequence[Node]) -> list[str]:
         "          }",
     ]
     return [f"if (f == end0 || f == end1) {{\n        {indented(lines, 8)}\n      }}"]
-
-
-def _settle_lanes(t: Lanes) -> str:
-    """Return the C function that settles the flagged lanes one by one.
-
-    It works on copies: a vector whose lanes are addressed would live in memory everywhere. Of a
-    lane that is not in doubt the velocities of the ordinary pass are known.
-    """
-    stages, nx = t.stages, t.layout.length["x"]
-    targets = {name: k for k, name in enumerate(t.results)}
-    places = [f"{kind}{k}" for kind in STATE for k in range(t.layout.length[kind])]
-    given = [f"ms[{k}] = m[{j}][l];" for j, k in enumerate(_memory(t))]
-    given += [f"o[{v}] = n[{targets[f'x{v}']}][l];" for v in stages.velocities]
-    taken = [
-        f"n[{k}] = SELECT(ONLY(l), SET(o[{places.index(name)}]), n[{k}]);"
-        for name, k in targets.items()
-    ]
-    added = [f"q[{j}][l] += o[{places.index(name)}];" for j, name in enumerate(_flows(t))]
-    return f"""static RARE void settle_lanes(B flagged, B doubtful, const double *c, double h,
-    const V *m, const V *old, V *n, V *q, V *counters) {{
-  double ms[{max(t.layout.length["m"], 1)}], xs[{nx}], ds[{nx}], o[RESULTS];
-  EACH_LANE(l, flagged) {{
-    for (int k = 0; k < {nx}; ++k) {{ xs[k] = old[k][l]; ds[k] = old[{nx} + k][l]; }}
-    {indented(given, 4)}
-    cuts made;
-    counters[0][l] += located(c + l * (CONSTANTS + 1), h, ms, xs, ds, !LANE(doubtful, l), o, &made);
-    counters[1][l] += 1.0;
-    for (int k = 0; k < {len(t.products)}; ++k) n[{len(targets)} + k][l] = 0.0;
-    {indented(taken + added, 4)}
-  }}
-  (void)m; (void)q;
-}}
-"""
-
-
-def _memory(t: Lanes) -> list[int]:
-    """Return the entries of the memory that a rare pass reads."""
-    read = t.graph.read_by(rare_roots(t.stages))
-    return [k for k in range(t.layout.length["m"]) if t.graph.leaf("m", k) in read]
-
-
-def _flows(t: Lanes) -> list[str]:
-    """Return the integrals that signals read; the others stay as they are."""
-    read = t.graph.read_by(t.stages.output)
-    return [f"q{k}" for k in range(t.layout.length["q"]) if t.graph.leaf("q", k) in read]
-
-
-def _repeat(t: Lanes) -> list[str]:
-    """Return the statements that hand a substep with flagged lanes to ``settle_lanes``."""
-    old = t.marked(*(f"{kind}{k}" for kind in ("x", "d") for k in range(t.layout.length[kind])))
-    new = t.marked(*(f"{name}_" for name in t.results), *(f"z{k}" for k in range(len(t.products))))
-    flow = t.marked(*_flows(t))
-    memory = t.marked(*(f"m{k}" for k in _memory(t)))
-    failures, repeats, flagged, c = t.marked("failures", "repeats", "flagged", "c")
-    doubtful = condition(t.graph, t.stages.fast["doubtful"][0], t.name, VECTOR_C)
-    nothing = ["SET(0.0)"]
-    arrays = {"old": old, "memory": memory or nothing, "n": new, "flow": flow or nothing}
-    return [
-        *(f"V {name}[] = {{{', '.join(values)}}};" for name, values in arrays.items()),
-        f"V count[] = {{{failures}, {repeats}}};",
-        f"settle_lanes({flagged}, {doubtful}, {c}, h_, memory, old, n, flow, count);",
-        *(f"{name} = n[{k}];" for k, name in enumerate(new)),
-        *(f"{name} = flow[{k}];" for k, name in enumerate(flow)),
-        f"{failures} = count[0];",
-        f"{repeats} = count[1];",
-    ]

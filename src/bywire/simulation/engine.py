@@ -194,6 +194,15 @@ def structure_of(model: Model, par: ParameterSet) -> tuple[object, ...]:
     return (*_makeup(model), type(par), _in_order(tuple(par.choices().items())))
 
 
+def are_alike(model: Model, par: ParameterSet, like: Model, like_par: ParameterSet) -> bool:
+    """Return whether two models are of one structure, as `structure_of` tells, but without a key.
+
+    Thousands of cases a second share the model and the choices.
+    """
+    is_same = model is like or _makeup(model) == _makeup(like)
+    return is_same and type(par) is type(like_par) and par.has_choices_of(like_par)
+
+
 def _makeup(model: Model) -> tuple[object, ...]:
     """Return the type of a model and what tells its own values apart."""
     fields = sorted(getattr(model, "__dict__", {}).items())

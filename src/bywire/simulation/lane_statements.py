@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from bywire.simulation.emission import (
     branching_statements,
@@ -45,6 +45,13 @@ class Lanes:
         )
         self.name = leaf_namer(self.graph, self._leaf, self._value, "SET({})")
         self.mode = modes(self.graph, self.pass_roots, self.level).without(self.carried)
+        judged = self._read_by([self.flag, stages.fast["doubtful"][0]])
+        self._judged = [n for n in self.mode.rest if n in judged]
+        self._later = [n for n in self.mode.rest if n not in judged]
+
+    def _read_by(self, roots: Iterable[Node]) -> frozenset[Node]:
+        """Return the operations that roots need, however often they are computed."""
+        return frozenset(needed(self.graph, roots, lambda _: False))
 
     def _leaf(self, kind: str, index: int) -> str:
         if kind == "p":
@@ -70,9 +77,9 @@ class Lanes:
         order = needed(self.graph, roots, lambda n: self.level[n] < below)
         return self.lines(order)
 
-    def lines(self, order: Sequence[Node]) -> list[str]:
-        """Return the statements of nodes."""
-        return branching_statements(self.graph, order, self.name, "const V ", VECTOR_C)
+    def lines(self, order: Sequence[Node], later: Sequence[Node] = ()) -> list[str]:
+        """Return the statements of nodes; ``later``: those that read them, too."""
+        return branching_statements(self.graph, order, self.name, "const V ", VECTOR_C, later)
 
     def number(self, node: Node) -> str:
         """Return the text of a result."""
@@ -99,11 +106,15 @@ class Lanes:
         values = [f"V {self.name(n)} = SET(0.0);" for n in self.mode.values]
         return [*values, *(f"B b{n} = (B){{0}};" for n in self.mode.atoms), "int fresh = 1;"]
 
-    def substep(self) -> list[str]:
-        """Return the statements of a substep; what hangs on the mode is renewed with it."""
+    def judged(self) -> list[str]:
+        """Return the statements of what tells whether one pass serves a substep.
+
+        What hangs on the mode is renewed with it.
+        """
         mode = self.mode
+        rest = self.lines(self._judged, self._later)
         if not mode.atoms:
-            return self.lines(mode.rest)
+            return rest
         changed = " | ".join(f"(n{n} ^ b{n})" for n in mode.atoms)
         truth = [condition(self.graph, n, self.name, VECTOR_C) for n in mode.atoms]
         renewed = statements(self.graph, mode.values, self.name, "", VECTOR_C)
@@ -115,5 +126,23 @@ class Lanes:
             *(f"  b{n} = n{n};" for n in mode.atoms),
             *(f"  {line}" for line in renewed),
             "}",
-            *self.lines(mode.rest),
+            *rest,
         ]
+
+    def sums(self) -> list[str]:
+        """Return the statements of the integrands, each added to its sum as soon as it is there."""
+        lines, rest = [], self._later
+        for k, product in enumerate(self.products):
+            read = self._read_by([product])
+            order, rest = [n for n in rest if n in read], [n for n in rest if n not in read]
+            lines += [*self.lines(order, rest), f"s{k}{self.mark} += {self.number(product)};"]
+        return lines
+
+    def finished(self, is_summed: bool = True) -> list[str]:
+        """Return the statements of the results that the flag does not need.
+
+        ``is_summed``: whether those of `sums` are there.
+        """
+        there = self._read_by(self.products if is_summed else ())
+        wanted = self._read_by(self.results.values()) - there
+        return self.lines([n for n in self._later if n in wanted])

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, leaf_table
 from bywire.core.typing import Array
 from bywire.simulation.advance import Progress, advance_all
+from bywire.simulation.buffered_call import BufferedCall
 from bywire.simulation.changes import Change, energies, energy_of, pieces, put_in_signals
 from bywire.simulation.engine import Engine, prepare
 from bywire.simulation.layout import Layout
@@ -56,6 +57,10 @@ class Run:
 
     def schedule(self) -> Schedule:
         """Return the integer plan of the run."""
+        return self._schedule
+
+    @cached_property
+    def _schedule(self) -> Schedule:
         periods = {task.name: task.period for task in self.model.tasks(self.par)}
         return plan(self.duration, self.step, periods, self.record)
 
@@ -102,11 +107,16 @@ class Trajectory:
 
 
 def initial_vector(layout: Layout, state: Sequence[float], memory: Sequence[float]) -> Array:
-    """Return the state vector of the engine at the start of a run."""
-    vector = np.zeros(layout.total)
-    vector[layout.start["x"] : layout.start["x"] + len(state)] = state
-    vector[layout.start["m"] : layout.start["m"] + len(memory)] = memory
-    return vector
+    """Return the state vector of the engine at the start of a run, shape (entries,)."""
+    return np.asarray(initial_vectors(layout, [state], [memory])[0])
+
+
+def initial_vectors(layout: Layout, states: Sequence[Any], memories: Sequence[Any]) -> Array:
+    """Return the same of several runs, shape (runs, entries)."""
+    vectors = np.zeros((len(states), layout.total))
+    for kind, values in (("x", np.array(states)), ("m", np.array(memories))):
+        vectors[:, layout.start[kind] :][:, : values.shape[1]] = values
+    return vectors
 
 
 def request_for(run: Run, signals: Sequence[str] | None = None) -> Request:
@@ -232,18 +242,23 @@ def doubts_of(runs: Sequence[Run]) -> list[str]:
     if not first.model.compliance(first.par):
         return [""] * len(runs)
     jacobians = prepare(first.model, first.par).contact_jacobians
-    each = [(run.state, run.memory, list(run.par.leaves().values())) for run in runs]
-    columns = [np.array(rows, dtype=np.float64).T for rows in zip(*each, strict=True)]
-    opened, *closed = (_matrices(J, len(runs)) for J in jacobians(*columns))
+    computed, table = BufferedCall(jacobians), leaf_table([run.par for run in runs])
+    each = [
+        np.concatenate(computed(run.state, run.memory, values))
+        for run, values in zip(runs, table, strict=True)
+    ]
+    patterns = [jacobians.sparsity_out(k) for k in range(jacobians.n_out())]
+    ends = np.cumsum([pattern.nnz() for pattern in patterns])
+    entries = np.split(np.array(each), ends[:-1], axis=1)
+    opened, *closed = map(_matrices, patterns, entries)
     return unresolved(opened, closed, first.step)
 
 
-def _matrices(J: Any, count: int) -> Array:
-    """Return sparse square matrices that stand side by side, shape (count, size, size)."""
-    size = J.size1()
-    rows, columns = J[:, :size].sparsity().get_triplet()  # alike in all of them
-    matrices = np.zeros((count, size, size))
-    matrices[:, rows, columns] = np.array(J.nonzeros()).reshape(count, -1)
+def _matrices(pattern: Any, entries: Array) -> Array:
+    """Return square matrices of one pattern of their entries, shape (count, size, size)."""
+    rows, columns = pattern.get_triplet()
+    matrices = np.zeros((len(entries), *pattern.shape))
+    matrices[:, rows, columns] = entries
     return matrices
 
 

@@ -17,17 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, leaf_table
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
 from bywire.simulation.case_kernels import CaseKernel, case_kernel, is_side_by_side
 from bywire.simulation.changes import energies, pieces, put_in_signals
-from bywire.simulation.engine import CUDA, prepare, structure_of
+from bywire.simulation.engine import CUDA, are_alike, prepare
 from bywire.simulation.native import Ends
 from bywire.simulation.run import (
     Run,
     Trajectory,
-    initial_vector,
+    initial_vectors,
     put_into,
     sampled_stimulus,
     selected,
@@ -46,10 +46,9 @@ def fit_lanes(runs: Sequence[Run], engine: str = "auto") -> bool:
     """
     if not is_side_by_side(engine) or not runs:
         return False
-    first = runs[0]
-    structure, schedule = structure_of(first.model, first.par), first.schedule()
+    first, schedule = runs[0], runs[0].schedule()
     return all(
-        structure_of(each.model, each.par) == structure and each.schedule() == schedule
+        are_alike(each.model, each.par, first.model, first.par) and each.schedule() == schedule
         for run in runs
         for each in (run, *(replace(run, par=change.par, changes=()) for change in run.changes))
     )
@@ -260,10 +259,9 @@ class _Carried:
         self._books = len(jumping) if jumping.any() else 0
         self._count, width = len(group), kernel.lanes
         filled = [*group, *[group[-1]] * (width - len(group))]  # idle lanes repeat the last
-        self._vector = np.array(
-            [initial_vector(kernel.layout, run.state, run.memory) for run in filled]
-        ).T.copy()
-        self._parameters = np.array([list(run.par.leaves().values()) for run in filled]).T.copy()
+        states, memories = [run.state for run in filled], [run.memory for run in filled]
+        self._vector = initial_vectors(kernel.layout, states, memories).T.copy()
+        self._parameters = leaf_table([run.par for run in filled]).T.copy()
         self._changes: dict[int, list[tuple[int, ParameterSet]]] = {}
         for lane, run in enumerate(filled):
             for begin, _, par in pieces(run.par, run.changes, schedule) if run.changes else ():
