@@ -88,8 +88,6 @@ class Bench:
     faults: Sequence[Mapping[str, Any]] = ()
     engine: str = "auto"
 
-    _is_driven_known = False  # whether the experiment drives what its model has a stimulus for
-
     def __post_init__(self) -> None:
         for key in ("experiment", "parameters", "name", "assembly"):
             if not isinstance(getattr(self, key), str):
@@ -204,7 +202,7 @@ class Bench:
     def _made(self, make: Cases) -> tuple[Case, ...]:
         """Return cases, or refuse overrides without effect and steps that do not divide."""
         cases = self.cases_with(self.par, self.chosen_options, make)
-        for case in () if self._is_driven_known else cases:
+        for case in cases:
             _check_driven(case, self.definition)
         is_changed = any(case.par is not self.par for case in cases)
         for name in self.overrides if is_changed else ():
@@ -262,8 +260,6 @@ class Bench:
         known["options"] = {**self.options, **options}
         known["seed"] = self.seed if seed is None else seed
         known["par"] = par = self.par.replace(overrides)
-        # Numbers choose no signals: what a choice has an experiment drive is checked anew.
-        known["_is_driven_known"] = par.has_choices_of(self.par) and not options
         following = self.definition.following
         if not options and (following is None or following(par) == self._following):
             known["chosen_options"] = self.chosen_options
