@@ -26,6 +26,7 @@ from bywire.api.design_inputs import (
 )
 from bywire.api.loop_case import loop_case, over_range, spread
 from bywire.bench.running import Progress
+from bywire.core.blas import on_one_thread
 from bywire.core.errors import ParameterError
 from bywire.report.answer import use_case
 from bywire.synthesis import designer
@@ -43,6 +44,7 @@ from bywire.synthesis.verification import verify
 
 
 @use_case
+@on_one_thread()
 def design(
     loop: str,
     parameters: str = "",

@@ -24,6 +24,7 @@ from bywire.api.frequency_response_answer import FrequencyResponse
 from bywire.api.loop_case import LoopCase, loop_case, over_range, spread
 from bywire.bench.running import Progress
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, of_difference
+from bywire.core.blas import on_one_thread
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import silent
@@ -36,6 +37,7 @@ _EXCITATIONS = ("sine", "multisine", "chirp")
 
 
 @use_case
+@on_one_thread()
 def frequency_response(
     loop: str,
     parameters: str = "",

@@ -12,6 +12,7 @@ import xarray as xr
 from bywire.api import earlier_result
 from bywire.api.identification import Identification
 from bywire.api.method_choice import ChosenMethod, Source, choose
+from bywire.core.blas import on_one_thread
 from bywire.core.errors import ParameterError
 from bywire.data.file_format import Progress, no_progress
 from bywire.identification.fitting.question import Question
@@ -34,6 +35,7 @@ _FAR = 30.0  # times: beyond, a unit is the first suspect
 
 
 @use_case
+@on_one_thread()
 def identify(
     method: str,
     measurements: Source | Sequence[Source] = (),

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from bywire.bench.running import Progress
+from bywire.core.blas import on_one_thread
 from bywire.report.answer import use_case
 from bywire.reproduction.reproduction import SOURCES, Reproduction
 
 
 @use_case
+@on_one_thread()
 def reproduce(source: str, *, progress: Progress | None = None) -> Reproduction:
     """Reproduce every table and figure of a published source; a disagreement is no error.
 

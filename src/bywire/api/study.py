@@ -15,6 +15,7 @@ from bywire.api.parameter_choice import set_for
 from bywire.bench.relative_changes import settled
 from bywire.bench.running import Progress
 from bywire.bench.values import parsed
+from bywire.core.blas import on_one_thread
 from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import silent
@@ -148,6 +149,7 @@ class StudyResult(Answer):
 
 
 @use_case
+@on_one_thread()
 def study(
     name: str,
     parameters: str = "",

@@ -12,6 +12,7 @@ from typing import Any
 
 from bywire.api import earlier_result
 from bywire.api.method_choice import ChosenMethod, choose
+from bywire.core.blas import on_one_thread
 from bywire.data.file_format import Progress, no_progress
 from bywire.identification import trust as trusted
 from bywire.identification.fitting.question import Question
@@ -100,6 +101,7 @@ class TrustStudy(Answer):
 
 
 @use_case
+@on_one_thread()
 def trust(
     method: str,
     count: int = 200,

@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from bywire.cli.output import INTERRUPTED, flush, message, open_streams
+from bywire.core.blas import keep_one_thread
 from bywire.core.errors import BywireError, ModelError, ParameterError
 from bywire.core.interrupts import interrupts_noted
 from bywire.core.unneeded import leave_out_dask
@@ -42,6 +43,7 @@ def process() -> None:
 
     atexit.register(leave)  # the first, and so the last that is called
     leave_out_dask()
+    keep_one_thread()
     try:
         main()
     except SystemExit as done:

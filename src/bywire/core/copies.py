@@ -12,6 +12,7 @@ from contextlib import contextmanager, nullcontext
 from multiprocessing import active_children, get_context, parent_process
 from typing import Any
 
+from bywire.core.blas import keep_one_thread
 from bywire.core.callers import is_command_line
 
 
@@ -73,8 +74,9 @@ def _nothing() -> None:
 
 
 def _begin(prepare: Callable[..., object], *arguments: Any) -> None:
-    """Prepare a process: Ctrl-C is for the one that asked, with which it ends."""
+    """Prepare a process of a core: Ctrl-C is for the one that asked, with which it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    keep_one_thread()
     threading.Thread(target=_end_with_parent, daemon=True).start()
     prepare(*arguments)
 
