@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.core.errors import ParameterError, SolverError
+from bywire.core.errors import ParameterError
 from bywire.identification.confidence import autocorrelation, is_white, uncertainty
-from bywire.identification.estimate import Estimate
-from bywire.identification.least_squares import Loss, Problem, estimate, solve
-from bywire.identification.loss import influence, rho
-from bywire.identification.multistart import search
-from bywire.identification.unknown import Unknown, scattered
+from bywire.identification.least_squares import Problem, estimate, solve
+from bywire.identification.unknown import Unknown
 
 Array = NDArray[np.float64]
 
@@ -140,54 +136,6 @@ def test_a_robust_loss_shrugs_off_outliers() -> None:
     assert abs(robust["a"] - 2.0) < 0.01
 
 
-def line(seed: int, share: float, loss: Loss) -> Estimate:
-    """Return the fit of a straight line, a share of whose measurements are outliers."""
-    random = np.random.default_rng(seed)
-    X = np.column_stack((np.ones(60), np.linspace(-1.0, 1.0, 60)))
-    e = random.normal(size=60)
-    spoiled = random.random(60) < share
-    e[spoiled] += random.normal(0.0, 20.0, int(spoiled.sum()))
-    y = X @ [1.0, 2.0] + e
-    unknowns = (Unknown("a", 1.0, scale=9.0), Unknown("b", 2.0, scale=9.0))
-    return estimate(Problem(unknowns, lambda v: (X @ v - y, X)), loss)
-
-
-@pytest.mark.parametrize("loss", ["linear", "soft_l1", "huber", "cauchy"])
-@pytest.mark.parametrize("share", [0.0, 0.05])
-def test_intervals_of_every_loss_are_honest(loss: Loss, share: float) -> None:
-    """An M-estimate's covariance has the mean slope of its influence, not its weight."""
-    found = [line(seed, share, loss) for seed in range(60)]
-    inside = np.mean([(f.intervals()[:, 0] < [1, 2]) & (f.intervals()[:, 1] > [1, 2])
-                      for f in found])  # fmt: skip
-    assert 0.9 <= inside <= 0.99
-    scatter = np.std([f.values for f in found], axis=0)
-    claimed = np.mean([f.deviations for f in found], axis=0)
-    np.testing.assert_allclose(claimed / scatter, 1.0, atol=0.25)
-
-
-@pytest.mark.parametrize("loss", ["soft_l1", "huber", "cauchy"])
-def test_a_loss_agrees_with_its_derivatives(loss: Loss) -> None:
-    z, h = np.array([0.1, 0.7, 1.5, 9.0, 400.0]), 1e-5
-    _, first, second = rho(z, loss)
-    up, down = rho(z + h, loss), rho(z - h, loss)
-    np.testing.assert_allclose((up[0] - down[0]) / (2 * h), first, rtol=1e-5)
-    np.testing.assert_allclose((up[1] - down[1]) / (2 * h), second, rtol=1e-4, atol=1e-10)
-    psi, slope = influence(np.sqrt(z), loss)
-    change = influence(np.sqrt(z) + h, loss)[0] - influence(np.sqrt(z) - h, loss)[0]
-    np.testing.assert_allclose(change / (2 * h), slope, rtol=1e-4, atol=1e-10)
-    np.testing.assert_allclose(psi, np.sqrt(z) * first)
-
-
-@pytest.mark.parametrize("loss", ["huber", "cauchy"])
-def test_a_robust_loss_leaves_priors_alone(loss: Loss) -> None:
-    """One measurement of 2 with unit noise against a prior of 9: the loss counts only the first."""
-    unknown = Unknown("x", 2.0, prior=(9.0, 0.01))
-    problem = Problem((unknown,), lambda v: (np.full(3, v[0] - 2.0), np.ones((3, 1))))
-    found = estimate(problem, loss)
-    assert found["x"] == pytest.approx(9.0, abs=1e-3)
-    assert not found.notes
-
-
 def test_a_prior_that_the_data_contradicts_is_named() -> None:
     y = np.random.default_rng(3).normal(1.0, 0.5, 50)
     unknown = Unknown("mean", 0.0, prior=(3.0, 0.01), unit="A")
@@ -239,89 +187,6 @@ def test_too_few_measurements_are_refused() -> None:
     problem = Problem((Unknown("a", 1.0),), lambda v: (v, np.ones((1, 1))))
     with pytest.raises(ParameterError, match="1 measured values cannot tell 1 unknowns"):
         estimate(problem)
-
-
-@pytest.mark.parametrize("undefined", ["residual", "slope"])
-def test_trials_where_something_is_not_defined_do_not_end_a_search(undefined: str) -> None:
-    """As a key figure that a trial's run does not have, or one of the runs beside it."""
-    refused = []
-
-    def evaluate(x: Array) -> tuple[Array, Array]:
-        r = np.arctan(3.0 * (x - 1.4))
-        J = np.array([3.0 / (1.0 + 9.0 * (x - 1.4) ** 2)])
-        if x[0] > 1.5:
-            refused.append(x[0])
-            (r if undefined == "residual" else J)[...] = np.nan
-        return r, J
-
-    problem = Problem((Unknown("x", 1.0),), evaluate)
-    found = search(problem, [np.array([1.0]), np.array([2.0])])
-    assert found.failed == 1
-    assert len(refused) > 1
-    assert found.best.values[0] == pytest.approx(1.4, abs=1e-3)
-
-
-def test_several_starts_find_the_lower_of_two_minima() -> None:
-    def evaluate(values: Array) -> tuple[Array, Array]:
-        x = values[0]
-        return np.array([(x * x - 1.0) * 3.0, x - 1.0, 0.0]), np.array([[6.0 * x], [1.0], [0.0]])
-
-    problem = Problem((Unknown("x", -1.2),), evaluate)
-    starts = scattered(problem.unknowns, 16, 2.0, seed=1)
-    found = search(problem, starts)
-    assert solve(problem, starts[0]).values[0] < 0.0
-    assert found.best.values[0] == pytest.approx(1.0, abs=1e-6)
-    assert 2 <= found.reached < 16
-
-
-def test_an_interrupted_search_goes_on_where_it_was(tmp_path: Path) -> None:
-    store, calls = tmp_path / "starts.jsonl", [0]
-    inner = decay(white(1))
-
-    def counted(values: Array) -> tuple[Array, Array]:
-        calls[0] += 1
-        return inner.evaluate(values)
-
-    problem = Problem(inner.unknowns, counted)
-    starts = scattered(problem.unknowns, 4, 0.3, seed=1)
-
-    def stop(label: str, share: float) -> None:
-        if share >= 0.5:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        search(problem, starts, progress=stop, store=store, threads=1)
-    lines = store.read_text().splitlines()
-    assert 2 <= len(lines) <= 4
-    store.write_text("\n".join(lines[:2]) + '\n{"key": "cut')  # as a killed run leaves it
-    calls[0] = 0
-    again = search(problem, starts, store=store, threads=1)
-    whole = search(problem, starts, threads=1)
-    np.testing.assert_array_equal(
-        [s.values for s in again.solutions], [s.values for s in whole.solutions]
-    )
-    store.write_text("nothing that is understood\n")
-    assert len(search(problem, starts, store=store).solutions) == 4
-
-
-@pytest.mark.parametrize("error", [SolverError, ParameterError])
-def test_trials_that_are_refused_do_not_end_a_search(error: type[Exception]) -> None:
-    """By the model, or by its parameters' own rules; starts that are refused are counted."""
-    refused = []
-
-    def evaluate(x: Array) -> tuple[Array, Array]:
-        if x[0] > 1.5:
-            refused.append(x[0])
-            raise error("refused")
-        return np.arctan(3.0 * (x - 1.4)), np.array([3.0 / (1.0 + 9.0 * (x - 1.4) ** 2)])
-
-    problem = Problem((Unknown("x", 1.0),), evaluate)
-    found = search(problem, [np.array([1.0]), np.array([2.0])])
-    assert found.failed == 1
-    assert len(refused) > 1  # of the way from the other start, too
-    assert found.best.values[0] == pytest.approx(1.4, abs=1e-3)
-    with pytest.raises(error, match="no start could" if error is SolverError else "refused"):
-        search(problem, [np.array([2.0])])
 
 
 def test_an_instrument_takes_off_the_bias_of_a_noisy_input() -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
-import shutil
 import stat
 import subprocess
 import sys
@@ -31,28 +29,8 @@ from bywire.simulation.compiler import (
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
+from simulation.small_library import SOURCE, system_compiler, twice
 from systems.two_mass import rig
-
-SOURCE = "double twice(double x) { return 2.0 * x; }\n"
-
-
-@pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    folder = tmp_path / "kernels"
-    monkeypatch.setenv("BYWIRE_CACHE", str(folder))
-    return folder
-
-
-def system_compiler() -> Compiler:
-    found = find_compiler()
-    assert found is not None
-    return found
-
-
-def twice(library: Path) -> float:
-    function = ctypes.CDLL(str(library)).twice
-    function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
-    return float(function(21.0))
 
 
 class Counting:
@@ -107,6 +85,7 @@ def test_a_damaged_entry_is_compiled_again(
 
 RACE = """
 import sys
+from simulation.small_library import SOURCE, system_compiler, twice
 from systems.two_mass import rig
 from bywire.simulation.run import simulate
 print(repr(float(simulate(rig(0.01), engine="compiled")["x_1"][-1])))
@@ -253,90 +232,6 @@ def test_a_cache_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.Monk
     assert stat.S_IMODE(library.parent.stat().st_mode) == 0o700
 
 
-def test_folders_that_others_may_write_to_are_not_trusted(tmp_path, monkeypatch):
-    shared = tmp_path / "shared"
-    shared.mkdir()
-    shared.chmod(0o777)
-    monkeypatch.setenv("BYWIRE_CACHE", str(shared))
-    with pytest.raises(CompilerError, match="not yours alone"):
-        kernel_cache.usable_folder()
-    shared.chmod(0o700)
-    assert kernel_cache.usable_folder() == shared
-
-
-PLANTED = "double twice(double x) { return 666.0; }\n"
-
-
-def planted(library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Put foreign code in a library's place, with a digest that is right."""
-    with monkeypatch.context() as patch:
-        patch.setenv("BYWIRE_CACHE", str(tmp_path / "elsewhere"))
-        foreign = compile_library(PLANTED, PLAIN, system_compiler())
-    library.unlink()
-    shutil.copy(foreign, library)
-    shutil.copy(kernel_cache.digest_of(foreign), kernel_cache.digest_of(library))
-
-
-def test_a_planted_library_does_not_run(cache, tmp_path, monkeypatch):
-    """Its digest is right, and the folder is private again; but others could write to the file."""
-    compiler = system_compiler()
-    library = compile_library(SOURCE, PLAIN, compiler)
-    planted(library, tmp_path, monkeypatch)
-    library.chmod(0o666)
-    with pytest.raises(CompilerError, match="not yours alone"):
-        kernel_cache.load(library, "twice")
-    assert twice(compile_library(SOURCE, PLAIN, compiler)) == 42.0
-
-
-@pytest.mark.skipif(os.name == "nt" or os.getuid() != 0, reason="gives files to others")
-@pytest.mark.parametrize("what", ["library", "digest", "folder", "above"])
-def test_a_library_of_somebody_else_does_not_run(cache, tmp_path, monkeypatch, what):
-    compiler = system_compiler()
-    library = compile_library(SOURCE, PLAIN, compiler)
-    planted(library, tmp_path, monkeypatch)
-    digest = kernel_cache.digest_of(library)
-    os.chown({"library": library, "digest": digest, "folder": cache, "above": tmp_path}[what], 1, 1)
-    assert not kernel_cache.is_intact(library, "twice")
-    if what in ("library", "digest"):
-        assert twice(compile_library(SOURCE, PLAIN, compiler)) == 42.0
-        assert library.stat().st_uid == 0
-    else:
-        with pytest.raises(CompilerError, match="not yours alone"):
-            compile_library(SOURCE, PLAIN, compiler)
-        with pytest.raises(CompilerError, match="not yours alone"):
-            kernel_cache.load(library, "twice")
-
-
-def test_folders_above_count_unless_others_cannot_replace_what_is_not_theirs(tmp_path, monkeypatch):
-    above = tmp_path / "above"
-    inner = above / "inner"
-    inner.mkdir(parents=True)
-    monkeypatch.setenv("BYWIRE_CACHE", str(inner))
-    above.chmod(0o777)
-    with pytest.raises(CompilerError, match=rf"{above} is not yours alone"):
-        kernel_cache.usable_folder()
-    above.chmod(0o1777)
-    assert kernel_cache.usable_folder() == inner
-    link = tmp_path / "link"
-    link.symlink_to(inner)
-    above.chmod(0o777)
-    monkeypatch.setenv("BYWIRE_CACHE", str(link))
-    with pytest.raises(CompilerError, match="not yours alone"):
-        kernel_cache.usable_folder()
-
-
-def test_the_usual_folder_is_left_alone_with_a_word(tmp_path, monkeypatch):
-    open_folder = tmp_path / "cache"
-    open_folder.mkdir()
-    open_folder.chmod(0o777)
-    monkeypatch.delenv("BYWIRE_CACHE", raising=False)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(open_folder))
-    monkeypatch.setattr(kernel_cache, "user_cache_path", lambda *_: open_folder / "bywire")
-    with pytest.warns(UserWarning, match="compiled kernels are not kept"):
-        folder = kernel_cache.usable_folder()
-    assert folder != open_folder / "bywire" / "kernels"
-
-
 @pytest.mark.parametrize("content", [b"garbage", b"\x7fELF", "halved", "without the function"])
 def test_a_library_that_is_none_is_rebuilt_and_not_loaded(cache, monkeypatch, content):
     """Though its digest fits: the system would crash on half a library."""
@@ -353,16 +248,6 @@ def test_a_library_that_is_none_is_rebuilt_and_not_loaded(cache, monkeypatch, co
     assert again == library
     assert loaded.twice
     assert twice(library) == 42.0
-
-
-def test_a_private_group_may_write(tmp_path, monkeypatch):
-    """Many systems give each user a group, and files that it may write to."""
-    folder = tmp_path / "group"
-    folder.mkdir()
-    folder.chmod(0o770)
-    assert kernel_cache.open_to_others(folder) == ""
-    monkeypatch.setattr(kernel_cache, "_is_private", lambda group: False)
-    assert kernel_cache.open_to_others(folder) == str(folder)
 
 
 def test_a_full_disk_is_said_with_a_way_out(cache, monkeypatch):

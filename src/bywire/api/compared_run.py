@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from bywire.bench.bench import experiment_of
 from bywire.bench.bench_file import flattened
 from bywire.bench.experiment import Experiment
+from bywire.bench.experiment_choice import experiment_of
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
 from bywire.bench.result import Result

@@ -9,21 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from bywire.bench.experiment import EXPERIMENTS, Case, Cases, Experiment, as_run
+from bywire.bench.experiment import Case, Cases, Experiment, as_run
+from bywire.bench.experiment_choice import experiment_of
 from bywire.bench.extent import check_seed, checked_interval, checked_step
 from bywire.bench.faults.fault_section import Injection, injections
 from bywire.bench.faults.injected import checked_sections, with_faults
-from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.relative_changes import settled
 from bywire.bench.requirements import check
-from bywire.bench.stimuli.registry import STIMULI, Stimulus, create
-from bywire.bench.stimulus_file import with_nodes
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.stimulus_sections import stimulus_of, stimulus_sections
 from bywire.bench.values import parsed
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ModelError, ParameterError, place_of, quoted, unknown_name
-from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import ParameterSet
-from bywire.core.registry import pick
 from bywire.simulation.engine import engine_names
 from bywire.simulation.run import Run
 
@@ -177,7 +175,7 @@ class Bench:
         units = {} if chosen.beside is None else dict(chosen.beside(self.chosen_options))
         if chosen.driven_unit is not None:
             units[""] = chosen.driven_unit(self.chosen_options)
-        return {name: _stimulus(each, units[name], name) for name, each in sections.items()}
+        return {name: stimulus_of(each, units[name], name) for name, each in sections.items()}
 
     @property
     def chosen_stimulus(self) -> Stimulus | None:
@@ -283,56 +281,6 @@ class Bench:
         return replace(self, overrides={**self.overrides, **settled(self.par, overrides)})
 
 
-def experiment_of(
-    name: str, parameters: str, assembly: str = "", options: Mapping[str, Any] | None = None
-) -> Experiment:
-    """Return the experiment of a name for a parameter set.
-
-    An experiment that a brake brings for this assembly goes before one of any brake, and that
-    before one of another assembly.
-
-    Parameters
-    ----------
-    name
-        Name of the experiment.
-    parameters
-        Name of the parameter set.
-    assembly
-        Model of the set's brake; that of the set where empty.
-    options
-        Options as the user gave them: they name signals.
-
-    Raises
-    ------
-    InputError
-        When there is no such experiment, or its options name signals that the model lacks.
-    """
-    cited = PARAMETER_SETS.find(parameters)
-    system = assembly or cited.assembly
-    likely = EXPERIMENTS.guess(name)
-    if likely is not None and likely.assembly == system:
-        return likely
-    brake = PARAMETER_SETS.owner(parameters)
-    its_own = EXPERIMENTS.of(brake).get(name)
-    if its_own is not None and its_own.assembly == system:
-        return its_own
-    known = GENERIC_EXPERIMENTS.all()
-    if name in known:
-        models = ASSEMBLIES.of(brake)
-        return known[name].bound(pick(models, system, "assembly")(), options or {})
-    every = EXPERIMENTS.all()
-    if name not in every:
-        raise unknown_name("experiment", name, {*every, *known}, first=EXPERIMENTS.of(brake))
-    return every[name]
-
-
-def stimulus_sections(stimulus: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """Return the sections of a stimulus by signal: what is no section itself under ""."""
-    plain = {key: value for key, value in stimulus.items() if not isinstance(value, Mapping)}
-    further = {key: value for key, value in stimulus.items() if isinstance(value, Mapping)}
-    return ({"": plain} if plain else {}) | further
-
-
 def _check_driven(case: Case, experiment: Experiment) -> None:
     """Refuse an experiment that drives what its model has no stimulus for."""
     known = case.model.Stimulus._fields
@@ -342,12 +290,3 @@ def _check_driven(case: Case, experiment: Experiment) -> None:
             raise ModelError(
                 f"{place_of(experiment.cases)}: experiment {experiment.name!r}: {error}"
             )
-
-
-def _stimulus(section: Mapping[str, Any], unit: str, name: str) -> Stimulus:
-    values = dict(section)
-    kind = values.pop("kind", None)
-    if not isinstance(kind, str):
-        title = f"stimulus.{name}" if name else "stimulus"
-        raise ParameterError(f"[{title}] needs a kind: {', '.join(sorted(STIMULI.all()))}")
-    return create(kind, with_nodes(values, unit) if kind == "table" else values, unit)

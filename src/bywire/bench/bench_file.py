@@ -9,14 +9,16 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from bywire.bench.bench import Bench, experiment_of, stimulus_sections
+from bywire.bench.bench import Bench
 from bywire.bench.bench_text import PATHS
 from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.experiment_choice import experiment_of
 from bywire.bench.faults.fault_section import with_units_wanted
 from bywire.bench.faults.injected import checked_sections
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.bench.relative_changes import is_relative, settled
 from bywire.bench.stimuli.registry import STIMULI
+from bywire.bench.stimulus_sections import stimulus_sections
 from bywire.bench.values import parsed, require_unit, require_units
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name

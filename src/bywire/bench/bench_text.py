@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from bywire.bench.bench import Bench, stimulus_sections
+from bywire.bench.bench import Bench
 from bywire.bench.faults.course import Course
 from bywire.bench.stimuli.registry import STIMULI
+from bywire.bench.stimulus_sections import stimulus_sections
 from bywire.core.parameters import ParameterSet, leaf_fields
 
 PATHS = ("trace", "trace_map", "file")

@@ -1,0 +1,15 @@
+"""What tests of the simulation share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of a kernel cache of this test's own."""
+    folder = tmp_path / "kernels"
+    monkeypatch.setenv("BYWIRE_CACHE", str(folder))
+    return folder
