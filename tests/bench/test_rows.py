@@ -25,6 +25,9 @@ def test_what_figures_and_warnings_ask_for(rows):
     assert rows["time"].values is TIME
     assert rows["y"].attrs["units"] == "N"
     assert rows.sizes["time"] == 4
+    assert {name: each.values.tolist() for name, each in rows.items()} == {
+        name: values.tolist() for name, values in SIGNALS.items()
+    }
     assert "dataset" not in vars(rows)  # none was made
 
 

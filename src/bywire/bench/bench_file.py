@@ -156,7 +156,8 @@ def _of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, Any]:
             f"experiment {name!r} is for any brake: say for which, with --set parameters=NAME "
             f"({sets})"
         )
-    return {"experiment": name, "parameters": main_set(definition.assembly)}
+    chosen = main_set(definition.assembly, beside=type(definition.defaults))
+    return {"experiment": name, "parameters": chosen}
 
 
 def _any_brake() -> Mapping[str, GenericExperiment]:

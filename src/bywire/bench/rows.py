@@ -9,7 +9,7 @@ of a signal, is made and answers.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, ItemsView, Iterator, Mapping
 from functools import cached_property
 from numbers import Number
 from typing import Any, cast
@@ -252,6 +252,10 @@ class Rows:
     def variables(self) -> Mapping[str, Row]:
         """The signals and their time, by name."""
         return _Named(self, tuple(self._values))
+
+    def items(self) -> ItemsView[str, Row]:
+        """Return the signals with their names, as a Dataset does."""
+        return self.data_vars.items()
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._signals)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 from bywire.core.brake import brakes
@@ -59,16 +60,25 @@ PARAMETER_SETS = Kind("parameter set", ("sets",), instances(CitedSet), declared=
 """every parameter set of every brake"""
 
 
-def main_set(assembly: str) -> str:
+def main_set(assembly: str, beside: type | None = None) -> str:
     """Return the name of the first parameter set that there is for an assembly.
+
+    Parameters
+    ----------
+    assembly
+        Name of the assembly.
+    beside
+        A class of the brake that is asked first, so that no other brake need be loaded.
 
     Raises
     ------
     ModelError
         When there is none.
     """
-    for brake in brakes().values():  # as many as it takes: their models are loaded with them
-        for name, cited in PARAMETER_SETS.of(brake.module).items():
+    first = () if beside is None else (PARAMETER_SETS.beside(beside),)
+    rest = (PARAMETER_SETS.of(brake.module) for brake in brakes().values())
+    for sets in chain(first, rest):  # as many as it takes: their models are loaded with them
+        for name, cited in sets.items():
             if cited.assembly == assembly:
                 return name
     raise ModelError(

@@ -18,7 +18,8 @@ def along_disc(run: xr.Dataset) -> xr.Dataset:
 
 def last_turn(run: xr.Dataset, begin: float, end: float) -> float | None:
     """Return when the disc's last revolution before a time begins [s]; None if before another."""
-    speed = abs(float(run["Omega"].sel(time=end, method="nearest")))
+    nearest = int(np.abs(run["time"].values - end).argmin())
+    speed = abs(float(run["Omega"].values[nearest]))
     if speed * (end - begin) < 2.0 * math.pi:
         return None
     return end - 2.0 * math.pi / speed
