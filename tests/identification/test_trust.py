@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,7 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, RunError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Force
 from bywire.identification.least_squares import Problem, estimate
@@ -42,10 +44,14 @@ def made(par: None, options: Options, seed: int) -> xr.Dataset:
     return xr.Dataset({"F": ("time", options.F + noise)}, {"time": t})
 
 
+def put_in(par: None, options: Options) -> dict[str, float]:
+    return {"F": options.F}
+
+
 METHOD = Method(
     name="level", assembly="", summary="a level", experiment="", signals={"F": "N"},
     options=Options, defaults=Options(F=5.0), identify=level, synthetic=made,
-    truth=lambda par, options: {"F": options.F},
+    truth=put_in,
 )  # fmt: skip
 SEEDS = range(100, 180)
 
@@ -107,3 +113,24 @@ def test_a_study_goes_on_from_its_store(tmp_path: Path) -> None:
     other = trust(again, None, Options(F=7.0), range(100, 102), store=store)
     assert other.recovered[0].truth == 7.0
     assert seen[3:] == [100, 101]
+
+
+def fatal_once(mark: Path, par: None, options: Options, seed: int) -> xr.Dataset:
+    """Be killed by the fifth experiment, the first time."""
+    if seed == 5 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return made(par, options, seed)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no such signal")
+def test_a_killed_process_ends_a_study_that_then_goes_on(tmp_path: Path) -> None:
+    """A pool that waits for what was lost would wait forever."""
+    method = replace(METHOD, synthetic=partial(fatal_once, tmp_path / "mark"))
+    asked = (method, None, METHOD.defaults, range(12), Effort())
+    store = tmp_path / "experiments.jsonl"
+    with pytest.raises(RunError, match=r"a process of the study was killed.*goes on"):
+        trust(*asked, processes=2, store=store)
+    found = trust(*asked, processes=2, store=store)
+    assert [each.seed for each in found.outcomes] == list(range(12))
+    assert found.outcomes == trust(METHOD, None, METHOD.defaults, range(12)).outcomes

@@ -14,7 +14,7 @@ import importlib
 import importlib.util
 import sys
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from html import escape
@@ -137,6 +137,12 @@ def is_package(brake: Brake) -> bool:
 def loaded_files() -> tuple[str, ...]:
     """Return the files of the brakes that were loaded by path: what another process has to load."""
     return tuple(brake.file for brake in _loaded.values())
+
+
+def load_brakes(files: Iterable[str]) -> None:
+    """Load what another process had loaded by path; see `loaded_files`."""
+    for file in files:
+        load_system(file)
 
 
 def load_system(path: str | Path) -> Brake:

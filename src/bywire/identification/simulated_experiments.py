@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-import multiprocessing
 import os
-import signal
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from bywire.core.brake import load_system, loaded_files
-from bywire.core.errors import BywireError, ParameterError
+from bywire.core.brake import load_brakes, loaded_files
+from bywire.core.copies import may_copy
+from bywire.core.copies import processes as copies
+from bywire.core.errors import BywireError, ParameterError, RunError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Progress
 from bywire.identification.identifiability import MisfitWarning
@@ -135,17 +137,17 @@ def _outcomes(
     if processes < 2 or len(seeds) < 2:
         yield from map(identify, seeds)
         return
-    context = multiprocessing.get_context("spawn")  # forks of a process with threads may hang
-    count = min(processes, len(seeds))
-    with context.Pool(count, _prepare_worker, (loaded_files(),)) as pool:
-        yield from pool.imap_unordered(identify, seeds)
-
-
-def _prepare_worker(systems: tuple[str, ...]) -> None:
-    """Leave interrupts to the parent, and know the brakes that it loaded by path."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for path in systems:
-        load_system(path)
+    is_copied = may_copy()
+    files = () if is_copied else loaded_files()  # a copy has them
+    try:
+        with copies(min(processes, len(seeds)), load_brakes, files, is_copied=is_copied) as pool:
+            jobs = [pool.submit(identify, seed) for seed in seeds]
+            yield from (job.result() for job in as_completed(jobs))
+    except BrokenProcessPool:
+        raise RunError(
+            "a process of the study was killed, most likely for want of memory: what was finished "
+            "is kept where there is an output folder, and the same command goes on"
+        ) from None
 
 
 def _key(method: Method, par: Any, options: Any, effort: Effort) -> str:

@@ -10,12 +10,12 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from bywire.core.brake import loaded_files
+from bywire.core.brake import load_brakes, loaded_files
 from bywire.core.errors import RunError
 from bywire.core.unneeded import allow_dask
 from bywire.data.file_format import library
 from bywire.studies.chunk import Columns, PlacedChunk
-from bywire.studies.computing import Apart, Chunks, Compute, load_brakes, single
+from bywire.studies.computing import Apart, Chunks, Compute, single
 from bywire.studies.plan import StudyPlan
 
 _AHEAD = 2  # tasks in flight for each worker, so that none waits for us

@@ -9,7 +9,6 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from bywire.core.brake import load_system
 from bywire.studies.chunk import Columns, PlacedChunk, computed_chunk, number_of
 from bywire.studies.plan import StudyPlan
 
@@ -89,11 +88,3 @@ class Executor(Protocol):
 def single(chunk: int | PlacedChunk, plan: StudyPlan) -> tuple[int, Columns]:
     """Return the number and the columns of a chunk, computed on one core."""
     return number_of(chunk), computed_chunk(plan, chunk, threads=1)
-
-
-def load_brakes(files: tuple[str, ...]) -> None:
-    """Load the brakes that were loaded by path."""
-    for file in files:
-        load_system(file)
-
-

@@ -13,7 +13,7 @@ from functools import partial
 from itertools import islice
 from typing import Any
 
-from bywire.core.brake import loaded_files
+from bywire.core.brake import load_brakes, loaded_files
 from bywire.core.copies import may_copy, processes
 from bywire.core.errors import ParameterError, RunError
 from bywire.simulation.engine import CUDA
@@ -26,7 +26,6 @@ from bywire.studies.computing import (
     Compute,
     Executor,
     T,
-    load_brakes,
     single,
 )
 from bywire.studies.plan import StudyPlan
