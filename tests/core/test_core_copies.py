@@ -75,6 +75,39 @@ with processes(2, list, is_copied=True) as pool:
     assert not any(map(_is_there, copies))
 
 
+def test_a_copy_that_is_killed_within_its_answer_keeps_nobody_waiting():
+    """The pool waits for the rest of the answer then, and the other copy for its turn."""
+    code = """
+import os, signal, sys, time
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.connection import Connection
+from bywire.core.copies import processes
+
+send = Connection._send
+
+def cut(self, answer, *more):
+    if len(answer) > 100_000:
+        os.write(self.fileno(), bytes(answer[:1000]))
+        os.kill(os.getpid(), signal.SIGKILL)
+    send(self, answer, *more)
+
+Connection._send = cut
+with processes(2, list, is_copied=True) as pool:
+    cut_short, other = pool.submit(bytes, 1_000_000), pool.submit(time.sleep, 0.2)
+    for each in (cut_short, other):
+        try:
+            each.result()
+        except BrokenProcessPool:
+            print("broken")
+with processes(2, list, is_copied=True) as pool:
+    print(pool.submit(len, "as ever").result())
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert (done.stdout, done.stderr) == ("broken\nbroken\n7\n", "")
+
+
 _told: list[str] = []
 
 

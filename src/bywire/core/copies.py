@@ -6,10 +6,12 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager, nullcontext
-from multiprocessing import active_children, get_context, parent_process
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
 from typing import Any
 
 from bywire.core.blas import keep_one_thread
@@ -44,19 +46,44 @@ def processes(
         Whether they are copies of this process, which begin with all that it has loaded and
         computed; others load what they need anew.
     """
-    others = active_children()
     pool = ProcessPoolExecutor(
         count, get_context("fork" if is_copied else "spawn"), initializer=_begin,
         initargs=(prepare, *arguments),
     )  # fmt: skip
+    workers: list[BaseProcess] = []
+    is_over = threading.Event()
+    watch = threading.Thread(target=_break_off, args=(pool, workers, is_over), daemon=True)
     try:
         with _deaf_to_interrupts() if is_copied else nullcontext():
-            pool.submit(_nothing)  # which starts them
+            for _ in range(count):
+                pool.submit(_nothing)  # which starts them
+        workers += pool._processes.values()
+        watch.start()
         yield pool
     finally:  # at once, also after Ctrl-C: nobody waits for what they are at
-        for process in set(active_children()).difference(others):
+        is_over.set()
+        for process in workers:
             process.terminate()
         pool.shutdown(wait=is_copied, cancel_futures=True)  # its threads, for the next copies
+        if is_copied and watch.ident is not None:
+            watch.join()
+
+
+def _break_off(
+    pool: ProcessPoolExecutor, workers: Sequence[BaseProcess], is_over: threading.Event
+) -> None:
+    """Have a pool break when a process of it is killed, wherever that process was.
+
+    All of them answer through one pipe. Where it is killed within an answer that is longer than the
+    pipe holds, the pool, which would notice its end, waits for the rest of the answer, and the
+    others wait for their turn.
+    """
+    wait([process.sentinel for process in workers])
+    if not is_over.is_set():
+        for process in workers:
+            process.kill()
+        last_end: Connection = vars(pool._result_queue)["_writer"]
+        last_end.close()  # so that what waits for the rest learns that there is none
 
 
 @contextmanager
