@@ -25,7 +25,16 @@ TICK = 2_000_000_000
 _ROOMS = ("bywire.core.", "bywire.plant", "bywire.control", "bywire.simulation", "bywire.brakes")
 _HARMLESS = {
     f"bywire.core.{name}"
-    for name in ("callers", "engines", "errors", "interrupts", "sources", "unneeded", "version")
+    for name in (
+        "blas",
+        "callers",
+        "engines",
+        "errors",
+        "interrupts",
+        "sources",
+        "unneeded",
+        "version",
+    )
 }
 
 _started: list[int] = []
