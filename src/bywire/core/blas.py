@@ -68,12 +68,12 @@ class _Limited:
     def begin(self) -> None:
         """Limit, unless that is done."""
         with self._lock:
-            self._count += 1
             if self._limits is None:
                 import scipy.linalg  # noqa: F401  has a BLAS of its own, which must be there to be told
                 from threadpoolctl import threadpool_limits
 
                 self._limits = threadpool_limits(1, "blas")
+            self._count += 1
 
     def end(self) -> None:
         """Give back what there was, unless somebody still wants it."""

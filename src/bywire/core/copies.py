@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
@@ -15,7 +16,9 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from bywire.core.blas import keep_one_thread
+from bywire.core.brake import load_brakes, loaded_files
 from bywire.core.callers import is_command_line
+from bywire.core.errors import RunError
 
 
 def may_copy() -> bool:
@@ -67,6 +70,41 @@ def processes(
         pool.shutdown(wait=is_copied, cancel_futures=True)  # its threads, for the next copies
         if is_copied and watch.ident is not None:
             watch.join()
+
+
+@contextmanager
+def processes_with_brakes(
+    count: int, advice: str, prepare: Callable[..., object] | None = None, *arguments: Any
+) -> Iterator[ProcessPoolExecutor]:
+    """Yield `processes` that know the brakes of this one: copies of it where that is safe.
+
+    Parameters
+    ----------
+    count, prepare, arguments
+        As of `processes`.
+    advice
+        What to do when one of them is killed.
+
+    Raises
+    ------
+    RunError
+        When one of them is killed.
+    """
+    is_copied = may_copy()
+    files = () if is_copied else loaded_files()  # a copy has them
+    try:
+        with processes(count, _know, files, prepare, *arguments, is_copied=is_copied) as pool:
+            yield pool
+    except BrokenProcessPool:
+        raise RunError(
+            f"a process of the study was killed, most likely for want of memory: {advice}"
+        ) from None
+
+
+def _know(files: Sequence[str], prepare: Callable[..., object] | None, *arguments: Any) -> None:
+    load_brakes(files)
+    if prepare is not None:
+        prepare(*arguments)
 
 
 def _break_off(

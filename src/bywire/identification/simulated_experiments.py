@@ -7,17 +7,14 @@ import os
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from bywire.core.brake import load_brakes, loaded_files
-from bywire.core.copies import may_copy
-from bywire.core.copies import processes as copies
-from bywire.core.errors import BywireError, ParameterError, RunError
+from bywire.core.copies import processes_with_brakes
+from bywire.core.errors import BywireError, ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Progress
 from bywire.identification.identifiability import MisfitWarning
@@ -26,6 +23,9 @@ from bywire.identification.unknown import parameters_of, scattered
 from bywire.simulation.job_store import JobStore
 
 _TRIES = 20
+_KILLED = (
+    "what was finished is kept where there is an output folder, and the same command goes on"
+)
 
 
 @dataclass(frozen=True)
@@ -137,17 +137,9 @@ def _outcomes(
     if processes < 2 or len(seeds) < 2:
         yield from map(identify, seeds)
         return
-    is_copied = may_copy()
-    files = () if is_copied else loaded_files()  # a copy has them
-    try:
-        with copies(min(processes, len(seeds)), load_brakes, files, is_copied=is_copied) as pool:
-            jobs = [pool.submit(identify, seed) for seed in seeds]
-            yield from (job.result() for job in as_completed(jobs))
-    except BrokenProcessPool:
-        raise RunError(
-            "a process of the study was killed, most likely for want of memory: what was finished "
-            "is kept where there is an output folder, and the same command goes on"
-        ) from None
+    with processes_with_brakes(min(processes, len(seeds)), _KILLED) as pool:
+        jobs = [pool.submit(identify, seed) for seed in seeds]
+        yield from (job.result() for job in as_completed(jobs))
 
 
 def _key(method: Method, par: Any, options: Any, effort: Effort) -> str:

@@ -6,16 +6,14 @@ import os
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from typing import Any
 
-from bywire.core.brake import load_brakes, loaded_files
-from bywire.core.copies import may_copy, processes
-from bywire.core.errors import ParameterError, RunError
+from bywire.core.copies import may_copy, processes_with_brakes
+from bywire.core.errors import ParameterError
 from bywire.simulation.engine import CUDA
 from bywire.studies.chunk import Columns, PlacedChunk, computed_chunks
 from bywire.studies.cluster import Cluster
@@ -33,6 +31,7 @@ from bywire.studies.plan import StudyPlan
 # Chunks that a graphics processor is given at once: 4,096 cases, of hard braking 2 GB of this
 # machine's memory for stimuli and rows.
 _TOGETHER = 64
+_KILLED = "resume it, with fewer --workers"
 _AHEAD = 2  # chunks in flight for each worker, so that none waits for us
 # Chunks from which on processes are worth their start; those that load all anew take a second.
 _WORTH_COPIES, _WORTH = 2, 8
@@ -96,16 +95,8 @@ class Pool:
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
         """Return what computes; see `Executor`."""
-        is_copied = may_copy()
-        files = () if is_copied else loaded_files()  # a copy has them
-        try:
-            with processes(self.workers, _begin, files, plan, is_copied=is_copied) as pool:
-                yield _InPool(pool, _AHEAD * self.workers)
-        except BrokenProcessPool:
-            raise RunError(
-                "a process of the study was killed, most likely for want of memory: resume it, "
-                "with fewer --workers"
-            ) from None
+        with processes_with_brakes(self.workers, _KILLED, _give, plan) as pool:
+            yield _InPool(pool, _AHEAD * self.workers)
 
 
 def executor_of(
@@ -157,9 +148,7 @@ def executor_of(
 _given: list[StudyPlan] = []
 
 
-def _begin(files: tuple[str, ...], plan: StudyPlan) -> None:
-    """Prepare a process of a pool."""
-    load_brakes(files)
+def _give(plan: StudyPlan) -> None:
     _given[:] = [plan]
 
 
