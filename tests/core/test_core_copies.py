@@ -121,3 +121,16 @@ def _is_there(process: int) -> bool:
     except OSError:
         return False
     return state != "Z"
+
+
+def test_a_program_without_a_guard_is_not_run_again_in_processes_that_load_anew(tmp_path):
+    """It is what a notebook's cell becomes when it is saved; each process would start more."""
+    program = tmp_path / "program.py"
+    program.write_text(
+        "from bywire.core.copies import processes\n"
+        "print('begun')\n"
+        "with processes(2, list, is_copied=False) as pool:\n"
+        "    print(sum(pool.map(abs, [-1, -2])))\n"
+    )
+    done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "begun\n3\n", "")

@@ -9,8 +9,8 @@ import pytest
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.studies.findings import Findings
+from bywire.studies.polynomial_chaos import surrogate_of
 from bywire.studies.study_file import read_study
-from bywire.studies.surrogate import surrogate_of
 
 pytest.importorskip("openturns")
 VARY = """
@@ -32,8 +32,8 @@ def scaled(cases: pd.DataFrame) -> list[np.ndarray]:
 def findings(study):
     """Return a function that gives the quick study made-up figures."""
 
-    def made(figure, count: int = 4, design: str = "") -> Findings:
-        plan = read_study(study(VARY + design))
+    def made(figure, count: int = 4, design: str = "", vary: str = VARY) -> Findings:
+        plan = read_study(study(vary + design))
         chunks = [pd.DataFrame(plan.values(k)) for k in range(count)]
         cases = pd.concat(chunks, ignore_index=True)
         return Findings(plan, cases.assign(peak_current=figure(cases)), ())
@@ -101,3 +101,28 @@ def test_a_choice_has_no_polynomial(study):
     plan = read_study(study(VARY + CHOICE))
     with pytest.raises(ParameterError, match=r"adc\.law: a choice"):
         surrogate_of(Findings(plan, pd.DataFrame(), ()), "peak_current")
+
+
+SINGLE = VARY + '"supply.V_bat" = { kind = "discrete", values = ["11 V", "12.6 V", "14 V"] }\n'
+
+
+def test_nothing_is_told_between_single_values(findings):
+    """A quadratic through three voltages hits them all; the figure between them is another one."""
+
+    def jagged(cases):
+        return scaled(cases)[0] + cases["supply.V_bat"].map({11.0: 4.0, 12.6: 0.0, 14.0: 9.0})
+
+    surrogate = surrogate_of(findings(jagged, vary=SINGLE), "peak_current")
+    told = surrogate({"motor.R_m": NOMINAL["motor.R_m"], "supply.V_bat": np.array([11.0, 14.0])})
+    assert told == pytest.approx([4.0, 9.0], abs=1e-6)
+    with pytest.raises(ParameterError, match=r"V_bat = 12\.2 V: .* 11 V, 12\.6 V, 14 V, .* is 12\.6 V"):
+        surrogate({"supply.V_bat": 12.2})
+    assert NOMINAL["supply.V_bat"] == 12.0  # none of the cases': it is taken for the nearest
+    assert surrogate.nominal["supply.V_bat"] == 12.6
+
+
+def test_what_is_no_mapping_of_numbers_is_refused(findings):
+    surrogate = surrogate_of(findings(lambda cases: scaled(cases)[0]), "peak_current")
+    with pytest.raises(ParameterError, match=r"\[\]: SI numbers by the name"):
+        surrogate([])
+    assert surrogate({"motor.R_m": []}).shape == (0,)

@@ -11,8 +11,9 @@ from bywire.api.controller_check import ControllerCheck, check_controller
 from bywire.api.export_folder import export_folder
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import read
+from bywire.core.arguments import whole_number
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import unknown_name
 from bywire.core.scratch import scratch_folder
 from bywire.export.controller.c_text import PRECISIONS
 from bywire.export.controller.files import files
@@ -146,8 +147,7 @@ def export_controller(
     """
     if precision not in PRECISIONS:
         raise unknown_name("precision", precision, PRECISIONS)
-    if isinstance(vectors, bool) or not isinstance(vectors, int) or not 1 <= vectors <= 100_000:
-        raise ParameterError(f"vectors = {vectors!r}: a whole number from 1 to 100000 is wanted")
+    whole_number("vectors", vectors, 1, 100_000)
     chosen = bench if isinstance(bench, Bench) else read(bench, {})
     case = replace(chosen, faults=()).cases()[0]
     made = program(case.model, case.par, precision)

@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.running import Progress
+from bywire.core.arguments import whole_number
 from bywire.core.errors import ParameterError, quoted
 from bywire.core.typing import Array, silent
 from bywire.core.units import difference_unit
@@ -269,8 +270,7 @@ def require_checkable(check: int, plan: LifePlan) -> None:
     ParameterError
         When it is none, too large, or below the stops that stand for the population.
     """
-    if isinstance(check, bool) or not isinstance(check, int) or not 0 <= check <= _MOST:
-        raise ParameterError(f"check = {quoted(check)}: a whole number from 0 to {_MOST} is wanted")
+    whole_number("check", check, 0, _MOST)
     if 0 < check < plan.count:
         raise ParameterError(
             f"check = {check}: fewer than the {plan.count} stops that stand for the population say "

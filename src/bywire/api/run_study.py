@@ -19,6 +19,7 @@ from bywire.core.errors import FileError, InputError, ParameterError, quoted
 from bywire.core.field_notes import field_notes
 from bywire.core.typing import silent
 from bywire.report.answer import use_case
+from bywire.studies.asked_cases import require_extensible, with_cases
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan
 from bywire.studies.points import SPANNED
@@ -56,8 +57,9 @@ def run_study(
     overrides
         Changes of the bench, as texts with units; kept with the study.
     cases
-        Cases in place of the file's; more of them extend what is there. Where the folder has more
-        than the file asks for, all are judged.
+        Cases in place of the file's, up to 10 million; more of them extend what is there, and of
+        those that were asked for so far what is not computed is taken back by fewer. Where the
+        folder has more than the file asks for, all are judged.
     workers
         Processes; by default one a core where the work is worth their start.
     cluster
@@ -87,7 +89,7 @@ def run_study(
         raise ParameterError(f"study = {quoted(study)}: name a study file, see docs/studies.md")
     source = Path(study)
     store = StudyStore(Path(out) if out is not None else Path(source.stem))
-    plan = _with_cases(_by(engine, read_study(source, overrides)), store, cases)
+    plan = with_cases(_by(engine, read_study(source, overrides)), store, cases)
     return _completed(Origin(source, overrides), plan, store, workers, cluster, progress)
 
 
@@ -133,7 +135,7 @@ def resume_study(
         Folder of the study.
     cases
         Cases in place of those that were asked for so far; more of them extend the study by points
-        of the same sequence.
+        of the same sequence, fewer take back what is not computed.
     workers, cluster, engine, progress
         See `run_study`.
 
@@ -155,8 +157,8 @@ def resume_study(
     plan, origin = _kept(store)
     plan = _by(engine, plan)
     if cases is not None:
-        _refuse_cases(plan, cases)
-        plan = _with_cases(plan, store, cases)
+        require_extensible(plan, cases)
+        plan = with_cases(plan, store, cases)
     return _completed(origin, plan, store, workers, cluster, progress)
 
 
@@ -217,50 +219,6 @@ def _kept(store: StudyStore) -> tuple[StudyPlan, Origin]:
 def _by(engine: str, plan: StudyPlan) -> StudyPlan:
     """Return the plan computed by an engine; its cases are the same by whichever."""
     return plan if engine == "auto" else replace(plan, bench=replace(plan.bench, engine=engine))
-
-
-def _with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPlan:
-    """Return the plan with so many cases, and with all that its folder has.
-
-    Raises
-    ------
-    ParameterError
-        For fewer than there are, too few, and where the design says how many there are.
-    """
-    if cases is not None and cases < 1:
-        raise ParameterError(f"cases = {cases} is not admissible: it must be >= 1")
-    if plan.design in SPANNED:
-        if cases is not None:
-            _refuse_cases(plan, cases)
-        return plan
-    if plan.is_sampled or plan.sought is not None:
-        known = store.cases_of(plan)
-        if cases is not None and cases < known:
-            raise ParameterError(
-                f"cases = {cases}: {store.folder} has {known} already, and none are taken off: "
-                "name more of them, or another folder"
-            )
-        extended = replace(plan, cases=max(cases or plan.cases, known))
-        if extended.sought is not None:
-            extended.sought.require_budget()
-        return extended
-    asked = plan if cases is None else replace(plan, cases=cases)
-    asked.points  # noqa: B018 - refuses too few before anything runs
-    return asked
-
-
-def _refuse_cases(plan: StudyPlan, cases: int) -> None:
-    """Refuse to add cases to a design that has its own."""
-    if plan.is_sampled or plan.sought is not None:
-        return
-    why = (
-        "it lists them by quantities and levels" if plan.design in SPANNED
-        else "its groups belong together"
-    )  # fmt: skip
-    raise ParameterError(
-        f"cases = {cases}: none are added to a study of {plan.design!r}, for {why}: change the "
-        "study file, and run it into another folder"
-    )
 
 
 def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:

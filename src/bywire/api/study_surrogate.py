@@ -19,7 +19,8 @@ from bywire.report.answer import Answer, use_case
 from bywire.report.document import Document, Section, TableBlock, spaced
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import amount, clean
-from bywire.studies.surrogate import Surrogate, surrogate_of
+from bywire.studies.polynomial_chaos import surrogate_of
+from bywire.studies.surrogate import Surrogate
 
 _POOR = 0.5  # share of the variance below which a surrogate is no use
 
@@ -58,10 +59,17 @@ class StudySurrogates(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """That quantities stay where they are although the study has them go together."""
+        """What quantities are taken for that were not given, where the bench alone does not say."""
+        varied, first = self.study.plan.varied, next(iter(self.surrogates.values()))
+        moved = [
+            f"no case has {v.name} = {amount(v.nominal, v.unit)} as the bench has it: the nearest, "
+            f"{amount(first.nominal[v.name], v.unit)}, is taken; choose another by --at"
+            for v in varied
+            if self.at and v.name not in self.at and first.nominal[v.name] != v.nominal
+        ]
         pairs = [pair for pair in self.study.plan.correlations if (pair[0] in self.at) !=
                  (pair[1] in self.at)]  # fmt: skip
-        return [
+        return moved + [
             f"{' and '.join(pair)} are correlated, and one of them stays as in the bench: give both"
             for pair in pairs
         ]
@@ -115,7 +123,7 @@ class StudySurrogates(Answer):
 @use_case
 def study_surrogates(
     folder: str | Path,
-    kpis: Sequence[str] = (),
+    kpis: str | Sequence[str] = (),
     at: Mapping[str, Any] = MappingProxyType({}),
 ) -> StudySurrogates:
     """Return polynomials that tell key figures of a study between its cases; nothing is run.
@@ -125,7 +133,7 @@ def study_surrogates(
     folder
         Folder of the study.
     kpis
-        Key figures; by default those that something is required of, or all.
+        Key figure, or several; by default those that something is required of, or all.
     at
         Values of what varies at which to tell them: SI numbers, texts with units, or changes such
         as ``"+5 %"`` of what the bench has; the others as in the bench.
@@ -140,8 +148,8 @@ def study_surrogates(
     ------
     InputError
         When the folder holds no study, for names that are unknown, values beyond what the cases
-        have shown, too few cases, designs that do not show what lies between their points, and
-        structural choices among what varies.
+        have shown, or between those of a quantity that has single ones, too few cases, designs that
+        do not show what lies between their points, and structural choices among what varies.
     """
     report = kept_study(folder)
     findings = report.findings
@@ -155,7 +163,7 @@ def study_surrogates(
         values[name] = number(change, quantities[name].unit or "1", name)
     surrogates: dict[str, Surrogate] = {}
     refused: dict[str, str] = {}
-    for kpi in kpis or shown_figures(findings):
+    for kpi in ([kpis] if isinstance(kpis, str) else kpis) or shown_figures(findings):
         try:
             surrogates[kpi] = surrogate_of(findings, kpi)
         except ParameterError as error:

@@ -38,9 +38,9 @@ study_app = typer.Typer(
 StudyFolder = Annotated[
     Path, typer.Argument(help="Folder of the study.", metavar="FOLDER", show_default=False)
 ]
-Cases = Annotated[int | None, typer.Option(help=texts.STUDY_CASES, min=1)]
+Cases = Annotated[int | None, typer.Option(help=texts.STUDY_CASES)]
 Workers = Annotated[
-    int | None, typer.Option(help="Processes; one a core by default, where it is worth it.", min=1)
+    int | None, typer.Option(help="Processes; one a core by default, where it is worth it.")
 ]
 ClusterAddress = Annotated[
     str, typer.Option("--cluster", metavar="ADDRESS", help="Dask scheduler that computes instead.")
@@ -90,7 +90,7 @@ def resume_command(
 @study_app.command("extend")
 def extend_command(
     place: StudyFolder,
-    cases: Annotated[int, typer.Option(help="Cases altogether.", min=1, show_default=False)],
+    cases: Annotated[int, typer.Option(help="Cases altogether.", show_default=False)],
     workers: Workers = None,
     cluster: ClusterAddress = "",
     engine: EngineName = "auto",

@@ -12,7 +12,9 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.process import BaseProcess
+from types import ModuleType
 from typing import Any
 
 from bywire.core.blas import keep_one_thread
@@ -29,6 +31,31 @@ def may_copy() -> bool:
     load take care of themselves.
     """
     return sys.platform == "linux" and is_command_line() and threading.active_count() == 1
+
+
+class _WithoutMain(SpawnProcess):
+    """A process that loads what it computes, and not the program that asked for it.
+
+    Python would run that program's file again in each: what stands there beside the call, and, where
+    no ``if __name__ == "__main__":`` guards it, the call itself, which cannot be.
+    """
+
+    def start(self) -> None:
+        """Start it; what it is given comes from modules that it can import."""
+        main = sys.modules["__main__"]
+        nameless = ModuleType("__main__")
+        vars(nameless).update(vars(main), __spec__=None, __file__=None)
+        sys.modules["__main__"] = nameless
+        try:
+            super().start()
+        finally:
+            sys.modules["__main__"] = main
+
+
+class _Anew(SpawnContext):
+    """Starts processes that load all anew."""
+
+    Process = _WithoutMain
 
 
 @contextmanager
@@ -50,7 +77,7 @@ def processes(
         computed; others load what they need anew.
     """
     pool = ProcessPoolExecutor(
-        count, get_context("fork" if is_copied else "spawn"), initializer=_begin,
+        count, get_context("fork") if is_copied else _Anew(), initializer=_begin,
         initargs=(prepare, *arguments),
     )  # fmt: skip
     workers: list[BaseProcess] = []

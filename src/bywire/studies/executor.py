@@ -12,6 +12,7 @@ from functools import partial
 from itertools import islice
 from typing import Any
 
+from bywire.core.arguments import whole_number
 from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.errors import ParameterError
 from bywire.simulation.engine import CUDA
@@ -31,6 +32,7 @@ from bywire.studies.plan import StudyPlan
 # Chunks that a graphics processor is given at once: 4,096 cases, of hard braking 2 GB of this
 # machine's memory for stimuli and rows.
 _TOGETHER = 64
+_MOST_WORKERS = 1024
 _KILLED = "resume it, with fewer --workers"
 _AHEAD = 2  # chunks in flight for each worker, so that none waits for us
 # Chunks from which on processes are worth their start; those that load all anew take a second.
@@ -124,24 +126,35 @@ def executor_of(
     Raises
     ------
     ParameterError
-        For no workers, for both at once, and for either beside a graphics processor.
+        As `require_workers`.
     """
-    if workers is not None and workers < 1:
-        raise ParameterError(f"workers = {workers} is not admissible: it must be >= 1")
+    require_workers(workers, cluster, engine)
     if engine == CUDA:
-        if workers is not None or cluster:
-            raise ParameterError(
-                "engine = 'cuda' computes all cases on one graphics processor: leave out "
-                f"{'--cluster' if cluster else '--workers'}"
-            )
         return InProcess(_TOGETHER)
     if cluster:
-        if workers is not None:
-            raise ParameterError("workers of a cluster are the cluster's own: leave one out")
         return Cluster(cluster)
     count = min(workers or os.cpu_count() or 1, together or chunks)
     is_worth = workers is not None or chunks >= (_WORTH_COPIES if may_copy() else _WORTH)
     return Pool(count) if count > 1 and is_worth else InProcess()
+
+
+def require_workers(workers: int | None, cluster: str, engine: str) -> None:
+    """Refuse workers that cannot be; see `executor_of`.
+
+    Raises
+    ------
+    ParameterError
+        For no workers or too many, for both at once, and for either beside a graphics processor.
+    """
+    if workers is not None:
+        whole_number("workers", workers, 1, _MOST_WORKERS)
+    if engine == CUDA and (workers is not None or cluster):
+        raise ParameterError(
+            "engine = 'cuda' computes all cases on one graphics processor: leave out "
+            f"{'--cluster' if cluster else '--workers'}"
+        )
+    if cluster and workers is not None:
+        raise ParameterError("workers of a cluster are the cluster's own: leave one out")
 
 
 # What a process of a pool computes: given once, and not with every job.

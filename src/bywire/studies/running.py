@@ -12,7 +12,7 @@ from bywire.bench.result import Result
 from bywire.core.typing import Progress
 from bywire.simulation.cuda_device import find_device
 from bywire.simulation.engine import CUDA
-from bywire.studies.executor import executor_of
+from bywire.studies.executor import executor_of, require_workers
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.rare_failures import rare_failures
 from bywire.studies.sought_design import WORST
@@ -66,6 +66,8 @@ def complete(
 
     Raises
     ------
+    ParameterError
+        For workers that cannot be; nothing is written then.
     FileError
         When the folder is another study's, or cannot be written.
     RunError
@@ -76,6 +78,7 @@ def complete(
         When interrupted; what is finished stays.
     """
     until = time.monotonic() + plan.time
+    require_workers(workers, cluster, plan.bench.engine)
     if plan.bench.engine == CUDA:
         find_device()  # else there would be a folder without a study
     store.open(plan, origin)

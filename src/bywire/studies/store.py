@@ -73,13 +73,14 @@ class StudyStore:
             When it holds another study, or cannot be written.
         """
         library("pyarrow", *_WHAT)
-        known = self.require(plan) if (self.folder / RECORD).exists() else {}
+        if (self.folder / RECORD).exists():
+            self.require(plan)
         try:
             (self.folder / CHUNKS).mkdir(parents=True, exist_ok=True)
             sweep(self.folder / CHUNKS)
             said = {
                 "digest": plan.digest, "source": str(origin.file.resolve()), "name": plan.name,
-                "cases": max(plan.total, known.get("cases", 0)), "chunk": CHUNK,
+                "cases": plan.total, "chunk": CHUNK,
                 "set": dict(origin.overrides), "systems": list(loaded_files()),
                 "study": plan.identity,
             }  # fmt: skip
@@ -88,12 +89,20 @@ class StudyStore:
         except OSError as error:
             raise _unwritable(self.folder, error) from None
 
-    def cases_of(self, plan: StudyPlan) -> int:
-        """Return for how many cases the folder was asked, if it holds this study; else zero."""
+    def cases_of(self, plan: StudyPlan) -> tuple[int, int]:
+        """Return for how many cases the folder was asked, and how many of them may be computed.
+
+        Both are zero where it does not hold this study. Of rare failures, what is computed is of
+        all requirements together, and what is asked for of each.
+        """
         if not (self.folder / RECORD).exists():
-            return 0
+            return 0, 0
         known = self.record()
-        return int(known["cases"]) if known["digest"] == plan.digest else 0
+        if known["digest"] != plan.digest:
+            return 0, 0
+        there = self.finished()
+        chunks = len(there) if plan.sought is not None else max(there, default=-1) + 1
+        return int(known["cases"]), min(int(known["cases"]), CHUNK * chunks)
 
     def require(self, plan: StudyPlan) -> dict[str, Any]:
         """Return what the folder says, or refuse it where it holds another study.
