@@ -36,5 +36,5 @@ def test_what_python_says_of_missing_arguments_stays():
 @pytest.mark.parametrize("value", [True, 0, 11, 2.0, "3", None, 10**400])
 def test_a_whole_number_is_one_within_its_range(value):
     assert whole_number("cases", np.int64(10), 1, 10) == 10
-    with pytest.raises(ParameterError, match="cases = .*: a whole number from 1 to 10 is wanted"):
+    with pytest.raises(ParameterError, match=r"cases = .*: a whole number from 1 to 10 is wanted"):
         whole_number("cases", value, 1, 10)

@@ -233,5 +233,6 @@ def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
     else:
         findings = Findings(plan, store.read(plan.chunks), nominal.kpis)
         is_whole = len(findings.cases) == plan.total
-    status = status_of(findings.judgments) if is_whole else "unfinished"
+    judged = status_of(findings.judgments) if findings.spreads else "failed"
+    status = judged if is_whole else "unfinished"
     return StudyRun(plan, store.folder, findings, nominal, status)

@@ -51,9 +51,9 @@ class ShownCases:
 
     @cached_property
     def benches(self) -> Mapping[str, Bench]:
-        """What runs each, by its key figure."""
+        """What runs each that has a result, by its key figure."""
         return {j.demand.kpi: self._bench(j, row) for j in self.findings.judgments
-                if (row := j.worst) is not None}  # fmt: skip
+                if (row := j.worst) is not None and row not in self.findings.failures}  # fmt: skip
 
     @cached_property
     def results(self) -> Mapping[str, Result]:
@@ -63,10 +63,18 @@ class ShownCases:
     def texts(self) -> list[str]:
         """Return each case in words."""
         return [
-            f"{(kpi := each.demand.kpi)} = {self._figure(kpi, row)}{self._doubt(each, row)} "
-            f"in case {self.named(row)}; {self.kind}-{kpi}.toml runs it"
-            for each in self.findings.judgments if (row := each.worst) is not None
+            self._text(each, each.worst) for each in self.findings.judgments
+            if each.worst is not None
         ]  # fmt: skip
+
+    def _text(self, judgment: Judgment, row: int) -> str:
+        kpi = judgment.demand.kpi
+        if row in self.findings.failures:
+            return f"{kpi}: case {self.named(row)}, which has no result"
+        return (
+            f"{kpi} = {self._figure(kpi, row)}{self._doubt(judgment, row)} in case "
+            f"{self.named(row)}; {self.kind}-{kpi}.toml runs it"
+        )
 
     def named(self, row: int) -> str:
         """Return a case by its row: number and values."""

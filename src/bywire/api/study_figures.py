@@ -42,7 +42,7 @@ def load_drawing() -> None:
 
 
 def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
-    """Return the figures of a study.
+    """Return the figures of a study; none where no case has a result.
 
     Parameters
     ----------
@@ -51,6 +51,8 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
     recordings
         Returns the recordings of the bench itself and of worst cases, by run and by what they are.
     """
+    if not findings.spreads:
+        return []
     if findings.rare:
         return [*rare_figures(findings), *_scatters(findings), *_overlays(recordings)]
     band = "; the shaded band holds 90 % of them" if findings.plan.is_sampled else ""

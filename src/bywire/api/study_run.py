@@ -28,7 +28,7 @@ from bywire.api.study_tables import (
 )
 from bywire.bench.bench import Bench
 from bywire.bench.result import Result
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Banner,
@@ -65,7 +65,7 @@ class StudyRun(Answer):
         The bench itself.
     status
         ``passed``, ``failed`` or ``undecided`` by the requirements, ``done`` where there are none,
-        ``unfinished`` where cases are missing.
+        ``failed``, too, where no case has a result, and ``unfinished`` where cases are missing.
     damaged
         Chunks whose files could not be read, and that were computed again.
     """
@@ -135,12 +135,16 @@ class StudyRun(Answer):
 
         Raises
         ------
+        UnknownNameError
+            When nothing is required of the key figure.
         ParameterError
-            When nothing is required of the key figure, or no case has it.
+            When no case has it.
         """
+        required = [each.demand.kpi for each in self.findings.judgments]
+        if kpi not in required:
+            raise unknown_name("key figure of a requirement", kpi, required)
         if kpi not in self._shown.benches:
-            raise ParameterError(f"no {self._shown.kind} case by {kpi!r}: "
-                                 "nothing is required of it, or no case is one")  # fmt: skip
+            raise ParameterError(f"there is no {self._shown.kind} case by {kpi} with a result")
         return self._shown.benches[kpi]
 
     def __repr__(self) -> str:
@@ -165,6 +169,7 @@ class StudyRun(Answer):
         )  # fmt: skip
         unindexed = [Listing(said)] if (said := missing_indices(findings)) else []
         judged: list[Block] = [demands] if plan.demands else []
+        figures = [spreads] if findings.spreads else []
         texts = self._shown.texts()
         remarks = [*(f"Warning: {text}." for text in self.warnings), *self.notes]
         missing = failure_texts(findings, self._shown.named)
@@ -174,17 +179,18 @@ class StudyRun(Answer):
             sections=lambda: [
                 *([Section("Requirements", judged)] if judged else []),
                 *([Section("What else to know", [Listing(remarks)])] if remarks else []),
-                Section("Key figures", [spreads]),
+                *([Section("Key figures", figures)] if figures else []),
                 *([Section("What drives them", [*drivers, *unindexed])] if drivers or unindexed
                   else []),
-                Section("Figures", study_figures(findings, self._shown.recordings)),
+                *([Section("Figures", drawn)]
+                  if (drawn := study_figures(findings, self._shown.recordings)) else []),
                 *([Section(self._shown.title, [Listing(texts)])] if judged and texts else []),
                 *([Section("Cases without a result", [Listing(missing)])] if missing else []),
                 Section("What varies", [TableBlock(varied_table(plan)), *correlated(plan)]),
                 subject.provenance(f"Chunks of the study: {self.folder}."),
             ],
             brief=spaced([
-                *([demands] if judged else []), spreads, *drivers[:3],
+                *([demands] if judged else []), *figures, *drivers[:3],
                 *([Listing(missing, "Cases without a result")] if missing else []),
             ]),
             data=self._data,
@@ -204,6 +210,8 @@ class StudyRun(Answer):
         )  # fmt: skip
 
     def _banner(self) -> Banner:
+        if not self.findings.spreads:
+            return Banner("no case has a result", "bad")
         outcomes = [each.outcome for each in self.findings.judgments]
         if not outcomes:
             return Banner(f"{len(self.cases)} cases done")

@@ -36,8 +36,8 @@ def may_copy() -> bool:
 class _WithoutMain(SpawnProcess):
     """A process that loads what it computes, and not the program that asked for it.
 
-    Python would run that program's file again in each: what stands there beside the call, and, where
-    no ``if __name__ == "__main__":`` guards it, the call itself, which cannot be.
+    Python would run that program's file again in each: what stands there beside the call and,
+    where no ``if __name__ == "__main__":`` guards it, the call itself, which cannot be.
     """
 
     def start(self) -> None:

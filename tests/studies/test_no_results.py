@@ -1,0 +1,51 @@
+"""Studies of which no case has a result: a report that says so and why, and no figure."""
+
+from __future__ import annotations
+
+import pytest
+
+import bywire
+from bywire.core.errors import ParameterError, UnknownNameError
+
+VARY = '[vary]\n"master_cylinder.x_end" = { kind = "uniform", low = "11 mm", high = "12 mm" }\n[design]\n'
+LIMIT = '[requirements]\npeak_current = "<= 25 A'
+
+
+@pytest.mark.parametrize(
+    ("design", "requirements"),
+    [
+        ('kind = "monte-carlo"\ncases = 64', ""),
+        ('kind = "monte-carlo"\ncases = 64', LIMIT + '"'),
+        ('kind = "morris"\ncases = 64', LIMIT + '"'),
+        ('kind = "worst-case"\ncases = 64', LIMIT + '"'),
+        ('kind = "subset-simulation"\ncases = 640\ncases_per_level = 640', LIMIT + ' with 90 %"'),
+    ],
+)
+def test_a_study_without_any_result_says_why_and_fails(study, tmp_path, design, requirements):
+    if "subset" in design:
+        pytest.importorskip("openturns")
+    if "morris" in design:
+        pytest.importorskip("SALib")
+    path = study(f"{VARY}{design}\n{requirements}", bench=BENCH)
+    run = bywire.run_study(path, tmp_path / "out")
+    assert (run.status, run.holds) == ("failed", False)
+    assert len(run.findings.failures) == len(run.cases) > 0
+    assert any("cases have no result" in text for text in run.warnings)
+    assert "must be less than the chamber length" in " ".join(str(run).split())
+    names = {each.name for each in run.write(tmp_path / "report")}
+    assert "report.html" in names
+    assert not [name for name in names if name.endswith((".png", ".toml", ".nc"))]
+    if requirements:
+        with pytest.raises(ParameterError, match="case by peak_current with a result"):
+            run.worst("peak_current")
+        with pytest.raises(UnknownNameError, match="did you mean 'peak_current'"):
+            run.worst("peak_curent")
+
+
+BENCH = """
+experiment = "hard-braking"
+parameters = "dardanelli2010"
+[options]
+duration = "40 ms"
+settle = "10 ms"
+"""
