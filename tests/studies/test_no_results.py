@@ -7,7 +7,11 @@ import pytest
 import bywire
 from bywire.core.errors import ParameterError, UnknownNameError
 
-VARY = '[vary]\n"master_cylinder.x_end" = { kind = "uniform", low = "11 mm", high = "12 mm" }\n[design]\n'
+VARY = """
+[vary]
+"master_cylinder.x_end" = { kind = "uniform", low = "11 mm", high = "12 mm" }
+[design]
+"""
 LIMIT = '[requirements]\npeak_current = "<= 25 A'
 
 

@@ -19,7 +19,7 @@ import pytest
 from scipy import stats
 
 import bywire
-from bywire.core.errors import FileError, InputError, ParameterError, RunError
+from bywire.core.errors import FileError, InputError, ParameterError, RunError, UnknownNameError
 from bywire.studies.cluster import CLUSTER_MEMORY, CLUSTER_SETTINGS, Cluster
 from bywire.studies.executor import InProcess, Pool, executor_of
 from bywire.studies.store import Origin, StudyStore
@@ -279,7 +279,7 @@ def test_results_in_python(study, tmp_path):
     assert "peak_current" in str(result)
     with undrawn():
         assert "probability" in result._repr_html_()
-    with pytest.raises(ParameterError, match="no worst case"):
+    with pytest.raises(UnknownNameError, match="known are peak_current"):
         result.worst("overshoot")
 
 

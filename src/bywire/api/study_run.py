@@ -245,7 +245,7 @@ class StudyRun(Answer):
                     **(_spread_data(each) if self.plan.is_sampled else {}),
                     **drivers_data(findings, each.name),
                 }
-                for each in (findings.spreads if len(self.cases) else ())
+                for each in findings.spreads
             },
             "warnings": self.warnings,
             "notes": self.notes,

@@ -155,7 +155,8 @@ class Findings:
         nominal = {kpi.name: kpi.value for kpi in self.nominal}
         return tuple(
             self._spread(name, unit, nominal.get(name, math.nan))
-            for name, unit in self.units.items() if np.isfinite(self.figure(name)).any()
+            for name, unit in (self.units if len(self.cases) else {}).items()
+            if np.isfinite(self.figure(name)).any()
         )  # fmt: skip
 
     def influences(self, name: str) -> Sequence[Influence]:
