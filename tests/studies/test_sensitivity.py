@@ -115,6 +115,28 @@ def test_a_linear_function_has_its_slopes(planned):
         assert each.sigma == pytest.approx(0.0, abs=1e-9)
 
 
+def test_a_step_between_single_values_is_all_they_can_do(study):
+    """Whatever their weights, a switch that adds 5 A has an effect of 5 A, and no more."""
+    plan = read_study(study("""
+[vary]
+"motor.R_m" = "+-5 %"
+"supply.V_bat" = { kind = "discrete", values = ["11 V", "13 V"], weights = [1, 3] }
+"adc.law" = { kind = "discrete", values = ["ideal", "quantized"] }
+[design]
+kind = "morris"
+cases = 64
+"""))  # fmt: skip
+    chunks = [pd.DataFrame(plan.values(k)) for k in range(plan.chunks)]
+    cases = pd.concat(chunks, ignore_index=True)
+    ratio = (cases["motor.R_m"] / plan.bench.par.motor.R_m - 1.0) / 0.05
+    figure = ratio + 2.0 * cases["supply.V_bat"] - 5.0 * (cases["adc.law"] == "ideal")
+    effects = by_name(Findings(plan, cases.assign(**{KPI: figure}), ()))
+    for name, size in (("motor.R_m", 2.0), ("supply.V_bat", 4.0), ("adc.law", 5.0)):
+        each = effects[name]
+        assert (each.mu_star.value, each.mu_star.low) == pytest.approx((size, size))
+        assert each.sigma == pytest.approx(0.0, abs=1e-9)
+
+
 def mean_effects(function) -> np.ndarray:
     """Return mu* over all trajectories there are: every step of two thirds on four levels."""
     levels = np.linspace(-1.0, 1.0, 4)

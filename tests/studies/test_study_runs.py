@@ -24,6 +24,7 @@ from bywire.studies.cluster import CLUSTER_MEMORY, CLUSTER_SETTINGS, Cluster
 from bywire.studies.executor import InProcess, Pool, executor_of
 from bywire.studies.store import Origin, StudyStore
 from bywire.studies.study_file import read_study
+from systems.loading import SPRING_AXIS
 from undrawn import undrawn
 
 DAMPED = """
@@ -306,6 +307,11 @@ def test_a_study_is_kept_with_its_changes_and_another_says_how_it_differs(study,
         bywire.run_study(path, out, workers=1)
     with pytest.raises(ParameterError, match="name a study file"):
         bywire.run_study({"bench": "hard-braking"})
+    study(VARY.replace('"+-5 %"', '{ kind = "tolerance", tolerance = "5 %", together = [BOTH] }')
+          .replace("BOTH", '"motor.L_m"'))  # fmt: skip
+    both = r"\(varied motor\.R_m together: nothing, now motor\.L_m\)"
+    with pytest.raises(FileError, match=both):
+        bywire.run_study(path, out, {"seal.T_pr": "+10 %"})
 
 
 def test_time_is_a_budget(study, tmp_path):
@@ -322,6 +328,7 @@ def test_a_study_of_a_loaded_brake_says_which_it_was(tmp_path, spring_axis):
     (tmp_path / "bench.toml").write_text(AXIS)
     (tmp_path / "study.toml").write_text(DAMPED.replace("KIND", "monte-carlo"))
     bywire.run_study(tmp_path / "study.toml", tmp_path / "out", cases=64, workers=1)
+    assert StudyStore(tmp_path / "out").resume_command.endswith(f"out --system {SPRING_AXIS}")
     record = json.loads((tmp_path / "out" / "study.json").read_text())
     record["systems"] = ["elsewhere/axis.py"]  # not loaded by now
     (tmp_path / "out" / "study.json").write_text(json.dumps(record))

@@ -112,7 +112,7 @@ def _completed(
     except KeyboardInterrupt:
         of = "" if plan.sought is not None else f" of {plan.chunks}"
         raise KeyboardInterrupt(
-            f"{len(store.finished())}{of} chunks are kept: bywire study resume {store.folder}"
+            f"{len(store.finished())}{of} chunks are kept: {store.resume_command}"
         ) from None
     return replace(_run_of(plan, store, completed.nominal), damaged=completed.damaged)
 

@@ -42,6 +42,7 @@ from bywire.report.document import (
 from bywire.report.subject import Subject
 from bywire.studies.findings import Findings, Judgment, Spread
 from bywire.studies.plan import StudyPlan
+from bywire.studies.store import StudyStore
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,7 +120,7 @@ class StudyRun(Answer):
         """The warnings, for which all cases are gone through once."""
         said = warned(self.findings, self.nominal.warnings)
         if self.status == "unfinished":
-            resume = f"bywire study resume {self.folder}"
+            resume = StudyStore(self.folder).resume_command
             said.append(unfinished(self.plan, len(self.cases), resume))
         return said
 

@@ -176,7 +176,10 @@ class Findings:
         if name not in known:
             assert design is not None
             names = [v.name for v in self.plan.varied]
-            known[name] = sensitivity(design, names, self.figure(name), self.plan.confidence)
+            singles = [v.name for v in self.plan.varied if v.distribution.is_discrete]
+            known[name] = sensitivity(
+                design, names, singles, self.figure(name), self.plan.confidence
+            )
         return known[name]
 
     def effects(self, name: str) -> Sequence[Effect]:

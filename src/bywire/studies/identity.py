@@ -14,6 +14,8 @@ _SHOWN = 3  # entries that are named, of those that differ
 _WORDS = {"version": "the version of bywire", "brake": "the code of the brake",
           "points": "how the library draws"}  # fmt: skip
 """entries whose values say nothing to a reader"""
+_PARTS = {"varied": ("", "together", "quantiles"), "stimuli": ("", "parameters")}
+"""entries whose values are lists, and what stands in each place of them"""
 
 
 def source_digest(module: str) -> str:
@@ -58,21 +60,26 @@ def differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
 def _difference(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     if name in _WORDS:
         return _WORDS[name]
-    return f"{name}: {_shown(old.get(name))}, now {_shown(new.get(name))}"
+    before, now = _shown(old.get(name)), _shown(new.get(name))
+    return f"{name}: {before}, now {now}" if before != now else f"{name}: other values"
 
 
 def _shown(value: Any) -> str:
-    told = value[0] if isinstance(value, list) and value else value  # of what varies, how
-    text = "nothing" if told is None else str(told)
-    return text if len(text) <= 40 else f"{text[:37]}..."
+    if isinstance(value, list):
+        value = ", ".join(map(str, value))
+    text = "nothing" if value is None or value == "" else str(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _entries(identity: Mapping[str, Any]) -> list[tuple[str, Any]]:
+def _entries(identity: Mapping[str, Any], group: str = "") -> list[tuple[str, Any]]:
     """Return the entries with those of groups in words of their own."""
     entries: list[tuple[str, Any]] = []
     for key, value in identity.items():
+        name = f"{group} {key}".strip()
         if isinstance(value, Mapping):
-            entries += [(f"{key} {inner}", each) for inner, each in value.items()]
+            entries += _entries(value, name)
+        elif group in _PARTS and isinstance(value, list):
+            entries += _entries(dict(zip(_PARTS[group], value, strict=False)), name)
         else:
-            entries.append((key, value))
+            entries.append((name, value))
     return entries

@@ -21,7 +21,7 @@ from bywire.studies.correlation import correlation_factor
 from bywire.studies.distribution import Distribution
 from bywire.studies.identity import as_json, digest_of, source_digest
 from bywire.studies.points import SAMPLED, Sampled, Spanned, spanned
-from bywire.studies.sensitivity_design import SENSITIVITY, SensitivityDesign
+from bywire.studies.sensitivity_design import MORRIS, SENSITIVITY, SensitivityDesign
 from bywire.studies.sought_design import RARE, SOUGHT, WORST, SoughtDesign, library_version
 
 CHUNK = 64
@@ -271,6 +271,8 @@ class StudyPlan:
             said["groups"] = self.sensitivity.base
             points = self.sensitivity.probabilities.tobytes()
             said["points"] = hashlib.sha256(points).hexdigest()
+            if self.design == MORRIS and any(v.distribution.is_discrete for v in self.varied):
+                said["single values"] = "as many levels each"
         if self.sought is not None:
             # Where it goes depends on the requirements, and on how the library draws.
             said["points"] = library_version(self.design)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from bywire.core.typing import Array
 from bywire.data.file_format import library
-from bywire.studies.sensitivity_design import LEVELS, LIBRARY, SensitivityDesign
+from bywire.studies.sensitivity_design import LEVELS, LIBRARY, STEP, SensitivityDesign
 
 _RESAMPLES = 200  # of the groups, for intervals: their widths scatter by 5 %
 _ROUNDING = 1e-12  # share of a figure below which its differences are those of rounding
@@ -59,7 +59,7 @@ class ElementaryEffects:
         Its name.
     mu_star
         Mean size of its elementary effects: what the figure changes by as the quantity goes from
-        end to end, at the rate of a single step.
+        end to end, at the rate of a single step; of single values, as it goes from one to another.
     sigma
         Their standard deviation: where it is small the quantity acts linearly, whatever the others.
     """
@@ -91,8 +91,9 @@ class Sensitivity:
 
 
 def sensitivity(
-    design: SensitivityDesign, names: Sequence[str], figure: Array, confidence: float
-) -> Sensitivity:
+    design: SensitivityDesign, names: Sequence[str], singles: Collection[str], figure: Array,
+    confidence: float,
+) -> Sensitivity:  # fmt: skip
     """Return what drives a key figure.
 
     Estimators and their intervals are SALib's: resampled groups, as normal ones. Indices of first
@@ -106,6 +107,8 @@ def sensitivity(
         What was computed.
     names
         The quantities, in the order of the design.
+    singles
+        Those of them that have single values.
     figure
         The key figure of every case in the order of the design, shape (cases,).
     confidence
@@ -134,8 +137,11 @@ def sensitivity(
     # The variance that is shared out is that of the points A and B, first and last of a group.
     if is_sobol and np.ptp(groups[:, [0, -1]]) <= least:
         return Sensitivity((), "varies in too few cases")
-    analyze: Callable[..., Sensitivity] = _variance_shares if is_sobol else _elementary_effects
-    return analyze(design, names, figure, confidence)
+    if is_sobol:
+        return _variance_shares(design, names, figure, confidence)
+    # A step between single values is all that they can do: it is no part of a longer way.
+    ways = [STEP if name in singles else 1.0 for name in names]
+    return _elementary_effects(design, names, ways, figure, confidence)
 
 
 def _variance_shares(
@@ -157,8 +163,9 @@ def _variance_shares(
 
 
 def _elementary_effects(
-    design: SensitivityDesign, names: Sequence[str], figure: Array, confidence: float
-) -> Sensitivity:
+    design: SensitivityDesign, names: Sequence[str], ways: Sequence[float], figure: Array,
+    confidence: float,
+) -> Sensitivity:  # fmt: skip
     indices = library("SALib.analyze.morris", *LIBRARY).analyze(
         design.problem, design.probabilities, figure, num_resamples=_RESAMPLES,
         conf_level=confidence, num_levels=LEVELS, seed=np.random.default_rng(design.seed),
@@ -166,10 +173,10 @@ def _elementary_effects(
     drivers = [
         ElementaryEffects(
             name,
-            _estimate(indices["mu_star"][k], indices["mu_star_conf"][k], least=0.0),
-            float(indices["sigma"][k]),
+            _estimate(way * indices["mu_star"][k], way * indices["mu_star_conf"][k], least=0.0),
+            way * float(indices["sigma"][k]),
         )
-        for k, name in enumerate(names)
+        for k, (name, way) in enumerate(zip(names, ways, strict=True))
     ]
     return Sensitivity(sorted(drivers, key=lambda each: -each.mu_star.value))
 

@@ -7,6 +7,7 @@ all, so that whatever is killed loses the chunks that it was at.
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,8 +19,8 @@ import numpy as np
 from bywire.core.brake import loaded_files
 from bywire.core.errors import FileError
 from bywire.core.scratch import replacing, sweep
-from bywire.data.file_format import library
 from bywire.studies.chunk import Columns
+from bywire.studies.chunk_file import read_chunk, require_pyarrow, write_chunk
 from bywire.studies.identity import differing
 from bywire.studies.plan import CHUNK, StudyPlan
 
@@ -31,7 +32,6 @@ RECORD = "study.json"
 CHUNKS = "chunks"
 """folder of the chunks"""
 _SAID = {"digest": str, "source": str, "cases": int, "set": dict, "systems": list, "study": dict}
-_WHAT = ("the files of a study", "studies")
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class StudyStore:
         FileError
             When it holds another study, or cannot be written.
         """
-        library("pyarrow", *_WHAT)
+        require_pyarrow()
         if (self.folder / RECORD).exists():
             self.require(plan)
         try:
@@ -117,7 +117,8 @@ class StudyStore:
             differs = differing(known["study"], plan.identity)
             raise FileError(
                 f"{self.folder} holds another study{differs and f' ({differs})'}: what is computed "
-                "there does not belong to this one; name another folder with --out, or remove it"
+                "there does not belong to this one; run it into another folder, bywire study run "
+                "FILE --out FOLDER, or remove that one"
             )
         return known
 
@@ -145,6 +146,12 @@ class StudyStore:
             f"{path} is damaged, or not of a study of many cases: run the study into another folder"
         )
 
+    @property
+    def resume_command(self) -> str:
+        """Command that goes on with the study, with the brakes that were loaded by path."""
+        words = ["bywire", "study", "resume", str(self.folder)]
+        return shlex.join([*words, *(w for file in loaded_files() for w in ("--system", file))])
+
     def path(self, chunk: int) -> Path:
         """Return the file of a chunk."""
         return self.folder / CHUNKS / f"{chunk:06d}.parquet"
@@ -164,7 +171,7 @@ class StudyStore:
         int
             How many there were.
         """
-        library("pyarrow", *_WHAT)  # without it nothing can be read, and nothing is damaged
+        require_pyarrow()
         damaged = 0
         for chunk in self.finished():
             try:
@@ -182,19 +189,12 @@ class StudyStore:
         FileError
             When it cannot be written.
         """
-        pa, parquet = library("pyarrow", *_WHAT), library("pyarrow.parquet", *_WHAT)
-        texts = [name for name, column in columns.items() if column.dtype.kind in "OU"]
-        columns = {**columns, **{name: columns[name].astype(object) for name in texts}}
-        arrays = {name: pa.array(column) for name, column in columns.items()}
-        fields = [
-            pa.field(name, array.type, metadata={b"unit": units.get(name, "1").encode()})
-            for name, array in arrays.items()
-        ]
-        table = pa.table(list(arrays.values()), schema=pa.schema(fields, self._marks(chunk)))
+        columns = {  # texts as they come back from the file
+            name: column.astype(object) if column.dtype.kind == "U" else column
+            for name, column in columns.items()
+        }
         try:
-            with replacing(self.path(chunk)) as fresh:
-                # A dictionary of numbers that all differ would be written in vain.
-                parquet.write_table(table, fresh, write_page_checksum=True, use_dictionary=texts)
+            write_chunk(self.path(chunk), columns, units, self._marks(chunk))
         except OSError as error:
             raise _unwritable(self.path(chunk), error) from None
         self._known[chunk] = columns
@@ -227,27 +227,19 @@ class StudyStore:
 
     def _read(self, chunk: int) -> Columns:
         """Return what the file of a chunk holds; see `columns`."""
-        parquet = library("pyarrow.parquet", *_WHAT)
+        path = self.path(chunk)
+        require_pyarrow()
         try:
-            # Of one file: what reads folders of them takes three times as long, and loads more.
-            with parquet.ParquetFile(
-                self.path(chunk), page_checksum_verification=True, pre_buffer=False
-            ) as file:
-                table = file.read(use_threads=False)
-            columns = {
-                name: np.asarray(table.column(name).to_numpy(zero_copy_only=False))
-                for name in table.column_names
-            }
+            columns, marks = read_chunk(path)
         except Exception as error:  # the library raises what it likes of damaged files
             raise FileError(
-                f"{self.path(chunk)} is damaged ({type(error).__name__}): 'bywire study resume "
-                f"{self.folder}' computes it again"
+                f"{path} is damaged ({type(error).__name__}): '{self.resume_command}' computes it "
+                "again"
             ) from None
-        marks = table.schema.metadata or {}
         if any(marks.get(key) != value for key, value in self._marks(chunk).items()):
             raise FileError(
-                f"{self.path(chunk)} is of another study, or another chunk of this one: 'bywire "
-                f"study resume {self.folder}' computes it again"
+                f"{path} is of another study, or another chunk of this one: "
+                f"'{self.resume_command}' computes it again"
             )
         return columns
 
