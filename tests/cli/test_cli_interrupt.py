@@ -205,7 +205,7 @@ def test_interrupt_within_text_that_is_executed_ends_with_130_too(tmp_path):
         "import bywire.report.wording\n"
         "from bywire.cli.main import main\n"
         "text = 'import signal; signal.raise_signal(signal.SIGINT)'\n"
-        "app = types.SimpleNamespace(program=lambda: lambda words: exec(text))\n"
+        "app = types.SimpleNamespace(program=lambda: lambda words, **_: exec(text))\n"
         "sys.modules['bywire.cli.app'] = app\n"
         "main()"
     )

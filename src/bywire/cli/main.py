@@ -150,10 +150,28 @@ def _warned() -> int | str:
         from bywire.cli.app import program
 
         try:
-            program()(systems_first(sys.argv[1:]))
+            status = program()(systems_first(sys.argv[1:]), standalone_mode=False)
         except SystemExit as done:
             return done.code or 0
-        return 0
+        except Exception as error:
+            # Typer's errors of usage; where they are declared differs between its versions.
+            if not hasattr(error, "format_message"):
+                raise
+            return _misused(error)
+        return status if isinstance(status, int) else 0
+
+
+def _misused(error: Any) -> int:
+    """Say in a line what is wrong with a command line, and return the exit status."""
+    text = error.format_message().strip().rstrip(".")
+    if "\n" in text:
+        error.show()  # the help of a command that needs another word
+    elif text:  # that help may be printed already
+        context = getattr(error, "ctx", None)
+        command = context.command_path if context is not None else "bywire"
+        name = f"{words}: " if (words := command.partition(" ")[2]) else ""
+        message(f"error: {name}{text[0].lower()}{text[1:]}: see '{command} -h'")
+    return int(error.exit_code)
 
 
 def _explained(error: BaseException) -> int:
