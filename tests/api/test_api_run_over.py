@@ -32,7 +32,7 @@ def test_every_value_is_run_and_judged(found):
     frame = found.tables()["Key figures"]
     np.testing.assert_allclose(frame["motor.R_m"], found.values)
     np.testing.assert_allclose(frame["peak_current <= 18 A"], found.kpi("peak_current"))
-    assert f"peak_current <= 18 A: failed at motor.R_m = {missed.sum()} values" in str(found)
+    assert f"peak_current <= 18 A: missed at motor.R_m = {missed.sum()} values" in str(found)
 
 
 @pytest.mark.usefixtures("drawn")

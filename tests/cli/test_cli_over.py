@@ -17,7 +17,7 @@ def test_table_object_and_status(bywire):
     limited = ("--set", "requirements.peak_current=<= 1 A")
     failed = bywire("run", "hard-braking", *QUICK, *OVER, *limited)
     assert failed.status == 1
-    assert "requirement not met: peak_current <= 1 A: failed at all 3 values" in failed.err
+    assert "requirement not met: peak_current <= 1 A: missed at all 3 values" in failed.err
 
 
 def test_what_is_no_range(bywire):

@@ -48,8 +48,8 @@ def texts(table: Table) -> list[list[str]]:
 
 def test_key_figures_are_shown_with_unit_limit_and_result() -> None:
     assert texts(KPIS) == [
-        ["steady_state_error", "0.12 bar", "<= 0.1 bar", "failed", "mean of the last 0.2 s"],
-        ["overshoot", "0.034", "<= 0.15", "ok", "share of the step"],
+        ["steady_state_error", "0.12 bar", "<= 0.1 bar", "missed", "mean of the last 0.2 s"],
+        ["overshoot", "0.034", "<= 0.15", "met", "share of the step"],
         ["settling_time", "not defined", "-", "-", "never settles"],
     ]
 
@@ -111,7 +111,7 @@ def test_text_is_aligned_and_wrapped() -> None:
     lines = table_text(KPIS, width=70).splitlines()
     assert max(map(len, lines)) <= 70
     assert lines[0].split() == ["name", "value", "limit", "result", "definition"]
-    assert lines[2].startswith("steady_state_error     0.12 bar  <= 0.1 bar  failed")
+    assert lines[2].startswith("steady_state_error     0.12 bar  <= 0.1 bar  missed")
     assert table_text(text_table(["a", "b"], [])) == "a  b\n-  -"
 
 
@@ -121,8 +121,8 @@ def test_text_cannot_steer_a_terminal() -> None:
 
 def test_html_tells_good_from_bad_without_color_too() -> None:
     html = table_html(KPIS)
-    assert '<td class="good">✓ ok</td>' in html
-    assert '<td class="bad">✗ failed</td>' in html
+    assert '<td class="good">✓ met</td>' in html
+    assert '<td class="bad">✗ missed</td>' in html
     assert '<td class="number">0.12 bar</td>' in html
 
 

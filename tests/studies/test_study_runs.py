@@ -293,7 +293,7 @@ def test_a_damaged_chunk_is_computed_again_and_that_is_said(study, tmp_path):
         bywire.study_report(tmp_path / "out")
     after = bywire.resume_study(tmp_path / "out", workers=1)
     pd.testing.assert_frame_equal(before.cases, after.cases, check_exact=True)
-    assert "1 damaged files of chunks are computed again" in after.notes
+    assert "1 damaged chunk is computed again" in after.notes
     store.path(1).write_bytes(store.path(0).read_bytes())  # sound, and in the wrong place
     with pytest.raises(FileError, match=r"000001\.parquet is of another study, or another chunk"):
         bywire.study_report(tmp_path / "out")

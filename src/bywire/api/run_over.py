@@ -196,9 +196,9 @@ class BenchRange(Answer):
             missed = [(value, verdict) for value, verdict in pairs if not verdict.met]
             head = f"{name} {pairs[0][1].limit}"
             if not missed:
-                yield f"{head}: ok {self._at([value for value, _ in pairs])}"
+                yield f"{head}: met {self._at([value for value, _ in pairs])}"
                 continue
-            word = "failed" if any(x.is_decided for _, x in missed) else "undecided"
+            word = "missed" if any(x.is_decided for _, x in missed) else "undecided"
             sign = -1.0 if pairs[0][1].limit.strip().startswith("<") else 1.0
             known = [(v, x) for v, x in missed if math.isfinite(x.value)]
             worst = min(known, key=lambda pair: sign * pair[1].value, default=missed[0])
@@ -308,6 +308,6 @@ def _cell(name: str, result: Result) -> Cell:
     text = measured_amount(kpi.value, kpi.unit, kpi.error)
     for verdict in result.verdicts:
         if verdict.kpi == name and not verdict.met:
-            judged = "failed" if verdict.is_decided else "undecided"
+            judged = "missed" if verdict.is_decided else "undecided"
             return Cell(f"{text} {judged}", "bad", kpi.value)
     return Cell(text, value=kpi.value)

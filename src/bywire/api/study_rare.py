@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bywire.api.study_tables import OUTCOMES
 from bywire.bench.requirements import limit_of
 from bywire.report.document import FigureBlock, TableBlock
-from bywire.report.tables import Cell, Column, Table, value_text
+from bywire.report.tables import OUTCOMES, Cell, Column, Table, value_text
 from bywire.report.wording import amount, clean
 from bywire.studies.failure_probability import FailureProbability, Interval
 from bywire.studies.findings import Findings
@@ -35,14 +34,13 @@ def failure_table(findings: Findings) -> Table:
         failure, wanted = each.failure, each.demand.probability
         assert failure is not None
         assert wanted is not None
-        text, verdict = OUTCOMES[each.outcome]
         probable = failure.estimate
         rows.append((
             Cell(clean(f"{each.demand.kpi} {each.demand.limit}")),
             Cell(_value(probable), value=probable.value), Cell(_ends(probable)),
             Cell("-" if np.isnan(probable.variation) else f"{100.0 * probable.variation:.2g} %"),
             Cell(str(failure.runs), value=failure.runs), Cell(f"{1.0 - wanted:.3g}"),
-            Cell(text, verdict),
+            OUTCOMES[each.outcome],
         ))  # fmt: skip
     columns = [Column(head, numeric="interval" not in head) for head in heads]
     return Table((Column("requirement"), *columns, Column("result")), tuple(rows))
@@ -109,6 +107,11 @@ def rare_notes(findings: Findings) -> list[str]:
             f"not judged, for no probability is wanted of it: {'; '.join(unjudged)}; cases that go "
             "where failures are say nothing of all cases"
         )
+    notes += [
+        f"{each.demand.kpi}: failure is less probable than a thousandth of what is admitted: it "
+        "was followed no further"
+        for each in findings.rare if each.failure.state == "negligible"
+    ]
     for each in findings.judgments if len(findings.cases) else ():
         if each.outcome == "undecided" and each.failure and each.failure.state == "done":
             more = (
@@ -128,8 +131,6 @@ def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
         so_far = f"it is no more probable than {failure.estimate.high:.2g}"
         return (f"the budget of {plan.cases} cases is spent before failure was come to ({so_far})"
                 + (": extend the study" if outcome == "undecided" else ""))  # fmt: skip
-    if failure.state == "negligible":
-        return "less than a thousandth of what is admitted: it was followed no further"
     if failure.state == "level":
         return "too many cases have the same figure to tell worse ones: take 'monte-carlo'"
     if failure.state == "no design point":

@@ -44,7 +44,10 @@ def unfinished(plan: StudyPlan, cases: int, resume: str) -> str:
 
 def noted(findings: Findings, damaged: int) -> list[str]:
     """Return what was rounded or repaired, and what intervals stand for."""
-    repaired = f"{damaged} damaged files of chunks are computed again" if damaged else ""
+    repaired = ""
+    if damaged:
+        files = "1 damaged chunk is" if damaged == 1 else f"{damaged} damaged chunks are"
+        repaired = f"{files} computed again"
     return [
         *filter(None, [repaired]), *_rounding(findings.plan), *_on_intervals(findings),
         *_on_choices(findings.plan),

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from bywire.core.units import difference_unit
 from bywire.report.document import Listing, TableBlock
-from bywire.report.tables import Cell, Column, Table, Verdict, text_table, value_text
+from bywire.report.tables import OUTCOMES, Cell, Column, Table, text_table, value_text
 from bywire.report.wording import amount, clean
 from bywire.studies.effects import Effect
 from bywire.studies.findings import Findings, Judgment
 from bywire.studies.plan import StudyPlan
 from bywire.studies.sought_design import WORST
-from bywire.studies.statistics import Influence, Outcome, Share
+from bywire.studies.statistics import Influence, Share
 
 _SHOWN = 5  # quantities that drive a key figure
-OUTCOMES: dict[Outcome, tuple[str, Verdict]] = {
-    "met": ("ok", "good"),
-    "missed": ("failed", "bad"),
-    "undecided": ("undecided", "open"),
-}
-"""what tables say of an outcome"""
 
 
 def demand_table(findings: Findings) -> Table:
@@ -44,10 +39,10 @@ def demand_table(findings: Findings) -> Table:
                 Cell(f"{percent(each.share.low, each.share)} to "
                      f"{percent(each.share.high, each.share)}"),
             ]  # fmt: skip
-        text, verdict = OUTCOMES[each.outcome]
+        result = OUTCOMES[each.outcome]
         if each.outcome == "met" and each.demand.probability is None:
-            text = "ok in all"
-        rows.append((*cells, Cell(text, verdict)))
+            result = replace(result, text="met in all")
+        rows.append((*cells, result))
     return Table((*columns, Column("result")), tuple(rows))
 
 

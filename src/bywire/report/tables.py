@@ -163,7 +163,7 @@ def kpi_table(rows: Iterable[KpiRow]) -> Table:
                 Cell(clean(row.name)),
                 Cell(measured_amount(row.value, row.unit, row.error)),
                 *((Cell(error_text(row.value, row.unit, row.error)),) * estimated),
-                *((Cell(clean(row.limit) or "-"), _OUTCOMES[row.outcome]) * limited),
+                *((Cell(clean(row.limit) or "-"), OUTCOMES[row.outcome]) * limited),
                 *((Cell(clean(row.stated) or "-"),) * stated),
                 *((Cell(clean(row.where) or "-"),) * placed),
                 Cell(clean(row.definition)),
@@ -244,12 +244,13 @@ def text_table(heading: Sequence[str], rows: Iterable[Sequence[object]]) -> Tabl
     )
 
 
-_OUTCOMES = {
+OUTCOMES: dict[str, Cell] = {
     "": Cell("-"),
-    "met": Cell("ok", "good"),
-    "missed": Cell("failed", "bad"),
+    "met": Cell("met", "good"),
+    "missed": Cell("missed", "bad"),
     "undecided": Cell("undecided", "open"),
 }
+"""what tables say of a requirement"""
 
 
 def _judged(holds: bool | None, good: str, bad: str) -> Cell:

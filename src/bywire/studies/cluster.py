@@ -35,6 +35,7 @@ CLUSTER_MEMORY = {"MALLOC_TRIM_THRESHOLD_": 1 << 28, "MALLOC_MMAP_THRESHOLD_": 1
 """environment with which workers are best started where the C library is glibc [byte]"""
 
 _LOST = "the cluster lost its workers ({}): resume the study when some are there"
+_GONE = "the cluster's scheduler is gone: resume the study when it is there again, or elsewhere"
 _WHAT = ("studies on a cluster", "cluster")
 
 
@@ -124,10 +125,19 @@ def _of_cluster(
             submit()
         for _, answer in tasks:
             if isinstance(answer, BaseException):  # a task that was cancelled gives why
-                raise RunError(_LOST.format(getattr(answer, "reason", answer)))
+                raise RunError(_lost(client, answer))
             seconds, given = answer
             size = max(1, round(_TASK * len(given) / seconds))
             submit()
             yield from given
     except distributed.KilledWorker as error:
-        raise RunError(_LOST.format(error)) from None
+        raise RunError(_lost(client, error)) from None
+
+
+def _lost(client: Any, error: BaseException) -> str:
+    """Return who is gone: the scheduler, or workers alone, with what else is known."""
+    reason = str(getattr(error, "reason", error))
+    if client.status != "running" or "scheduler" in reason:
+        return _GONE
+    # Tasks are forgotten where workers took the study, which they were given once, with them.
+    return _LOST.format("all of them" if "forgotten" in reason else reason)

@@ -108,7 +108,7 @@ class Spread:
     largest: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Findings:
     """The cases of a study, and what they say.
 
@@ -131,6 +131,9 @@ class Findings:
     nominal: tuple[Kpi, ...]
     rare: tuple[RareFailure, ...] = ()
     searches: tuple[WorstCase, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<Findings of {self.plan.name}: {len(self.cases)} cases>"
 
     @cached_property
     def units(self) -> Mapping[str, str]:
