@@ -328,7 +328,7 @@ def test_a_study_of_a_loaded_brake_says_which_it_was(tmp_path, spring_axis):
     (tmp_path / "bench.toml").write_text(AXIS)
     (tmp_path / "study.toml").write_text(DAMPED.replace("KIND", "monte-carlo"))
     bywire.run_study(tmp_path / "study.toml", tmp_path / "out", cases=64, workers=1)
-    assert StudyStore(tmp_path / "out").resume_command.endswith(f"out --system {SPRING_AXIS}")
+    assert f" --system {SPRING_AXIS}" in StudyStore(tmp_path / "out").resume_command
     record = json.loads((tmp_path / "out" / "study.json").read_text())
     record["systems"] = ["elsewhere/axis.py"]  # not loaded by now
     (tmp_path / "out" / "study.json").write_text(json.dumps(record))
