@@ -23,7 +23,8 @@ from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import choice_fields
 from bywire.core.signals import signals_of
 from bywire.data.toml_file import read_toml
-from bywire.studies.study_file import read_all_varied, read_bench
+from bywire.studies.study_file import read_bench
+from bywire.studies.vary_section import read_all_varied
 
 _KEYS = ("name", "bench", "set", "vary", "measured", "campaign", "values", "criteria", "residuals",
          "rates", "reaction")  # fmt: skip

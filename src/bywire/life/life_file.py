@@ -16,9 +16,9 @@ from bywire.core.units import parse
 from bywire.data.toml_file import read_toml
 from bywire.life.declaration import LIVES, Life, StopConditions
 from bywire.life.plan import CONDITION, LifePlan
-from bywire.studies.distribution import read_distribution
+from bywire.studies.distribution_section import read_distribution
 from bywire.studies.plan import Varied
-from bywire.studies.study_file import entries_of, read_varied
+from bywire.studies.vary_section import entries_of, read_varied
 
 _KEYS = ("name", "life", "set", "vary", "projection")
 _WEAR = "wear."

@@ -15,7 +15,7 @@ import numpy as np
 from bywire.bench.bench import Bench
 from bywire.core.errors import FileError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import leaf_fields
-from bywire.studies.distribution import read_distribution
+from bywire.studies.distribution_section import read_distribution
 from bywire.studies.plan import Varied
 
 ESTIMATE = "estimate.json"
