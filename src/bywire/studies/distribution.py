@@ -39,8 +39,8 @@ class Distribution:
     below, above
         ``below(x)``, ``above(x)``: probability of values below and above; None of single values,
         which end at ``low`` and ``high``.
-    is_discrete
-        Whether it has single values.
+    singles
+        Single values that it has [SI], or texts; none of what has any value.
     """
 
     kind: str
@@ -50,7 +50,12 @@ class Distribution:
     high: float = math.nan
     below: Callable[[float], float] | None = None
     above: Callable[[float], float] | None = None
-    is_discrete: bool = False
+    singles: tuple[Any, ...] = ()
+
+    @property
+    def is_discrete(self) -> bool:
+        """Whether it has single values."""
+        return bool(self.singles)
 
     def levels(self, count: int) -> NDArray[Any]:
         """Return values for a grid: evenly from end to end; those of single values as they are.
@@ -59,7 +64,7 @@ class Distribution:
         at a probability of 0.135 % beyond.
         """
         if self.is_discrete:
-            return np.array(list(dict.fromkeys(self.quantile(np.linspace(0.0, 1.0, 4097)[1:-1]))))
+            return np.array(self.singles)
         near = self.quantile(np.array([TAIL, 1.0 - TAIL])).tolist()
         low = self.low if math.isfinite(self.low) else float(near[0])
         high = self.high if math.isfinite(self.high) else float(near[1])

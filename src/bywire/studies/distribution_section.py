@@ -9,19 +9,28 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from bywire.bench.relative_changes import share_of
-from bywire.bench.values import number
+from bywire.bench.values import number, plain_text
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.units import difference_unit, parse, shown
-from bywire.studies.admissible import require_admissible
+from bywire.studies.admissible import admitted
 from bywire.studies.distribution import Distribution
 from bywire.studies.laws import Law, LogNormal, Normal, Triangular, Uniform, truncated_normal
-from bywire.studies.single_values import among, weights_of
+from bywire.studies.single_values import (
+    DISCRETE,
+    KEYS,
+    among,
+    choice_text,
+    require_several,
+    weights_of,
+)
 
 _TOLERANCE = re.compile(r"\s*(?:\+-|\+/-|±)\s*(\S.*)")
 
 
-def read_distribution(name: str, entry: Any, leaf: Leaf, nominal: float) -> Distribution:
+def read_distribution(
+    name: str, entry: Any, leaf: Leaf, nominal: float, title: str = "[vary]", advice: str = ""
+) -> Distribution:
     """Return how a number varies.
 
     Parameters
@@ -34,6 +43,11 @@ def read_distribution(name: str, entry: Any, leaf: Leaf, nominal: float) -> Dist
         Unit and admissible range of the number.
     nominal
         Its value in the bench [SI]: shares are of it.
+    title
+        Section of the file that says so, for errors.
+    advice
+        What to do about a distribution that leaves the admissible range; by default what its kind
+        has for that.
 
     Raises
     ------
@@ -45,26 +59,42 @@ def read_distribution(name: str, entry: Any, leaf: Leaf, nominal: float) -> Dist
         entry = {"kind": "tolerance", "tolerance": tolerance[1]}
     if not isinstance(entry, Mapping):
         raise ParameterError(
-            f"[vary] {name} = {quoted(entry)}: write a tolerance such as '+-5 %', or a section "
+            f"{title} {name} = {quoted(entry)}: write a tolerance such as '+-5 %', or a section "
             "such as { kind = 'normal', sd = '5 %' }"
         )
-    kind = entry.get("kind")
-    if kind not in _KINDS:
-        raise unknown_name(f"kind of [vary] {name}", str(kind), _KINDS)
+    if "kind" not in entry:
+        raise _without_kind(f"{title} {name}", entry)
+    kind = entry["kind"]
+    if not isinstance(kind, str) or kind not in _KINDS:
+        raise unknown_name(f"kind of {title} {name}", choice_text(kind), _KINDS)
     known, make = _KINDS[kind]
     for key in entry.keys() - {"kind", "together"}:
         if key not in known:
-            raise unknown_name(f"key of [vary] {name} (kind {kind})", key, known)
-    made = make(_Entry(name, entry, leaf, nominal))
-    require_admissible(name, made, leaf)
-    return made
+            raise unknown_name(f"key of {title} {name} (kind {kind})", key, known)
+    made = make(_Entry(f"{title} {name}", entry, leaf, nominal))
+    first, *_, last = made.levels(2)
+    if not made.singles and not first < last:
+        raise ParameterError(
+            f"{title} {name}: {made.text}: it is no wider than the last digit of a number, and "
+            "nothing varies: give it a larger width"
+        )
+    return admitted(f"{title} {name}", made, leaf, advice)
+
+
+def _without_kind(where: str, entry: Mapping[str, Any]) -> ParameterError:
+    """Return the error of a section that does not say what kind of distribution it is."""
+    given = entry.keys() - {"together"}
+    near = [kind for kind, (keys, _) in _KINDS.items() if given and given <= {*keys}]
+    which = " or ".join(map(repr, near or _KINDS))
+    others = f" (there are {', '.join(_KINDS)})" if near else ""
+    return ParameterError(f"{where} = {quoted(entry)}: kind is missing: add kind = {which}{others}")
 
 
 @dataclass(frozen=True)
 class _Entry:
-    """A section of ``[vary]`` with what its texts are read by."""
+    """A section of ``[vary]`` with what its texts are read by; ``where``: what errors call it."""
 
-    name: str
+    where: str
     section: Mapping[str, Any]
     leaf: Leaf
     nominal: float
@@ -81,12 +111,12 @@ class _Entry:
         """Return a width [SI] > 0; a share is of another value."""
         text = self._given(key)
         if isinstance(text, str) and text.strip().endswith("%"):
-            width = abs(of) * parse(text, "1", f"[vary] {self.name}.{key}")
+            width = abs(of) * parse(text, "1", f"{self.where}.{key}")
         else:
             width = self._number(key, text, difference_unit(self.leaf.unit.symbol))
         if not width > 0.0 or not math.isfinite(width):
             raise ParameterError(
-                f"[vary] {self.name}.{key} = {quoted(text)}: a width > 0 is wanted"
+                f"{self.where}.{key} = {quoted(text)}: a width > 0 is wanted"
                 + ("; a share of 0 is none: give an amount" if not of else "")
             )
         return width
@@ -97,7 +127,7 @@ class _Entry:
 
     def _given(self, key: str) -> Any:
         if key not in self.section:
-            raise ParameterError(f"[vary] {self.name} of kind {self.section['kind']} needs {key!r}")
+            raise ParameterError(f"{self.where} of kind {self.section['kind']} needs {key!r}")
         return self.section[key]
 
     def breadth(self, value: float) -> str:
@@ -106,44 +136,42 @@ class _Entry:
 
     def _number(self, key: str, value: Any, symbol: str = "") -> float:
         unit = self.leaf.unit
-        where = f"[vary] {self.name}.{key}"
+        where = f"{self.where}.{key}"
         if isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0:
-            value = repr(value)  # a file's plain number: 37 is not 37 bar, and hardly 37 Pa
+            value = plain_text(value)  # a file's plain number: 37 is not 37 bar, and hardly 37 Pa
         return float(number(value, symbol or unit.symbol, where, unit.nominal))
 
     def refused(self, why: str) -> ParameterError:
         """Return the error of a section that contradicts itself."""
-        return ParameterError(f"[vary] {self.name} (kind {self.section['kind']}): {why}")
+        return ParameterError(f"{self.where} (kind {self.section['kind']}): {why}")
 
 
-def _frozen(entry: _Entry, law: Law, text: str) -> Distribution:
-    low, high = map(float, law.support())
-    return Distribution(
-        str(entry.section["kind"]), text, law.ppf, low, high, law.cdf, law.sf
-    )
+def _frozen(
+    entry: _Entry, law: Law, text: str, low: float = -math.inf, high: float = math.inf
+) -> Distribution:
+    """Return a distribution by its law; that of a tail has no end, wherever its law ends."""
+    return Distribution(str(entry.section["kind"]), text, law.ppf, low, high, law.cdf, law.sf)
 
 
 def _uniform(entry: _Entry) -> Distribution:
     low, high = entry.level("low"), entry.level("high")
-    return _between(entry, low, high, f"uniform, {entry.amount(low)} to {entry.amount(high)}")
-
-
-def _between(entry: _Entry, low: float, high: float, text: str) -> Distribution:
     if not low < high:
         raise entry.refused(f"low = {entry.amount(low)} must be below high = {entry.amount(high)}")
-    return _frozen(entry, Uniform(low, high - low), text)
+    text = f"uniform, {entry.amount(low)} to {entry.amount(high)}"
+    return _frozen(entry, Uniform(low, high - low), text, low, high)
 
 
 def _tolerance(entry: _Entry) -> Distribution:
     width = entry.width("tolerance", entry.nominal)
+    low, high = entry.nominal - width, entry.nominal + width
     shape = entry.section.get("shape", "uniform")
     text = f"{entry.amount(entry.nominal)} +- {entry.breadth(width)}"
     if shape == "uniform":
-        return _between(entry, entry.nominal - width, entry.nominal + width, f"{text}, uniform")
+        return _frozen(entry, Uniform(low, high - low), f"{text}, uniform", low, high)
     if shape != "normal":
-        raise unknown_name(f"shape of [vary] {entry.name}", str(shape), ("uniform", "normal"))
+        raise unknown_name(f"shape of {entry.where}", str(shape), ("uniform", "normal"))
     law = truncated_normal(-3.0, 3.0, entry.nominal, width / 3.0)
-    return _frozen(entry, law, f"{text}, normal with 3 sd at the ends")
+    return _frozen(entry, law, f"{text}, normal with 3 sd at the ends", low, high)
 
 
 def _normal(entry: _Entry) -> Distribution:
@@ -158,7 +186,7 @@ def _normal(entry: _Entry) -> Distribution:
         raise entry.refused(f"low = {entry.amount(low)} must be below high = {entry.amount(high)}")
     law = truncated_normal((low - mean) / sd, (high - mean) / sd, mean, sd)
     ends = " to ".join("any" if math.isinf(x) else entry.amount(x) for x in (low, high))
-    return _frozen(entry, law, f"{text}, truncated: {ends}")
+    return _frozen(entry, law, f"{text}, truncated: {ends}", low, high)
 
 
 def _lognormal(entry: _Entry) -> Distribution:
@@ -168,8 +196,7 @@ def _lognormal(entry: _Entry) -> Distribution:
     variation = entry.width("sd", median) / median
     sigma = math.sqrt(math.log1p(variation**2))
     text = f"log-normal, median {entry.amount(median)}, sd {100.0 * variation:.3g} %"
-    # It ends at zero, but as it ends where it has no end: not within any standard deviation.
-    return replace(_frozen(entry, LogNormal(sigma, median), text), low=-math.inf)
+    return _frozen(entry, LogNormal(sigma, median), text)  # ends at zero as where it has no end
 
 
 def _triangular(entry: _Entry) -> Distribution:
@@ -179,17 +206,18 @@ def _triangular(entry: _Entry) -> Distribution:
     if not low <= mode <= high or not low < high:
         raise entry.refused(f"low, mode and high must rise, got {ends}")
     law = Triangular((mode - low) / (high - low), low, high - low)
-    return _frozen(entry, law, f"triangular, {ends}")
+    return _frozen(entry, law, f"triangular, {ends}", low, high)
 
 
 def _discrete(entry: _Entry) -> Distribution:
     values = entry.section.get("values")
     if not isinstance(values, list) or not values:
         raise entry.refused("it needs values = [...]")
-    read = [replace(entry, section={"value": value}).level("value") for value in values]
-    weights = weights_of(entry.name, entry.section, len(read))
-    made = among(read, weights, ", ".join(map(entry.amount, read)))
-    return replace(made, low=min(read), high=max(read))
+    read = [replace(entry, section={"values": value}).level("values") for value in values]
+    weights = weights_of(entry.where, entry.section, len(read))
+    texts = list(map(entry.amount, read))
+    require_several(entry.where, read, texts)
+    return replace(among(read, weights, ", ".join(texts)), low=min(read), high=max(read))
 
 
 _KINDS: dict[str, tuple[tuple[str, ...], Callable[[_Entry], Distribution]]] = {
@@ -198,5 +226,7 @@ _KINDS: dict[str, tuple[tuple[str, ...], Callable[[_Entry], Distribution]]] = {
     "normal": (("mean", "sd", "low", "high"), _normal),
     "log-normal": (("median", "sd"), _lognormal),
     "triangular": (("low", "mode", "high"), _triangular),
-    "discrete": (("values", "weights"), _discrete),
+    DISCRETE: (KEYS, _discrete),
 }
+ENTRY_KEYS = frozenset({"kind", "together"}).union(*(keys for keys, _ in _KINDS.values()))
+"""all keys that a section of a quantity may have"""
