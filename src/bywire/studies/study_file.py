@@ -10,7 +10,7 @@ from typing import Any
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
-from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
+from bywire.core.errors import InputError, ParameterError, quoted, unknown_of_few
 from bywire.data.toml_file import read_toml
 from bywire.studies.demand_section import read_demands
 from bywire.studies.design_rules import require_agreement
@@ -52,9 +52,7 @@ def read_study(
 def _plan(
     content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]
 ) -> StudyPlan:
-    for key in content:
-        if key not in _KEYS:
-            raise unknown_name("key of a study file", key, _KEYS)
+    _require_known(content)
     for key in ("vary", "measured", "design", "set", "requirements"):
         if not isinstance(content.get(key, {}), Mapping):
             raise ParameterError(f"[{key}] must be a section with key = value lines")
@@ -77,15 +75,29 @@ def _plan(
     return plan
 
 
+def _require_known(content: Mapping[str, Any]) -> None:
+    """Refuse what no study file has, and say where that of a bench belongs."""
+    for key in content:
+        if key in bench_file.SECTIONS and key not in _KEYS:
+            raise ParameterError(
+                f"[{key}] is of the bench, not of a study: write it into the bench file, or change "
+                f"single values in [set], as \"{key}.NAME\" = \"VALUE\"; a study file has "
+                f"{', '.join(_KEYS)}"
+            )
+        if key not in _KEYS:
+            raise unknown_of_few("key of a study file", key, _KEYS)
+
+
 def read_bench(
     content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
 ) -> Bench:
     """Return the bench that a file names, with the changes of its ``[set]`` and further ones."""
     source = content.get("bench")
     if not isinstance(source, str) or not source.strip():
+        said = f"bench = {quoted(source)}" if "bench" in content else "bench is missing"
         raise ParameterError(
-            f"bench = {quoted(source)}: name a bench file (its path starts at the study file's "
-            "folder), or an experiment of 'bywire list'"
+            f"{said}: write bench = \"...\", a bench file (its path starts at this file's folder), "
+            "or an experiment of 'bywire list'"
         )
     changes = bench_file.flattened(content.get("set", {}))
     there = source if bench_file.names_experiment(source) else folder / source
