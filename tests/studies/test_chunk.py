@@ -24,6 +24,12 @@ parameters = "dardanelli2010"
 duration = "40 ms"
 settle = "10 ms"
 """
+CORNER = """
+experiment = "corner-stop"
+parameters = "roberts2003-corner"
+[options]
+v_0 = "10 km/h"
+"""
 OPEN_LOOP = """
 experiment = "open-loop"
 parameters = "dardanelli2010"
@@ -66,19 +72,21 @@ def test_cases_of_several_structures_run_in_groups(study, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("bench", "name", "values"),
+    ("bench", "name", "values", "other"),
     [
-        (RELEASE, "options.how", ["controlled", "current-off"]),
-        (OPEN_LOOP, "options.add_holding", ["false", "true"]),
+        (RELEASE, "options.how", ["controlled", "current-off"], "motor.R_m"),
+        (OPEN_LOOP, "options.add_holding", ["false", "true"], "motor.R_m"),
+        (CORNER, "options.surface", ["dry-asphalt", "ice"], "options.v_0"),
     ],
+    ids=["release", "open-loop", "corner"],
 )
 def test_key_figures_of_choices_among_the_options_are_those_of_single_runs(
-    study, monkeypatch, bench, name, values
+    study, monkeypatch, bench, name, values, other
 ):
     monkeypatch.setattr("bywire.studies.plan.CHUNK", 8)
     text = ", ".join(values if "true" in values else map(repr, values))
     plan = read_study(study(f'[vary]\n"{name}" = {{ values = [{text}] }}\n'
-                            '"motor.R_m" = "+-5 %"\n', bench))  # fmt: skip
+                            f'"{other}" = "+-5 %"\n', bench))  # fmt: skip
     columns = computed_chunk(plan, 0)
     assert sorted({*columns[name]}) == values
     assert not any(columns["failure"])
