@@ -224,7 +224,7 @@ def test_a_bench_file_of_any_brake_and_its_text(tmp_path: Any) -> None:
     path.write_text(
         f'experiment = "step"\nparameters = "{SET}"\n[options]\ninput = "F_set"\nend = 150\n'
     )
-    with pytest.raises(UnitError, match="end = '150' has the wrong unit"):
+    with pytest.raises(UnitError, match="end = 150 has the wrong unit"):
         bywire.load(path)
 
 

@@ -63,6 +63,22 @@ def test_a_bench_file_says_what_failed_and_what_it_cannot_do(
             "rotor", "only shapes simulated")  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("given", "texts"),
+    [
+        ("F_set", ("unknown stimulus 'F_set'", "did you mean 'v_set'", "Known are p_set, ")),
+        ("frequency=p_mc", ("unknown stimulus 'frequency': known are p_set, pedal_force, i_set",)),
+        ("p_set=", ("--input p_set=: write STIMULUS=SIGNAL", "p_set=p_ref")),
+    ],
+)
+def test_an_input_that_is_none_is_refused_with_those_that_are(
+    bywire: Bywire, given: str, texts: tuple[str, ...]
+) -> None:
+    asked = ("--bench", "hard-braking", "--output", "p_mc", "--unknown", "motor.R_m")
+    outcome = bywire("identify", "output-error", *asked, "--synthetic", "1", "--input", given)
+    refused(outcome, *texts)
+
+
 def test_options_that_only_simulate_are_options() -> None:
     for method in METHODS.all().values():
         assert set(method.simulated) <= set(method.options.model_fields), method.name

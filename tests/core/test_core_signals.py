@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from datetime import date, datetime
 from typing import Annotated, Any, NamedTuple, get_args
 
 import pytest
@@ -139,8 +140,13 @@ def test_unknown_name(name, known, text):
         (10**999, "a number of 300 digits or more"),
         ([10**9999], "a list"),
         (None, "None"),
+        (True, "true"),
+        (date(2010, 5, 27), "2010-05-27"),
+        ([datetime(2010, 5, 27, 12, 30)], "[2010-05-27T12:30:00]"),
+        ({"kind": "normal", "a b": [False, 0.5]}, "{ kind = 'normal', 'a b' = [false, 0.5] }"),
+        ({}, "{}"),
     ],
-    ids=range(8),
+    ids=range(13),
 )
 def test_quoted(value, text):
     assert quoted(value) == text

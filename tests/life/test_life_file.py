@@ -70,7 +70,7 @@ def test_stops_that_differ_in_pauses_alone_are_simulated_once(plan_of):
         ('life = "wedge-pads"\n[vary]\n"stop.paus" = "+-5 %"', r"did you mean 'stop.pause'"),
         ('life = "wedge-pads"\n[vary]\n"caliper.clearance" = "+-5 %"', r"follows from what wears"),
         ('life = "wedge-pads"\n[vary]\n"caliper.law".kind = "discrete"\n'
-         '"caliper.law".values = ["linear"]', r"is a choice"),
+         '"caliper.law".values = ["linear", "table"]', r"is a choice"),
         ('life = "wedge-pads"\n[projection]\nstop = 3', r"did you mean 'stops'"),
         ('life = "wedge-pads"\n[projection]\nstops = 1', r"whole number from 2 to 4096"),
         ('life = "wedge-pads"\n[projection]\nstops = 2.5', r"whole number"),

@@ -3,17 +3,45 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bywire.bench import running
 from bywire.core.errors import DeviceError, RunError
+from bywire.core.parameters import ParameterSet
 from bywire.studies import chunk as chunks
 from bywire.studies.chunk import case_bench, computed_chunk
 from bywire.studies.executor import InProcess
 from bywire.studies.study_file import read_study
 from emulated_driver import EmulatedDriver, Status, emulated
+
+RELEASE = """
+experiment = "release"
+parameters = "dardanelli2010"
+[options]
+duration = "40 ms"
+settle = "10 ms"
+"""
+CORNER = """
+experiment = "corner-stop"
+parameters = "roberts2003-corner"
+[options]
+v_0 = "10 km/h"
+"""
+OPEN_LOOP = """
+experiment = "open-loop"
+parameters = "dardanelli2010"
+[options]
+duration = "40 ms"
+p_start = "5 bar"
+[stimulus]
+kind = "step"
+start = "0 A"
+end = "2 A"
+t_step = "0 s"
+"""
 
 
 @pytest.fixture
@@ -41,6 +69,42 @@ def test_cases_of_several_structures_run_in_groups(study, monkeypatch):
     columns = computed_chunk(plan, 0)
     assert {*columns["adc.law"]} == {"ideal", "quantized"}
     assert np.isfinite(columns["peak_current"]).all()
+
+
+@pytest.mark.parametrize(
+    ("bench", "name", "values", "other"),
+    [
+        (RELEASE, "options.how", ["controlled", "current-off"], "motor.R_m"),
+        (OPEN_LOOP, "options.add_holding", ["false", "true"], "motor.R_m"),
+        (CORNER, "options.surface", ["dry-asphalt", "ice"], "options.v_0"),
+    ],
+    ids=["release", "open-loop", "corner"],
+)
+def test_key_figures_of_choices_among_the_options_are_those_of_single_runs(
+    study, monkeypatch, bench, name, values, other
+):
+    monkeypatch.setattr("bywire.studies.plan.CHUNK", 8)
+    text = ", ".join(values if "true" in values else map(repr, values))
+    plan = read_study(study(f'[vary]\n"{name}" = {{ values = [{text}] }}\n'
+                            f'"{other}" = "+-5 %"\n', bench))  # fmt: skip
+    columns = computed_chunk(plan, 0)
+    assert sorted({*columns[name]}) == values
+    assert not any(columns["failure"])
+    for k in range(8):
+        case = {each: column[k] for each, column in plan.values(0).items()}
+        for kpi in running.run(case_bench(plan, k, case)).kpis:
+            assert columns[kpi.name][k] == pytest.approx(kpi.value, rel=1e-9, nan_ok=True)
+
+
+def test_choices_of_one_name_in_parameters_and_options_tell_cases_apart():
+    class Chosen(ParameterSet):
+        law: str
+
+    def bench(par, option):
+        return SimpleNamespace(par=Chosen(law=par), chosen_options=Chosen(law=option))
+
+    benches = {0: bench("a", "b"), 1: bench("b", "b"), 2: bench("a", "b"), 3: bench("a", "a")}
+    assert chunks._alike(benches) == [[0, 2], [1], [3]]
 
 
 def test_a_case_that_fails_fails_alone(plan, monkeypatch):

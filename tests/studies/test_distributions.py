@@ -10,7 +10,8 @@ import pytest
 from bywire.core.errors import InputError
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
-from bywire.studies.distribution import read_choice, read_distribution
+from bywire.studies.distribution_section import read_distribution
+from bywire.studies.single_values import read_choice
 
 LEAF = Leaf("motor.R_m", Unit("ohm"), 0.0, 10.0, True, False)
 MIDDLES = (np.arange(200_000) + 0.5) / 200_000
@@ -58,11 +59,32 @@ def test_a_normal_tolerance_ends_where_it_says():
     ("entry", "texts"),
     [
         ({"kind": "normal", "sd": "50 %"}, ["> 0 ohm", "probability of 0.023", "'low'"]),
-        ({"kind": "uniform", "low": "-1 ohm", "high": "1 ohm"}, ["leaves what is admissible"]),
-        ({"kind": "discrete", "values": ["0 ohm", "1 ohm"]}, ["leaves what is admissible"]),
+        ({"kind": "uniform", "low": "-1 ohm", "high": "1 ohm"},
+         ["leaves what is admissible", "give 'low' and 'high' within it"]),
+        ({"kind": "triangular", "low": "-1 ohm", "high": "1 ohm"},
+         ["leaves what is admissible", "'low', 'mode' and 'high'"]),
+        ({"kind": "log-normal", "sd": "900 %"}, ["leaves what is admissible", "smaller 'sd'"]),
+        ("+-200 %", ["leaves what is admissible", "narrower tolerance"]),
+        ({"kind": "discrete", "values": ["0 ohm", "1 ohm"]},
+         ["leaves what is admissible", "leave out 0 ohm"]),
+        ("+-100 %", ["its end at 0 ohm is not admissible", "> 0 ohm and <= 10 ohm"]),
+        ({"kind": "tolerance", "tolerance": "100 %", "shape": "normal"}, ["its end at 0 ohm"]),
+        ({"kind": "uniform", "low": "0 ohm", "high": "1 ohm"}, ["its end at 0 ohm"]),
+        ({"kind": "triangular", "low": "-100 %", "high": "1 ohm"}, ["its end at 0 ohm"]),
+        ({"kind": "uniform", "low": "1 ohm", "high": "1 ohm"}, ["must be below"]),
+        ({"kind": "discrete", "values": [0.3, 0.4]}, ["motor.R_m.values = 0.3 has"]),
+        ("+- 1e-18 %", ["no wider than the last digit"]),
+        ({"kind": "normal", "sd": "1e-18 %"}, ["no wider than the last digit"]),
+        ({"kind": "log-normal", "sd": "1e-18 %"}, ["no wider than the last digit"]),
+        ({"kind": "discrete", "values": ["0.3 ohm"]}, ["one value alone, 0.3 ohm"]),
+        ({"kind": "discrete", "values": ["0.3 ohm", "1 ohm", "300 mohm"]},
+         ["0.3 ohm stands there twice", "weights"]),
+        ({"sd": "5 %"}, ["{ sd = '5 %' }: kind is missing", "'normal' or 'log-normal'"]),
+        ({"kind": ["normal"], "sd": "5 %"}, ["unknown kind", "'normal'"]),
+        ({"kind": "normal", "sd": True}, ["sd = true: one number"]),
         ({"kind": "uniform", "low": "0.5 ohm", "high": "0.4 ohm"}, ["must be below"]),
         ({"kind": "uniform", "low": "0.5 ohm"}, ["needs 'high'"]),
-        ({"kind": "uniform", "low": 0.3, "high": "0.4 ohm"}, ["low = '0.3'", "ohm"]),
+        ({"kind": "uniform", "low": 0.3, "high": "0.4 ohm"}, ["low = 0.3 has", "ohm"]),
         ({"kind": "normal", "sd": "5 V"}, ["wrong unit"]),
         ({"kind": "normal", "sd": "0 %"}, ["width > 0"]),
         ({"kind": "normal", "sigma": "5 %"}, ["'sigma'", "sd"]),
@@ -80,6 +102,20 @@ def test_what_is_wrong_is_said(entry, texts):
         read(entry)
     for text in ("[vary] motor.R_m", *texts):
         assert text in str(refused.value)
+
+
+def test_ends_reach_a_limit_that_is_admissible_though_rounding_misses_it():
+    made = read("+-0.2 ohm", nominal=0.1, leaf=Leaf("x", Unit("ohm"), -1.0, 0.3, False, False))
+    assert 0.1 + 0.2 > 0.3
+    assert (made.high, made.levels(2)[-1]) == (0.3, 0.3)
+
+
+@pytest.mark.parametrize("low", ["0 ohm", "-100 %"])
+def test_what_is_truncated_at_a_limit_that_is_not_admissible_has_levels_within(low):
+    made = read({"kind": "normal", "sd": "50 %", "low": low, "high": "10 ohm"})
+    first, last = made.levels(2)
+    assert 0.0 < first < 0.01
+    assert (made.low, made.high, last) == (-math.inf, 10.0, 10.0)
 
 
 def test_a_share_of_zero_needs_an_amount():

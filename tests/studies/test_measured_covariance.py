@@ -53,11 +53,13 @@ def test_estimates_come_back_as_they_were(study, written):
 
 def test_some_of_them_and_cut_off(study, written):
     written(estimate(value=0.02))
-    with pytest.raises(InputError, match="leaves what is admissible"):
+    refused = r"\[measured\] motor.R_m: .* leaves what is admissible.*truncate = true"
+    with pytest.raises(InputError, match=refused):
         read_study(study('[measured]\nfile = "id"\n'))
     plan = read_study(study('[measured]\nfile = "id/estimate.json"\nof = ["motor.R_m"]\n'
                             "truncate = true\n"))  # fmt: skip
-    assert plan.varied[0].distribution.low == 0.0
+    assert "truncated: 0 ohm to any" in plan.varied[0].distribution.text
+    assert 0.0 < plan.varied[0].distribution.levels(2)[0] < 0.001
     assert plan.correlations == {}
 
 
@@ -88,7 +90,8 @@ def test_what_is_no_estimate_is_said(study, written, content, text):
         ('file = "id"\nof = []', "name some of them"),
         ('file = "id"\ntruncate = "yes"', "true or false"),
         ('file = "id"\nonly = ["motor.R_m"]', "'only'"),
-        ('file = "id"\n[vary]\n"motor.K_e" = "+-5 %"', "motor.K_e varies twice"),
+        ('file = "id"\n[vary]\n"motor.K_e" = "+-5 %"',
+         r"motor.K_e varies twice, by \[measured\] and by \[vary\]"),
         ('file = "id"\n[[correlation]]\nof = ["motor.K_e", "motor.R_m"]\nvalue = 0.1',
          "stands there twice"),
     ],

@@ -11,7 +11,7 @@ from bywire.core.errors import ParameterError
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
 from bywire.studies.correlation import correlation_factor
-from bywire.studies.distribution import read_distribution
+from bywire.studies.distribution_section import read_distribution
 from bywire.studies.points import SAMPLED, Sampled, spanned
 
 LEAF = Leaf("x", Unit("m"), -np.inf, np.inf, False, False)

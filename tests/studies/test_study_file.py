@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 
@@ -10,6 +11,17 @@ import pytest
 
 from bywire.core.errors import InputError
 from bywire.studies.study_file import read_study
+
+RELEASE = 'experiment = "release"\nparameters = "dardanelli2010"\n'
+OPEN_LOOP = """
+experiment = "open-loop"
+parameters = "dardanelli2010"
+[stimulus]
+kind = "step"
+start = "0 A"
+end = "2 A"
+t_step = "0 s"
+"""
 
 
 def test_a_study_says_what_varies_and_how(study):
@@ -54,7 +66,28 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
         ("", ["[vary] is empty", "motor.R_m"]),
         ('[vary]\n"motor.R_x" = "+-5 %"', ["'motor.R_x'", "'motor.R_m'"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n"motor.K_e" = { kind = "normal", sd = "1 %", '
-         'together = ["motor.R_m"] }', ["motor.R_m varies twice"]),
+         'together = ["motor.R_m"] }', ["motor.R_m varies twice", "[vary] motor.K_e.together"]),
+        ('[vary]\nmotor.R_m = "+-1 %"\n"motor.R_m" = "+-5 %"',
+         ["motor.R_m varies twice", '"motor.R_m" in quotation marks']),
+        ('[vary.motor]\nR_m = "+-1 %"\n[vary.motor.K_e]\nsd = "1 %"',
+         ["[vary] motor.K_e = { sd = '1 %' }: kind is missing"]),
+        ('[vary]\n"motor.K_e" = "+-1 %"\n[set]\nmotor.R_m = "1 ohm"\n"motor.R_m" = "2 ohm"',
+         ["motor.R_m has two values"]),
+        ('[vary]\n"motor.R_m" = { sd = "5 %" }',
+         ["kind is missing", "'normal' or 'log-normal'", "triangular"]),
+        ('[vary]\nmotor.R_m.sd = "5 %"', ["[vary] motor.R_m = { sd = '5 %' }: kind is missing"]),
+        ('[vary]\nmotor.R_x = { sd = "5 %" }', ["unknown", "'motor.R_x'", "'motor.R_m'"]),
+        ('[vary]\nmoter.R_m = "+-5 %"', ["'moter.R_m'", "'motor.R_m'"]),
+        ('[vary]\nmotor = { R_m = 5 }', ["[vary] motor.R_m = 5: write a tolerance"]),
+        ('[vary]\n"motor.K_e" = { kind = "normal", sd = "1 %", together = [["a"]] }',
+         ["varies together", '"[\'a\']"']),
+        ('[vary]\n"motor.K_e" = { kind = "normal", sd = "1 %", '
+         'together = ["ecu.pedal_map.V_nodes"] }', ["ecu.pedal_map.V_nodes is a table"]),
+        ('[vary]\n"seal.T_pr" = { kind = "tolerance", tolerance = "100 %", '
+         'together = ["motor.R_m"] }',
+         ["[vary] seal.T_pr.together motor.R_m", "its end at 0", "must be > 0"]),
+        ('[vary]\n"motor.R_m" = "+-100 %"',
+         ["its end at 0 ohm is not admissible", "> 0 ohm", "narrower tolerance"]),
         ('[vary]\n"motor.K_e" = { kind = "normal", sd = "1 %", together = ["ecu.K"] }',
          ["varies together", "'ecu.K'"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\ncases = 0', ["cases = 0", "from 1"]),
@@ -68,6 +101,23 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
          ["overshoot", "percent"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nkind = "corners"\n[requirements]\n'
          'overshoot = "<= 15 % with 90 %"', ["draws nothing", "'monte-carlo'"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 10 % with 0.9"',
+         ["overshoot = '<= 10 % with 0.9'", "behind 'with' stands '0.9'", "'with 90 %'"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 10 % with lots"',
+         ["behind 'with' stands 'lots'", "in percent", "'with 99 %'"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 10 % with"',
+         ["behind 'with' stands ''"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 10 % with 9x %"',
+         ["behind 'with' stands '9x %'"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "15 % with 90 %"',
+         ["overshoot = '15 %' cannot be read"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nvalue = 0.5', ["of is missing"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nof = [["a"], "b"]\nvalue = 0.5',
+         ["quantity of [[correlation]]"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[simulation]\nstep = "10 us"',
+         ["[simulation] is of the bench", "[set]", "requirements"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[simulatoin]\nstep = "10 us"',
+         ["'simulatoin': known are name, bench, vary"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nof = ["motor.R_m", "motor.K_e"]\n'
          "value = 0.5", ["'motor.K_e'", "correlation"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n"motor.K_e" = "+-5 %"\n[[correlation]]\n'
@@ -76,6 +126,12 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nlevels = 3', ["levels", "'monte-carlo'"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nkind = "grid"\ncases = 9', ["'grid' lists"]),
         ('[vary]\n"friction.law" = { values = ["dry"] }', ["friction.law"]),
+        ('[vary]\n"adc.law" = { values = ["ideal"] }', ["one value alone, ideal", "[set]"]),
+        ('[vary]\n"adc.law" = { values = ["ideal", "ideal"] }', ["ideal stands there twice"]),
+        ('[vary]\n"adc.law" = { values = ["ideal", "quantized"], weigths = [1, 2] }',
+         ["'weigths'", "'weights'"]),
+        ('[vary]\n"adc.law" = { kind = "normal", values = ["ideal", "quantized"] }',
+         ["adc.law is a choice", "'discrete'", "'normal'"]),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_with_the_files_name(study, text, texts):
@@ -86,11 +142,79 @@ def test_what_is_wrong_is_said_with_the_files_name(study, text, texts):
         assert each in str(refused.value)
 
 
-@pytest.mark.parametrize("line", ["bench = 3", "", 'bench = "none.toml"'])
-def test_a_study_needs_a_bench(tmp_path, line):
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('"options.how" = { values = ["controlled", "curent-off"] }', "'current-off'"),
+        ('"options.hwo" = { values = ["controlled", "current-off"] }', "'options.how'"),
+        ('"options.how" = "+-5 %"', "a choice varies among values"),
+        ('"options.how" = { values = ["current-off"] }', "one value alone"),
+        ('"options.how" = { values = ["controlled", "current-off"], together = ["motor.R_m"] }',
+         "nothing varies by its ratio"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_choice_among_the_options_is_said(study, text, said):
+    with pytest.raises(InputError, match=re.escape(said)):
+        read_study(study(f"[vary]\n{text}\n", RELEASE))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('"options.source" = { values = ["current", "voltage"] }', "A cannot be V"),
+        ('"options.source" = { values = ["current", "current-loop"] }', "(share_sat_current, "),
+        ('"options.add_holding" = { values = [true, 1] }', "known are false, true"),
+    ],
+)
+def test_an_option_that_makes_it_another_experiment_does_not_vary(study, text, said):
+    with pytest.raises(InputError, match=re.escape(said)):
+        read_study(study(f"[vary]\n{text}\n", OPEN_LOOP))
+
+
+def test_an_option_that_names_a_file_or_a_signal_does_not_vary(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text('bench = "pedal-tracking"\n[vary]\n"options.trace" = { values = ["a", "b"] }')
+    with pytest.raises(InputError, match="names a signal or a file"):
+        read_study(path)
+
+
+@pytest.mark.parametrize(
+    ("kind", "library"),
+    [("corners", ""), ("one-at-a-time", ""), ("grid", ""), ("sobol", ""), ("morris", "SALib"),
+     ("sobol-indices", "SALib")],
+)  # fmt: skip
+def test_designs_visit_the_choices_of_an_option(study, kind, library):
+    if library:
+        pytest.importorskip(library)
+    plan = read_study(study(
+        '[vary]\n"options.how" = { values = ["controlled", "current-off"] }\n'
+        '"motor.R_m" = "+-5 %"\n'
+        f'[design]\nkind = "{kind}"\n', RELEASE))  # fmt: skip
+    assert {*plan.values(0)["options.how"].tolist()} == {"controlled", "current-off"}
+    assert (plan.varied[0].nominal, plan.varied[0].unit) == ("controlled", "")
+
+
+def test_rare_values_are_levels_too(study):
+    plan = read_study(study(
+        '[vary]\n"adc.law" = { values = ["ideal", "quantized"], weights = [1, 100000] }\n'
+        '[design]\nkind = "grid"\n'))  # fmt: skip
+    assert plan.values(0)["adc.law"].tolist() == ["quantized", "ideal", "quantized"]
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("bench = 3", "bench = 3:"),
+        ("bench = true", "bench = true:"),
+        ("bench = 2010-05-27", "bench = 2010-05-27:"),
+        ("", "bench is missing"),
+        ('bench = "none.toml"', "none.toml"),
+    ],
+)
+def test_a_study_needs_a_bench(tmp_path, line, said):
     path = tmp_path / "study.toml"
     path.write_text(f'{line}\n[vary]\n"motor.R_m" = "+-5 %"\n')
-    with pytest.raises(InputError, match="bench"):
+    with pytest.raises(InputError, match=said):
         read_study(path)
 
 

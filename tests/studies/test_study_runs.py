@@ -193,6 +193,25 @@ def test_who_computes_is_chosen_by_the_work(monkeypatch):
             executor_of(workers, cluster, 1000, engine="cuda")
 
 
+def test_a_choice_among_the_options_varies_from_the_file_to_the_worst_bench(study, tmp_path):
+    bench = ('experiment = "release"\nparameters = "dardanelli2010"\n[options]\n'
+             'duration = "40 ms"\nsettle = "10 ms"\n')  # fmt: skip
+    found = bywire.run_study(study(
+        '[vary]\n"options.how" = { values = ["controlled", "current-off"] }\n'
+        '"motor.R_m" = "+-5 %"\n[design]\nkind = "corners"\n[requirements]\n'
+        'peak_current = "<= 1 A"\n', bench), tmp_path / "out", workers=1)  # fmt: skip
+    assert found.cases["options.how"].tolist() == ["controlled"] * 3 + ["current-off"] * 2
+    with undrawn():
+        found.write(tmp_path / "out")
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "one of controlled, current-off" in page
+    written = bywire.load(tmp_path / "out" / "worst-peak_current.toml")
+    assert written.options["how"] == "controlled"
+    (kpi,) = (k for k in bywire.run(written).kpis if k.name == "peak_current")
+    assert kpi.value == pytest.approx(found.cases["peak_current"].max(), rel=1e-9)
+    assert found.cases["peak_current"].max() > 2.0 * found.cases["peak_current"].min()
+
+
 def test_more_cases_extend_a_study_and_requirements_may_change(study, tmp_path):
     path, out = study(), tmp_path / "out"
     first = bywire.run_study(path, out, cases=64)

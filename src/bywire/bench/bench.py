@@ -256,6 +256,8 @@ class Bench:
         known |= self._shared
         known["overrides"] = {**self.overrides, **overrides}
         known["options"] = {**self.options, **options}
+        if any(isinstance(value, (str, bool)) for value in options.values()):
+            known.pop("chosen_stimuli")  # a choice may say what is driven, and in which unit
         known["seed"] = self.seed if seed is None else seed
         known["par"] = par = self.par.replace(overrides)
         following = self.definition.following

@@ -24,7 +24,8 @@ from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.data.toml_file import read_toml
 
-_SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
+SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
+"""what a bench file has beside single keys"""
 _KEYS = ("experiment", "parameters", "assembly", "name")
 _FAULTS = "faults"
 _SIMULATION = ("step", "record", "seed", "engine")
@@ -76,7 +77,7 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
     )
     relative = {
         name: value for name, value in changes.items()
-        if is_relative(name, value) and name.partition(".")[0] not in _SECTIONS
+        if is_relative(name, value) and name.partition(".")[0] not in SECTIONS
     }  # fmt: skip
     try:
         _require_shape(content)
@@ -122,13 +123,25 @@ def _located(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return nested sections as dotted names."""
+    """Return nested sections as dotted names.
+
+    Raises
+    ------
+    ParameterError
+        For a name that is written in two ways, ``motor.R_m`` and ``"motor.R_m"``.
+    """
     flat: dict[str, Any] = {}
     for key, value in tree.items():
-        if isinstance(value, Mapping):
-            flat |= flattened(value, f"{prefix}{key}.")
-        else:
-            flat[f"{prefix}{key}"] = value
+        name = f"{prefix}{key}"
+        for each, leaf in (
+            flattened(value, f"{name}.") if isinstance(value, Mapping) else {name: value}
+        ).items():
+            if each in flat:
+                raise ParameterError(
+                    f"{each} has two values, by {each} and by \"{each}\" in quotation marks: leave "
+                    "one of both out"
+                )
+            flat[each] = leaf
     return flat
 
 
@@ -183,9 +196,9 @@ def _printable(name: str) -> str:
 def _require_shape(content: Mapping[str, Any]) -> None:
     """Refuse unknown keys, and texts and sections that are something else."""
     for key in content:
-        if key not in (*_KEYS, *_SECTIONS, _FAULTS):
-            raise unknown_name("key", key, (*_KEYS, *_SECTIONS, _FAULTS))
-    for section in _SECTIONS:
+        if key not in (*_KEYS, *SECTIONS, _FAULTS):
+            raise unknown_name("key", key, (*_KEYS, *SECTIONS, _FAULTS))
+    for section in SECTIONS:
         if not isinstance(content.get(section, {}), Mapping):
             raise ParameterError(f"[{section}] must be a section with key = value lines")
     for key in _KEYS:
@@ -236,17 +249,19 @@ def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str
     changed = {k: dict(v) if isinstance(v, Mapping) else v for k, v in content.items()}
     for name, value in changes.items():
         section, _, key = name.partition(".")
-        near = get_close_matches(section, _SECTIONS, n=1, cutoff=0.8)
+        near = get_close_matches(section, SECTIONS, n=1, cutoff=0.8)
         if section == "stimulus" and "." in key:
             signal, _, field = key.partition(".")
             known = changed.setdefault(section, {})
             below = known.get(signal, {})
             known[signal] = {**(below if isinstance(below, Mapping) else {}), field: value}
-        elif section in _SECTIONS and key:
+        elif section == "options" and key:
+            changed[section] = {**flattened(changed.get(section, {})), key: value}
+        elif section in SECTIONS and key:
             changed.setdefault(section, {})[key] = value
         elif near and key:
-            raise unknown_name("section", section, _SECTIONS)
-        elif name in _SECTIONS:
+            raise unknown_name("section", section, SECTIONS)
+        elif name in SECTIONS:
             raise ParameterError(f"{name} is a section: write {name}.NAME=VALUE")
         elif section == _FAULTS:
             raise ParameterError("faults are put in by --fault NAME=VALUE@ONSET, not by --set")

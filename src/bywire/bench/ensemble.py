@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import NamedTuple, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 import xarray as xr
@@ -17,16 +17,15 @@ from bywire.bench.result import Result
 from bywire.bench.running import Progress, judged, recording_of, static_recordings
 from bywire.bench.side_by_side import rounds
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, unestimated
+from bywire.bench.varied_choices import OPTION, choices_that_vary
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.leaf import Leaf
-from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
+from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.typing import Array
 from bywire.simulation import ensemble
 from bywire.simulation.ensemble import Ensemble
 from bywire.simulation.run import Run
 from bywire.simulation.variations import Variations
-
-_OPTION = "options."
 
 
 @dataclass(frozen=True)
@@ -156,7 +155,7 @@ def _varied_leaf(of: type[ParameterSet], chosen: type[ParameterSet], name: str) 
     parameters = leaf_fields(of)
     if name in parameters:
         return parameters[name]
-    known = {f"{_OPTION}{option}": leaf for option, leaf in leaf_fields(chosen).items()}
+    known = {f"{OPTION}{option}": leaf for option, leaf in leaf_fields(chosen).items()}
     if name not in known:
         raise unknown_name("parameter or option to vary", name, {**parameters, **known})
     return known[name]
@@ -168,6 +167,8 @@ class _Names(NamedTuple):
     parameters: tuple[str, ...]
     options: tuple[tuple[str, str], ...]
     """each with its name among the options"""
+    switches: frozenset[str]
+    """those that are true or false"""
 
 
 @lru_cache(maxsize=64)  # the cases of a study all change the same
@@ -175,12 +176,13 @@ def _names_within(
     of: type[ParameterSet], chosen: type[ParameterSet], names: tuple[str, ...]
 ) -> _Names:
     """Return which names are of parameters and which of options, or refuse one that is of none."""
-    choices = choice_fields(of)
+    choices = choices_that_vary(of, chosen)
     for name in names:
         if name not in choices:
             _varied_leaf(of, chosen, name)
-    options = tuple((n, n.removeprefix(_OPTION)) for n in names if n.startswith(_OPTION))
-    return _Names(tuple(n for n in names if not n.startswith(_OPTION)), options)
+    options = tuple((n, n.removeprefix(OPTION)) for n in names if n.startswith(OPTION))
+    switches = frozenset(n for n in names if choices.get(n) == (False, True))
+    return _Names(tuple(n for n in names if not n.startswith(OPTION)), options, switches)
 
 
 def changed(
@@ -188,14 +190,19 @@ def changed(
 ) -> Bench:
     """Return a bench with other parameters, choices and options [SI], and noise of another seed.
 
+    What is true or false is a text, ``"true"`` or ``"false"``, as other choices are.
+
     Raises
     ------
     InputError
         When one is unknown or out of range, or contradicts another; the values are named.
     """
     names = _names_within(type(bench.par), type(bench.chosen_options), tuple(values))
-    overrides = {name: values[name] for name in names.parameters}
-    options = {within: values[name] for name, within in names.options}
+    plain: Mapping[str, Any] = values
+    if names.switches:
+        plain = {**values, **{name: values[name] in (True, "true") for name in names.switches}}
+    overrides = {name: plain[name] for name in names.parameters}
+    options = {within: plain[name] for name, within in names.options}
     try:
         return bench.varied(overrides, options, seed)
     except InputError as error:

@@ -123,7 +123,29 @@ def require_unit(value: Any, symbol: str, name: str, nominal: float = 1.0) -> No
     except OverflowError:  # a whole number of 309 digits or more
         return
     if is_plain:
-        units.parse(repr(value), symbol, name, nominal)
+        units.parse(plain_text(value), symbol, name, nominal)
+
+
+class _Unquoted(str):
+    """A text that errors quote without quotation marks."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def plain_text(value: float) -> str:
+    """Return a plain number of a file as a text, which errors quote as it stands there.
+
+    Texts are refused where a unit is missing, and numbers are taken as SI.
+
+    Examples
+    --------
+    >>> quoted(plain_text(37)), quoted("37")
+    ('37', "'37'")
+    """
+    return _Unquoted(repr(value))
 
 
 def _quantity(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:

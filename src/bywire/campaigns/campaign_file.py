@@ -20,10 +20,10 @@ from bywire.campaigns.plan import CampaignPlan, Failing, Reaction, evenly, touch
 from bywire.campaigns.residual import Residual, residuals_of
 from bywire.campaigns.simulating import require_small
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
-from bywire.core.parameters import choice_fields
 from bywire.core.signals import signals_of
 from bywire.data.toml_file import read_toml
-from bywire.studies.study_file import read_all_varied, read_bench
+from bywire.studies.study_file import read_bench
+from bywire.studies.vary_section import read_all_varied
 
 _KEYS = ("name", "bench", "set", "vary", "measured", "campaign", "values", "criteria", "residuals",
          "rates", "reaction")  # fmt: skip
@@ -77,7 +77,7 @@ def _plan(
     bench = read_bench(content, folder, overrides)
     case = _only_case(bench)
     varied, correlations = read_all_varied(bench, content, folder)
-    chosen = [v.name for v in varied if v.name in choice_fields(type(bench.par))]
+    chosen = [v.name for v in varied if not v.unit]
     if chosen:
         raise ParameterError(f"[vary] {chosen[0]} is a choice: in a campaign only numbers vary")
     known = modes_of(case.model, case.par)

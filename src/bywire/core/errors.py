@@ -18,13 +18,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+from datetime import date, time
 from difflib import SequenceMatcher, get_close_matches
 from typing import Any
 
 from bywire.core.callers import in_callers_words
 
 _SHOWN = 60  # characters of a value in a message
+_NEAR = 0.7  # resemblance of a name that was meant, where all are listed anyway
+_BARE_KEY = re.compile(r"[\w-]+", re.ASCII)
 
 
 class BywireError(Exception):
@@ -115,6 +119,24 @@ def unknown_name(
     return UnknownNameError(f"unknown {kind} {quoted(name)}: {hint}")
 
 
+def unknown_of_few(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
+    """Build the error for an unknown name among few: the one that is near, and all in their order.
+
+    ``kind``, ``name``, ``known``: as of `unknown_name`.
+
+    Examples
+    --------
+    >>> print(unknown_of_few("key", "desing", ["vary", "design"]))
+    unknown key 'desing': did you mean 'design'? Known are vary, design
+    >>> print(unknown_of_few("key", "frequency", ["vary", "design"]))
+    unknown key 'frequency': known are vary, design
+    """
+    every = list(known)
+    near = get_close_matches(name, every, n=1, cutoff=_NEAR)
+    meant = f"did you mean {near[0]!r}? Known" if near else "known"
+    return UnknownNameError(f"unknown {kind} {quoted(name)}: {meant} are {_shown(every)}")
+
+
 def nearest_first(names: Iterable[str], wanted: Iterable[str]) -> str:
     """Return names as an error lists them: those that resemble what is wanted first, not all.
 
@@ -132,22 +154,40 @@ def nearest_first(names: Iterable[str], wanted: Iterable[str]) -> str:
 
 
 def quoted(value: object) -> str:
-    """Return a value as an error quotes it: on one line, and cut off where it is long.
+    """Return a value as an error quotes it: as a TOML file has it, on one line, cut off where long.
 
     Examples
     --------
-    >>> quoted("9 mm"), quoted([1, 2])
-    ("'9 mm'", '[1, 2]')
+    >>> quoted("9 mm"), quoted([1, True])
+    ("'9 mm'", '[1, true]')
     """
     if isinstance(value, int) and value.bit_length() > 1000:
         return "a number of 300 digits or more"  # Python refuses to write the longest ones
     if isinstance(value, str):
         return repr(value if len(value) <= _SHOWN else f"{value[:_SHOWN]}...")
     try:
-        text = repr(value)
+        text = _as_toml(value)
     except (ValueError, RecursionError):  # such a number inside, or lists a thousand levels deep
         return f"a {type(value).__name__}"
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+
+
+def _as_toml(value: object) -> str:
+    """Return a value as a TOML file has it; what TOML has not, as Python has it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (date, time)):
+        return value.isoformat()
+    if type(value) is list:
+        return f"[{', '.join(map(_as_toml, value))}]"
+    if type(value) is dict:
+        each = (f"{_key(str(k))} = {_as_toml(v)}" for k, v in value.items())
+        return f"{{ {', '.join(each)} }}" if value else "{}"
+    return repr(value)
+
+
+def _key(name: str) -> str:
+    return name if _BARE_KEY.fullmatch(name) else repr(name)
 
 
 def _listing(candidates: list[str]) -> str:

@@ -20,6 +20,11 @@ class Leaf:
     low_open: bool
     high_open: bool
 
+    def admits(self, value: float) -> bool:
+        """Return whether a value [SI] lies in the admissible range."""
+        above = value > self.low if self.low_open else value >= self.low
+        return above and (value < self.high if self.high_open else value <= self.high)
+
     @property
     def range_text(self) -> str:
         """Admissible range as a user reads it, for instance ``> 0 ohm``."""

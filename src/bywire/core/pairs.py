@@ -6,6 +6,16 @@ from collections.abc import Iterable
 
 from bywire.core.errors import ParameterError
 
+_INPUT = ("--input", "Inputs")  # of a command, and of a form
+_CHANGE = "KEY=VALUE, for instance motor.R_m=0.4ohm"
+_FORMS = {
+    **dict.fromkeys(
+        _INPUT, "STIMULUS=SIGNAL, what drives the model and what was measured: p_set=p_ref"
+    ),
+    "--option": "NAME=VALUE, an option of the method ('bywire list METHOD')",
+    "--prior": "NAME=VALUE +- DEVIATION, for instance 'motor.R_m=0.35 +- 0.02 ohm'",
+}
+
 
 def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
     """Return what an option ``NAME`` or ``NAME=TEXT`` names, with an empty text by default.
@@ -29,6 +39,8 @@ def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
 def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
     """Return what ``--set KEY=VALUE``, or another such option, asks for.
 
+    A stimulus of ``--input`` alone is driven by the measured signal of its name.
+
     Raises
     ------
     ParameterError
@@ -37,8 +49,10 @@ def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
     values: dict[str, str] = {}
     for text in texts or ():
         key, equals, value = (part.strip() for part in text.partition("="))
+        if flag in _INPUT and not equals:
+            value = equals = key
         if not equals or not key or not value:
-            raise ParameterError(f"{flag} {text}: write KEY=VALUE, for instance motor.R_m=0.4ohm")
+            raise ParameterError(f"{flag} {text}: write {_FORMS.get(flag, _CHANGE)}")
         if key in values:
             raise ParameterError(f"{flag} {text}: {key} is set twice: leave one of them out")
         values[key] = value

@@ -179,11 +179,15 @@ def choice_fields(cls: type[ParameterSet], prefix: str = "") -> tuple[str, ...]:
 
 
 def choices_of(cls: type[ParameterSet], name: str) -> tuple[Any, ...]:
-    """Return what a structural choice of a dotted name may be; nothing where any text will do."""
+    """Return what a structural choice of a dotted name may be; nothing where any text will do.
+
+    Texts, or of a field that is true or false these two.
+    """
     *groups, last = name.split(".")
     for group in groups:
         cls = cast("type[ParameterSet]", cls.model_fields[group].annotation)
-    return typing.get_args(cls.model_fields[last].annotation)
+    annotation = cls.model_fields[last].annotation
+    return (False, True) if annotation is bool else typing.get_args(annotation)
 
 
 def require_units(cls: type[ParameterSet], prefix: str = "") -> None:

@@ -16,9 +16,9 @@ from bywire.core.units import parse
 from bywire.data.toml_file import read_toml
 from bywire.life.declaration import LIVES, Life, StopConditions
 from bywire.life.plan import CONDITION, LifePlan
-from bywire.studies.distribution import read_distribution
+from bywire.studies.distribution_section import read_distribution
 from bywire.studies.plan import Varied
-from bywire.studies.study_file import entries_of, read_varied
+from bywire.studies.vary_section import entries_of, quantities_of, read_varied
 
 _KEYS = ("name", "life", "set", "vary", "projection")
 _WEAR = "wear."
@@ -114,10 +114,10 @@ def _varied(
     bench: Bench, conditions: StopConditions, section: Mapping[str, Any]
 ) -> list[Varied]:
     """Return what varies of the bench, and of the conditions of its stops."""
-    each = dict(entries_of(section))
+    leaves = {f"{CONDITION}{k}": leaf for k, leaf in leaf_fields(StopConditions).items()}
+    each = entries_of(section, {*quantities_of(bench), *leaves})
     of_bench = {name: entry for name, entry in each.items() if not name.startswith(CONDITION)}
     varied = list(read_varied(bench, of_bench))
-    leaves = {f"{CONDITION}{k}": leaf for k, leaf in leaf_fields(StopConditions).items()}
     for name, entry in each.items():
         if name in of_bench:
             continue

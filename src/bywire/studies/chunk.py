@@ -162,8 +162,8 @@ def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:
     """Return cases in groups that differ in numbers alone, so that they run side by side."""
     groups: dict[tuple[Any, ...], list[int]] = {}
     for k, bench in benches.items():
-        chosen = {**bench.par.choices(), **bench.chosen_options.choices()}
-        groups.setdefault(tuple(chosen.items()), []).append(k)
+        each = (bench.par.choices(), bench.chosen_options.choices())  # names may be in both
+        groups.setdefault(tuple(tuple(chosen.items()) for chosen in each), []).append(k)
     return list(groups.values())
 
 

@@ -15,13 +15,14 @@ import numpy as np
 from bywire.bench.bench import Bench
 from bywire.core.errors import FileError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import leaf_fields
-from bywire.studies.distribution import read_distribution
+from bywire.studies.distribution_section import read_distribution
 from bywire.studies.plan import Varied
 
 ESTIMATE = "estimate.json"
 """file of an identification's folder that holds its estimates"""
 _KEYS = ("file", "of", "truncate")
 _LARGEST = 20_000_000  # bytes of a file that is read
+_TRUNCATE = "cut it off, with truncate = true"
 _WEAK = 1e-9  # correlation that counts as none
 
 
@@ -89,8 +90,9 @@ def varied_as_measured(
             raise unknown_name("key of [measured]", key, _KEYS)
     file, truncate = section.get("file"), section.get("truncate", False)
     if not isinstance(file, str) or not file.strip():
+        said = f"file = {quoted(file)}" if "file" in section else "file is missing"
         raise ParameterError(
-            f"[measured] file = {quoted(file)}: name the folder that 'bywire identify --out' has "
+            f"[measured] {said}: name the folder that 'bywire identify --out' has "
             "written"
         )
     if not isinstance(truncate, bool):
@@ -114,7 +116,7 @@ def varied_as_measured(
         ends = {"low": leaf.low, "high": leaf.high} if truncate else {}
         entry |= {key: f"{x!r} {leaf.unit.symbol}" for key, x in ends.items() if math.isfinite(x)}
         nominal = float(values[name])
-        law = read_distribution(name, entry, leaf, nominal)
+        law = read_distribution(name, entry, leaf, nominal, "[measured]", _TRUNCATE)
         varied.append(Varied(name, leaf.unit.symbol, nominal, law))
     return tuple(varied), dict(chosen.correlations)
 

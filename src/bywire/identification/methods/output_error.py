@@ -11,7 +11,7 @@ import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case, as_run
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, unknown_name, unknown_of_few
 from bywire.core.signals import Signal, signals_of
 from bywire.identification.fitting.bench_fit import BenchFit
 from bywire.identification.fitting.output_noise import noise_given
@@ -145,14 +145,16 @@ def _require_known(case: Case, question: Question) -> None:
             "no output is measured: give --output SIGNAL, once for each of the model's outputs "
             f"that the record has, for instance {', '.join(list(outputs)[:6])}"
         )
-    for kind, names, known in (
-        ("output", question.noise, outputs),
-        ("stimulus", question.inputs, [n for n in stimuli if not n.startswith("noise_")]),
-        ("state in --estimate-start", question.states, case.model.State._fields),
+    driven = [name for name in stimuli if not name.startswith("noise_")]
+    states = case.model.State._fields
+    for kind, names, known, refused in (
+        ("output", question.noise, outputs, unknown_name),
+        ("stimulus", question.inputs, driven, unknown_of_few),
+        ("state in --estimate-start", question.states, states, unknown_of_few),
     ):
         for name in names:
             if name not in known:
-                raise unknown_name(kind, name, known)
+                raise refused(kind, name, known)
 
 
 METHOD = BenchMethod(

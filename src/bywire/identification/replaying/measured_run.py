@@ -15,7 +15,13 @@ import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case, changes_of, driven_at
-from bywire.core.errors import ParameterError, StepError, nearest_first, unknown_name
+from bywire.core.errors import (
+    ParameterError,
+    StepError,
+    nearest_first,
+    unknown_name,
+    unknown_of_few,
+)
 from bywire.core.parameters import leaf_fields
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
@@ -147,15 +153,15 @@ def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> d
     stimuli, there = signals_of(case.model.Stimulus), [str(name) for name in data.data_vars]
     if wanted is None:
         wanted = {name: name for name in there if name in stimuli}
+    driven = [name for name in stimuli if not name.startswith("noise_")]
     if not wanted:
-        driven = [name for name in stimuli if not name.startswith("noise_")]
         raise ParameterError(
             f"nothing measured drives the model: give --input STIMULUS=SIGNAL with one of "
             f"{', '.join(driven)} and one of {nearest_first(there, driven)}"
         )
     for stimulus, signal in wanted.items():
         if stimulus not in stimuli:
-            raise unknown_name("stimulus", stimulus, stimuli)
+            raise unknown_of_few("stimulus", stimulus, driven)
         require_measured(data, signal, stimuli[stimulus])
     return dict(wanted)
 

@@ -1,0 +1,232 @@
+"""Distributions of numbers as study files write them: a tolerance, or a section with ``kind``."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from bywire.bench.relative_changes import share_of
+from bywire.bench.values import number, plain_text
+from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.core.leaf import Leaf
+from bywire.core.units import difference_unit, parse, shown
+from bywire.studies.admissible import admitted
+from bywire.studies.distribution import Distribution
+from bywire.studies.laws import Law, LogNormal, Normal, Triangular, Uniform, truncated_normal
+from bywire.studies.single_values import (
+    DISCRETE,
+    KEYS,
+    among,
+    choice_text,
+    require_several,
+    weights_of,
+)
+
+_TOLERANCE = re.compile(r"\s*(?:\+-|\+/-|±)\s*(\S.*)")
+
+
+def read_distribution(
+    name: str, entry: Any, leaf: Leaf, nominal: float, title: str = "[vary]", advice: str = ""
+) -> Distribution:
+    """Return how a number varies.
+
+    Parameters
+    ----------
+    name
+        Dotted name of the parameter or option.
+    entry
+        What the study file says: a tolerance as text, ``"+-5 %"``, or a section with ``kind``.
+    leaf
+        Unit and admissible range of the number.
+    nominal
+        Its value in the bench [SI]: shares are of it.
+    title
+        Section of the file that says so, for errors.
+    advice
+        What to do about a distribution that leaves the admissible range; by default what its kind
+        has for that.
+
+    Raises
+    ------
+    InputError
+        For entries that cannot be read, contradict themselves, or leave the admissible range.
+    """
+    tolerance = _TOLERANCE.fullmatch(entry) if isinstance(entry, str) else None
+    if tolerance is not None:
+        entry = {"kind": "tolerance", "tolerance": tolerance[1]}
+    if not isinstance(entry, Mapping):
+        raise ParameterError(
+            f"{title} {name} = {quoted(entry)}: write a tolerance such as '+-5 %', or a section "
+            "such as { kind = 'normal', sd = '5 %' }"
+        )
+    if "kind" not in entry:
+        raise _without_kind(f"{title} {name}", entry)
+    kind = entry["kind"]
+    if not isinstance(kind, str) or kind not in _KINDS:
+        raise unknown_name(f"kind of {title} {name}", choice_text(kind), _KINDS)
+    known, make = _KINDS[kind]
+    for key in entry.keys() - {"kind", "together"}:
+        if key not in known:
+            raise unknown_name(f"key of {title} {name} (kind {kind})", key, known)
+    made = make(_Entry(f"{title} {name}", entry, leaf, nominal))
+    first, *_, last = made.levels(2)
+    if not made.singles and not first < last:
+        raise ParameterError(
+            f"{title} {name}: {made.text}: it is no wider than the last digit of a number, and "
+            "nothing varies: give it a larger width"
+        )
+    return admitted(f"{title} {name}", made, leaf, advice)
+
+
+def _without_kind(where: str, entry: Mapping[str, Any]) -> ParameterError:
+    """Return the error of a section that does not say what kind of distribution it is."""
+    given = entry.keys() - {"together"}
+    near = [kind for kind, (keys, _) in _KINDS.items() if given and given <= {*keys}]
+    which = " or ".join(map(repr, near or _KINDS))
+    others = f" (there are {', '.join(_KINDS)})" if near else ""
+    return ParameterError(f"{where} = {quoted(entry)}: kind is missing: add kind = {which}{others}")
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A section of ``[vary]`` with what its texts are read by; ``where``: what errors call it."""
+
+    where: str
+    section: Mapping[str, Any]
+    leaf: Leaf
+    nominal: float
+
+    def level(self, key: str, default: float | None = None) -> float:
+        """Return a value [SI]; a share with a sign, ``+10 %``, is a change of the nominal one."""
+        if key not in self.section and default is not None:
+            return default
+        text = self._given(key)
+        share = share_of(text)
+        return self._number(key, text) if share is None else (1.0 + share) * self.nominal
+
+    def width(self, key: str, of: float) -> float:
+        """Return a width [SI] > 0; a share is of another value."""
+        text = self._given(key)
+        if isinstance(text, str) and text.strip().endswith("%"):
+            width = abs(of) * parse(text, "1", f"{self.where}.{key}")
+        else:
+            width = self._number(key, text, difference_unit(self.leaf.unit.symbol))
+        if not width > 0.0 or not math.isfinite(width):
+            raise ParameterError(
+                f"{self.where}.{key} = {quoted(text)}: a width > 0 is wanted"
+                + ("; a share of 0 is none: give an amount" if not of else "")
+            )
+        return width
+
+    def amount(self, value: float) -> str:
+        """Return a value with its unit."""
+        return shown(value, self.leaf.unit.symbol)
+
+    def _given(self, key: str) -> Any:
+        if key not in self.section:
+            raise ParameterError(f"{self.where} of kind {self.section['kind']} needs {key!r}")
+        return self.section[key]
+
+    def breadth(self, value: float) -> str:
+        """Return a width with its unit."""
+        return shown(value, difference_unit(self.leaf.unit.symbol))
+
+    def _number(self, key: str, value: Any, symbol: str = "") -> float:
+        unit = self.leaf.unit
+        where = f"{self.where}.{key}"
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0:
+            value = plain_text(value)  # a file's plain number: 37 is not 37 bar, and hardly 37 Pa
+        return float(number(value, symbol or unit.symbol, where, unit.nominal))
+
+    def refused(self, why: str) -> ParameterError:
+        """Return the error of a section that contradicts itself."""
+        return ParameterError(f"{self.where} (kind {self.section['kind']}): {why}")
+
+
+def _frozen(
+    entry: _Entry, law: Law, text: str, low: float = -math.inf, high: float = math.inf
+) -> Distribution:
+    """Return a distribution by its law; that of a tail has no end, wherever its law ends."""
+    return Distribution(str(entry.section["kind"]), text, law.ppf, low, high, law.cdf, law.sf)
+
+
+def _uniform(entry: _Entry) -> Distribution:
+    low, high = entry.level("low"), entry.level("high")
+    if not low < high:
+        raise entry.refused(f"low = {entry.amount(low)} must be below high = {entry.amount(high)}")
+    text = f"uniform, {entry.amount(low)} to {entry.amount(high)}"
+    return _frozen(entry, Uniform(low, high - low), text, low, high)
+
+
+def _tolerance(entry: _Entry) -> Distribution:
+    width = entry.width("tolerance", entry.nominal)
+    low, high = entry.nominal - width, entry.nominal + width
+    shape = entry.section.get("shape", "uniform")
+    text = f"{entry.amount(entry.nominal)} +- {entry.breadth(width)}"
+    if shape == "uniform":
+        return _frozen(entry, Uniform(low, high - low), f"{text}, uniform", low, high)
+    if shape != "normal":
+        raise unknown_name(f"shape of {entry.where}", str(shape), ("uniform", "normal"))
+    law = truncated_normal(-3.0, 3.0, entry.nominal, width / 3.0)
+    return _frozen(entry, law, f"{text}, normal with 3 sd at the ends", low, high)
+
+
+def _normal(entry: _Entry) -> Distribution:
+    mean = entry.level("mean", entry.nominal)
+    sd = entry.width("sd", mean)
+    text = f"normal, mean {entry.amount(mean)}, sd {entry.breadth(sd)}"
+    low = entry.level("low", -math.inf)
+    high = entry.level("high", math.inf)
+    if math.isinf(low) and math.isinf(high):
+        return _frozen(entry, Normal(mean, sd), text)
+    if not low < high:
+        raise entry.refused(f"low = {entry.amount(low)} must be below high = {entry.amount(high)}")
+    law = truncated_normal((low - mean) / sd, (high - mean) / sd, mean, sd)
+    ends = " to ".join("any" if math.isinf(x) else entry.amount(x) for x in (low, high))
+    return _frozen(entry, law, f"{text}, truncated: {ends}", low, high)
+
+
+def _lognormal(entry: _Entry) -> Distribution:
+    median = entry.level("median", entry.nominal)
+    if not median > 0.0:
+        raise entry.refused(f"the median {entry.amount(median)} must be above zero")
+    variation = entry.width("sd", median) / median
+    sigma = math.sqrt(math.log1p(variation**2))
+    text = f"log-normal, median {entry.amount(median)}, sd {100.0 * variation:.3g} %"
+    return _frozen(entry, LogNormal(sigma, median), text)  # ends at zero as where it has no end
+
+
+def _triangular(entry: _Entry) -> Distribution:
+    low, high = entry.level("low"), entry.level("high")
+    mode = entry.level("mode", entry.nominal)
+    ends = f"{entry.amount(low)}, {entry.amount(mode)}, {entry.amount(high)}"
+    if not low <= mode <= high or not low < high:
+        raise entry.refused(f"low, mode and high must rise, got {ends}")
+    law = Triangular((mode - low) / (high - low), low, high - low)
+    return _frozen(entry, law, f"triangular, {ends}", low, high)
+
+
+def _discrete(entry: _Entry) -> Distribution:
+    values = entry.section.get("values")
+    if not isinstance(values, list) or not values:
+        raise entry.refused("it needs values = [...]")
+    read = [replace(entry, section={"values": value}).level("values") for value in values]
+    weights = weights_of(entry.where, entry.section, len(read))
+    texts = list(map(entry.amount, read))
+    require_several(entry.where, read, texts)
+    return replace(among(read, weights, ", ".join(texts)), low=min(read), high=max(read))
+
+
+_KINDS: dict[str, tuple[tuple[str, ...], Callable[[_Entry], Distribution]]] = {
+    "tolerance": (("tolerance", "shape"), _tolerance),
+    "uniform": (("low", "high"), _uniform),
+    "normal": (("mean", "sd", "low", "high"), _normal),
+    "log-normal": (("median", "sd"), _lognormal),
+    "triangular": (("low", "mode", "high"), _triangular),
+    DISCRETE: (KEYS, _discrete),
+}
+ENTRY_KEYS = frozenset({"kind", "together"}).union(*(keys for keys, _ in _KINDS.values()))
+"""all keys that a section of a quantity may have"""
