@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from bywire.core.arguments import whole_number
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.units import parse
 from bywire.studies.plan import StudyPlan
@@ -41,7 +42,7 @@ def read_design(section: Mapping[str, Any]) -> dict[str, Any]:
         ("cases_per_level", 1, MOST),
     ):  # fmt: skip
         if key in section:
-            design[key] = _whole(key, section[key], low, high)
+            design[key] = whole_number(f"[design] {key}", section[key], low, high)
     if "confidence" in section:
         share = parse(section["confidence"], "1", "[design] confidence")
         if not 0.5 <= share < 1.0:
@@ -77,10 +78,3 @@ def _require_of_use(kind: str, section: Mapping[str, Any]) -> None:
             f"[design] cases: {kind!r} lists its cases by quantities and levels: leave them out"
         )
 
-
-def _whole(key: str, value: Any, low: int, high: int) -> int:
-    if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
-        raise ParameterError(
-            f"[design] {key} = {quoted(value)}: a whole number from {low} to {high} is wanted"
-        )
-    return value
