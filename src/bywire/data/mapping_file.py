@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bywire.core import units
+from bywire.core.arguments import whole_number
 from bywire.core.errors import InputError, ParameterError, UnitError, quoted, unknown_name
 from bywire.data.column_units import si_symbol, unit_of
 from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
@@ -37,11 +38,7 @@ def mapping_from(content: Mapping[str, Any]) -> MeasurementMapping:
     decimal = _text(content, "decimal", "")
     if decimal not in ("", ".", ","):
         raise ParameterError(f"decimal = {decimal!r} is not admissible: it must be '.' or ','")
-    skip = content.get("skip_lines", 0)
-    if isinstance(skip, bool) or not isinstance(skip, int) or not 0 <= skip <= 10_000:
-        raise ParameterError(
-            f"skip_lines = {quoted(skip)} is not admissible: a whole number from 0 to 10000"
-        )
+    skip = whole_number("skip_lines", content.get("skip_lines", 0), 0, 10_000)
     return MeasurementMapping(
         {n: _signal(n, _table(v, f"signals.{n}")) for n, v in signals.items()},
         _clock(content, ""),
