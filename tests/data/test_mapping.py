@@ -45,7 +45,7 @@ def test_a_mapping_file_means_what_it_says(tmp_path):
         (signal(offset=2), UnitError, "signals.p.offset = 2 has no unit: .* '1.5 bar'"),
         (signal(delay="2 bar"), UnitError, "signals.p.delay = '2 bar' has the wrong unit"),
         (signal(sign=2), ParameterError, "signals.p.sign = 2 .* 1 or -1"),
-        (signal(sign=True), ParameterError, "signals.p.sign = True"),
+        (signal(sign=True), ParameterError, "signals.p.sign = true"),
         (signal(scale=0), ParameterError, "signals.p.scale = 0"),
         (signal(scale="2 mm"), UnitError, "signals.p.scale"),
         (signal(column=0), ParameterError, "signals.p.column = 0: columns are counted from 1"),
