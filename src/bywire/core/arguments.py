@@ -47,7 +47,8 @@ def require_kinds(
         kinds = wanted.get(name, ())
         if kinds and not any(_KINDS[kind][1](value) for kind in kinds):
             said = " or ".join(_KINDS[kind][0] for kind in kinds if kind != "None")
-            raise ParameterError(f"{name} = {quoted(value)}: {said} is wanted")
+            given = repr(value) if isinstance(value, bool) else quoted(value)  # not as TOML has it
+            raise ParameterError(f"{name} = {given}: {said} is wanted")
 
 
 def whole_number(name: str, value: object, least: int, most: int) -> int:
