@@ -46,6 +46,19 @@ def test_a_study_without_any_result_says_why_and_fails(study, tmp_path, design, 
             run.worst("peak_curent")
 
 
+def test_key_figures_that_no_case_has_are_no_result(tmp_path):
+    """The wheel stands before its hold begins."""
+    path = tmp_path / "study.toml"
+    path.write_text(
+        'bench = "corner-stop"\n[vary]\n"options.v_0" = "+-5 %"\n[design]\ncases = 64\n'
+        '[set]\n"options.v_0" = "10 km/h"\n"options.t_hold" = "0.1 s"\n'
+    )
+    with pytest.warns(match="no key figure is defined in any case"):
+        run = bywire.run_study(path, tmp_path / "out")
+    assert (run.status, run.findings.failures) == ("failed", {})
+    assert run.write(tmp_path / "report")
+
+
 BENCH = """
 experiment = "hard-braking"
 parameters = "dardanelli2010"

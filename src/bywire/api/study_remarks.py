@@ -28,6 +28,8 @@ def warned(findings: Findings, of_the_bench: list[str]) -> list[str]:
             f"{len(failed)} of {count} cases have no result; they count as missing every "
             "requirement"
         )
+    elif count and not findings.spreads:
+        said.append("no key figure is defined in any case: look at the bench itself, bywire run")
     return said + (state_texts(findings) if findings.rare and count else [])
 
 

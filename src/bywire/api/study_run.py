@@ -66,7 +66,7 @@ class StudyRun(Answer):
         The bench itself.
     status
         ``passed``, ``failed`` or ``undecided`` by the requirements, ``done`` where there are none,
-        ``failed``, too, where no case has a result, and ``unfinished`` where cases are missing.
+        ``failed``, too, where no case has a key figure, and ``unfinished`` where cases are missing.
     damaged
         Chunks whose files could not be read, and that were computed again.
     """
@@ -212,7 +212,7 @@ class StudyRun(Answer):
 
     def _banner(self) -> Banner:
         if not self.findings.spreads:
-            return Banner("no case has a result", "bad")
+            return Banner("no case has a key figure", "bad")
         outcomes = [each.outcome for each in self.findings.judgments]
         if not outcomes:
             return Banner(f"{len(self.cases)} cases done")
