@@ -136,11 +136,13 @@ class StudyRun(Answer):
         Raises
         ------
         ParameterError
-            When nothing is required of the key figure, or no case has it.
+            When nothing is required of the key figure, no case has it, or all have the same.
         """
         if kpi not in self._shown.benches:
-            raise ParameterError(f"no {self._shown.kind} case by {kpi!r}: "
-                                 "nothing is required of it, or no case is one")  # fmt: skip
+            raise ParameterError(
+                f"no {self._shown.kind} case by {kpi!r}: nothing is required of it, or no case is "
+                "worse than the others"
+            )
         return self._shown.benches[kpi]
 
     def __repr__(self) -> str:
