@@ -10,9 +10,10 @@ import pytest
 import xarray as xr
 
 from bywire.report.bode import Response, bode
-from bywire.report.document import FigureBlock, Section
+from bywire.report.document import FigureBlock, Section, TableBlock
 from bywire.report.page import write_page
 from bywire.report.panels import Panel, Trace
+from bywire.report.tables import Cell, Column, Table
 from bywire.report.time_traces import time_traces
 
 JUMP = 0.5  # s, where the signals jump: its place on the screen says where that time is
@@ -163,7 +164,30 @@ def test_wheel_and_buttons_zoom_a_figure(page, seen):
     page.mouse.wheel(0, -300)
     width = "document.querySelector('.zoom svg').viewBox.baseVal.width"
     page.wait_for_function(f"() => {width} < {before['viewBox'][2]}")
-    place.locator("button[title='Whole figure']").click()
+    figure = page.locator("figure").first
+    figure.locator("button[title='Whole figure']").click()
     assert seen()[0]["viewBox"] == before["viewBox"]
-    place.locator("button[title='Zoom in']").click()
+    figure.locator("button[title='Zoom in']").click()
     assert seen()[0]["viewBox"][2] == pytest.approx(0.5 * before["viewBox"][2])
+
+
+def test_buttons_cover_nothing_of_a_figure(page):
+    page.locator(".zoom").first.hover()
+    for figure in page.locator("figure").all():
+        drawn = figure.locator("svg").bounding_box()
+        for button in figure.locator("button").all():
+            assert button.bounding_box()["y"] >= drawn["y"] + drawn["height"]
+
+
+def test_a_table_of_seven_columns_of_figures_fits_a_window_of_1000_px(chromium, tmp_path):
+    heads = ("the bench itself", "5 %", "median", "95 %", "least", "largest")
+    columns = (Column("name"), *(Column(head, numeric=True) for head in heads))
+    row = tuple(Cell(text) for text in ("excess_slip_time_front", *["0.0008643 rad"] * 6))
+    block = TableBlock(Table(columns, (row,)))
+    file = write_page(tmp_path / "report.html", "Table", "", [Section("Key figures", [block])])
+    opened = chromium.new_page(viewport={"width": 1000, "height": 800})
+    opened.goto(file.as_uri())
+    widths = "e => [e.scrollWidth, e.clientWidth]"
+    table, window = opened.locator(".scroll").evaluate(widths)
+    opened.close()
+    assert table <= window

@@ -12,12 +12,17 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.text import Text
+from numpy.typing import NDArray
 
 from bywire.core.typing import Array
+from bywire.report.study.case_axis import CaseAxis, choice_axis
 from bywire.report.study.convergence import convergence
+from bywire.report.study.drawn_cases import LINES, DrawnCases, drawn_cases
+from bywire.report.study.exceedance import Curve, exceedance
 from bywire.report.study.histograms import Spread, histograms
-from bywire.report.study.readable_axis import scale_of
-from bywire.report.study.scatter import Axis, parallel_coordinates, scatter
+from bywire.report.study.parallel_coordinates import parallel_coordinates
+from bywire.report.study.readable_axis import few_labels, scale_of
+from bywire.report.study.scatter import scatter
 from bywire.report.study.tornado import tornado
 from bywire.studies.effects import Effect
 from bywire.studies.statistics import running_share
@@ -26,11 +31,11 @@ RNG = np.random.default_rng(1)
 CASES = 200
 UNIT = RNG.uniform(size=CASES)
 DRIVERS = [
-    Axis("caliper.K_pd", "N/m", 1.1e6 * (1.0 + 0.1 * UNIT)),
-    Axis("motor.R_m", "ohm", 0.35 + 1e-7 * RNG.uniform(size=CASES)),
-    Axis("motor.J", "kg*m**2", 3e-5 * RNG.uniform(0.9, 1.1, CASES)),
+    CaseAxis("caliper.K_pd", "N/m", 1.1e6 * (1.0 + 0.1 * UNIT)),
+    CaseAxis("motor.R_m", "ohm", 0.35 + 1e-7 * RNG.uniform(size=CASES)),
+    CaseAxis("motor.J", "kg*m**2", 3e-5 * RNG.uniform(0.9, 1.1, CASES)),
 ]
-ERROR = Axis("steady_state_error", "Pa", 500.0 * UNIT)
+ERROR = CaseAxis("steady_state_error", "Pa", 500.0 * UNIT)
 
 
 def drawn(figure: Figure) -> Figure:
@@ -66,6 +71,10 @@ def entries(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
+def every(met: NDArray[np.bool_]) -> DrawnCases:
+    return drawn_cases(met, met.size)
+
+
 def texts(axes: Axes) -> list[str]:
     return [text.get_text() for text in axes.texts]
 
@@ -88,6 +97,7 @@ def test_labels_of_a_histogram_never_touch(middle: float, spread: float, unit: s
         (0.0686, "s", "ms", 68.6), (1.2, "s", "s", 1.2), (25e5, "Pa", "bar", 25.0),
         (773.0, "Pa", "10⁻³ bar", 7.73), (3e-5, "kg*m**2", "10⁻⁶ kg·m²", 30.0),
         (2e6, "1", "10⁶", 2.0), (0.0, "1", "", 0.0), (6.2, "%", "%", 6.2),
+        (41.2, "m", "m", 41.2), (4e-3, "m", "mm", 4.0), (373.15, "K", "°C", 100.0),
     ],
 )  # fmt: skip
 def test_scales_spare_the_reader_powers_of_ten(
@@ -95,14 +105,14 @@ def test_scales_spare_the_reader_powers_of_ten(
 ) -> None:
     scale = scale_of(np.array([-0.1 * largest, np.nan, largest]), symbol)
     assert scale.unit == unit
-    assert scale.factor * largest == pytest.approx(shown, rel=1e-12)
+    assert scale(largest) == pytest.approx(shown, rel=1e-12)
 
 
 def test_a_histogram_names_a_limit_that_lies_far_off() -> None:
     far, near = Spread(ERROR.values, "Pa", 250.0, 1e4), Spread(ERROR.values, "Pa", 250.0, 600.0)
     figure = drawn(histograms({"far": far, "near": near}))
-    assert texts(figure.axes[0]) == ["limit 0.1 bar →"]
-    assert texts(figure.axes[1]) == []
+    assert figure.axes[0].get_title(loc="right") == "limit 0.1 bar →"
+    assert texts(figure.axes[0]) == texts(figure.axes[1]) == []
     assert "limit" in entries(figure)
     assert "limit" not in entries(histograms({"far": far}))
 
@@ -111,7 +121,7 @@ def test_a_histogram_names_a_limit_that_lies_far_off() -> None:
     ("limit", "named"), [(1e4, ["limit 0.1 bar ↑"]), (-1e4, ["limit -0.1 bar ↓"]), (600.0, [])]
 )
 def test_points_of_a_scatter_fill_it_however_far_the_limit(limit: float, named: list[str]) -> None:
-    figure = drawn(scatter(ERROR, DRIVERS, limit, ERROR.values <= limit))
+    figure = drawn(scatter(ERROR, DRIVERS, limit, every(ERROR.values <= limit)))
     assert_readable(figure)
     low, high = figure.axes[0].get_ylim()
     assert (low <= 1e-2 * limit <= high) == (not named)  # in 10⁻³ bar
@@ -121,16 +131,17 @@ def test_points_of_a_scatter_fill_it_however_far_the_limit(limit: float, named: 
 
 
 def test_entries_of_a_scatter_are_what_is_drawn() -> None:
-    mixed = scatter(ERROR, DRIVERS, 300.0, ERROR.values <= 300.0)
+    mixed = scatter(ERROR, DRIVERS, 300.0, every(ERROR.values <= 300.0))
     assert entries(mixed) == ["meets the limit", "misses the limit", "limit"]
-    undefined = Axis(ERROR.name, "Pa", np.where(ERROR.values > 300.0, np.nan, ERROR.values))
-    assert "misses the limit" not in entries(scatter(undefined, DRIVERS, 300.0, UNIT < 0.6))
+    undefined = CaseAxis(ERROR.name, "Pa", np.where(ERROR.values > 300.0, np.nan, ERROR.values))
+    known = drawn_cases(UNIT < 0.6, CASES, known=np.isfinite(undefined.values))
+    assert "misses the limit" not in entries(scatter(undefined, DRIVERS, 300.0, known))
 
 
 def test_many_points_are_small_and_translucent() -> None:
     def marker(cases: int) -> tuple[float, float]:
-        own = Axis("ripple", "Pa", np.linspace(1.0, 2.0, cases))
-        axes = scatter(own, [own], 3.0, np.ones(cases, dtype=bool)).axes[0]
+        own = CaseAxis("ripple", "Pa", np.linspace(1.0, 2.0, cases))
+        axes = scatter(own, [own], 3.0, every(np.ones(cases, dtype=bool))).axes[0]
         return axes.lines[0].get_markersize(), axes.lines[0].get_alpha() or 1.0
 
     (few_size, few_alpha), (size, alpha) = marker(1000), marker(1001)
@@ -182,9 +193,9 @@ def test_the_outline_of_a_histogram_holds_all_cases() -> None:
 
 def test_parallel_coordinates_say_what_lines_are_and_where_limits_lie() -> None:
     met = ERROR.values <= 300.0
-    rise = Axis("rise_time", "s", 0.06 + 0.01 * UNIT)
+    rise = CaseAxis("rise_time", "s", 0.06 + 0.01 * UNIT)
     figure = drawn(parallel_coordinates(
-        [*DRIVERS, ERROR, rise], met, {"steady_state_error": 300.0, "rise_time": 0.1}
+        [*DRIVERS, ERROR, rise], every(met), {"steady_state_error": 300.0, "rise_time": 0.1}
     ))  # fmt: skip
     assert entries(figure) == ["meets all requirements", "misses a requirement", "limit"]
     axes = figure.axes[0]
@@ -203,8 +214,8 @@ def test_parallel_coordinates_say_what_lines_are_and_where_limits_lie() -> None:
 
 
 def test_a_figure_that_no_case_has_leaves_parallel_coordinates() -> None:
-    nothing = Axis("settling_time", "s", np.full(CASES, np.nan))
-    figure = parallel_coordinates([*DRIVERS, nothing], np.zeros(CASES, dtype=bool), {})
+    nothing = CaseAxis("settling_time", "s", np.full(CASES, np.nan))
+    figure = parallel_coordinates([*DRIVERS, nothing], every(np.zeros(CASES, dtype=bool)), {})
     assert len(figure.axes[0].get_xticks()) == len(DRIVERS)
     assert entries(figure) == ["misses a requirement"]
 
@@ -221,3 +232,76 @@ def test_a_tornado_is_not_squeezed_by_a_limit_far_off() -> None:
     near = tornado(effects, units, {"steady_state_error": 600.0})
     assert "limit" in entries(near)
     assert near.axes[0].get_title(loc="right") == ""
+
+
+def test_curves_of_figures_with_other_units_fill_panels_of_their_own() -> None:
+    points = np.linspace(0.0, 1.0, 50)
+    probable = 10.0 ** (-3.0 * points)
+    curves = [
+        Curve(name, unit, limit, 0.01, limit * (0.5 + 0.6 * points), probable, 0.5 * probable,
+              2.0 * probable)
+        for name, unit, limit in (("rise_time", "s", 0.07), ("peak_power", "W", 200.0))
+    ]  # fmt: skip
+    figure = drawn(exceedance(curves))
+    assert_readable(figure)
+    for axes, shown in zip(figure.axes, ((35.0, 77.0), (100.0, 220.0)), strict=True):
+        low, high = axes.get_xlim()
+        assert shown[1] - shown[0] > 0.8 * (high - low)
+        assert len(labels(axes)) > 1
+    assert [axes.get_xlabel() for axes in figure.axes] == ["rise time [ms]", "peak power [W]"]
+
+
+def test_choices_stand_by_their_names_and_their_points_beside_each_other() -> None:
+    law = choice_axis("adc.law", ["quantized", "ideal"] * (CASES // 2), ["ideal", "quantized"])
+    met = ERROR.values <= 300.0
+    figure = drawn(scatter(ERROR, [law, *DRIVERS[:2]], 300.0, every(met)))
+    assert_readable(figure)
+    axes = figure.axes[0]
+    assert [text.get_text() for text in labels(axes)] == ["ideal", "quantized"]
+    assert axes.get_xlabel() == "adc.law"
+    points = np.sort(np.concatenate([line.get_xdata() for line in axes.lines[:2]]))
+    assert np.unique(points).size == CASES
+    np.testing.assert_array_equal(np.round(points), np.repeat([0.0, 1.0], CASES // 2))
+    shown = drawn(parallel_coordinates([law, ERROR], every(met), {})).axes[0]
+    assert {"ideal", "quantized"} <= set(texts(shown))
+
+
+def test_long_names_of_choices_never_touch() -> None:
+    names = ["field-oriented", "six-step-commutation", "direct-torque"]
+    law = choice_axis("drive.law", [names[k % 3] for k in range(CASES)], names)
+    figure = drawn(scatter(ERROR, [law, law, law], 300.0, every(UNIT < 2.0)))
+    for axes in figure.axes:
+        first, second, _ = labels(axes)
+        apart = second.get_position()[0] - first.get_position()[0]
+        width = np.ptp(axes.transData.transform([(0.0, 0.0), (apart, 0.0)])[:, 0])
+        across = width * np.sin(np.deg2rad(first.get_rotation()))  # between slanted lines of text
+        assert across > first.get_fontsize() * figure.dpi / 72.0
+
+
+def test_what_is_thinned_is_said_with_its_numbers() -> None:
+    met = np.arange(1000) % 100 != 0
+    cases = drawn_cases(met, 400, LINES)
+    assert (cases.met.size, cases.missed.size) == (400, 10)
+    assert np.all(met[cases.met])
+    assert not np.any(met[cases.missed])
+    said = "Drawn are 400 of 990 cases that meet the limit and all 10 that miss it."
+    assert cases.caption("meet the limit", "miss it") == said
+    assert drawn_cases(met, 990).caption("meet the limit", "miss it") == ""
+
+
+@pytest.mark.parametrize("ends", [(0.034126, 0.034856), (0.0301, 0.0309), (21.96, 22.03)])
+def test_a_narrow_axis_has_two_labels_at_least(ends: tuple[float, float]) -> None:
+    figure = Figure(figsize=(1.87, 1.0))
+    axes = figure.subplots()
+    axes.set_xlim(*ends)
+    few_labels(axes.xaxis, 1.87)
+    assert_readable(drawn(figure))
+    assert len(labels(axes)) > 1
+
+
+def test_a_limit_far_off_crosses_no_line_of_a_histogram() -> None:
+    own = float(np.max(ERROR.values))  # the bench itself lies at that end
+    axes = drawn(histograms({"far": Spread(ERROR.values, "Pa", own, 1e4)})).axes[0]
+    title = axes._right_title  # matplotlib hands out its text alone
+    assert title.get_text() == "limit 0.1 bar →"
+    assert not title.get_window_extent().overlaps(axes.get_window_extent())

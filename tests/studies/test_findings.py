@@ -7,10 +7,12 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.findings import Findings
+from bywire.studies.statistics import correlation_ratio
 from bywire.studies.study_file import read_study
 
 
@@ -67,3 +69,35 @@ def test_without_a_probability_every_case_has_to_meet_it(found, peaks, error, ou
 
 def test_the_worst_of_a_lower_limit_is_the_smallest(found):
     assert found([19.0, 25.0, 18.0], limit=">= 20 A").judgments[0].worst == 2
+
+
+def test_no_case_is_the_worst_where_all_are_equal(found):
+    assert found([0.0] * 200).judgments[0].worst is None
+    assert found([0.0, math.nan, 0.0]).judgments[0].worst is None
+    assert found([0.0]).judgments[0].worst == 0
+
+
+CHOICE = """
+[vary]
+"motor.R_m" = "+-5 %"
+"adc.law" = { kind = "discrete", values = ["ideal", "quantized"] }
+[requirements]
+peak_current = "<= 20 A with 90 %"
+"""
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 3.0])
+def test_choices_are_ranked_among_what_drives_a_figure(found, study, share):
+    """By ranks: two choices have the size of their rank correlation, but for what chance makes."""
+    rng = np.random.default_rng(3)
+    law = rng.integers(0, 2, 400)
+    slope, noise = np.linspace(0.0, 1.0, 400), 0.1 * rng.normal(size=400)
+    findings = found(slope + noise + share * law)
+    plan = read_study(study(CHOICE))
+    cases = findings.cases.assign(**{"adc.law": np.array(["ideal", "quantized"])[law]})
+    mixed = Findings(plan, cases, findings.nominal)
+    ratio = correlation_ratio(cases["adc.law"], mixed.figure("peak_current"))
+    told = abs(stats.spearmanr(law, mixed.figure("peak_current")).statistic)
+    assert ratio == pytest.approx(told, abs=0.05 if share == 0.0 else 0.01)
+    wanted = ["adc.law", "motor.R_m"] if share > 1.0 else ["motor.R_m", "adc.law"]
+    assert mixed.drivers("peak_current") == wanted[: 2 - (ratio == 0.0)]

@@ -307,3 +307,11 @@ def test_a_missing_library_is_one_error(planned, monkeypatch):
     monkeypatch.setitem(sys.modules, "SALib.sample.sobol", None)
     with pytest.raises(FileError, match=r"need the library SALib.*bywire\[studies\]"):
         planned("sobol-indices", 320)
+
+
+def test_no_interval_of_a_share_ends_beyond_all_of_the_variance(planned):
+    """What one quantity makes alone has wide intervals around 1 with few groups."""
+    indices = by_name(found(planned("sobol-indices", 320), lambda x: x[0] ** 3))
+    for each in indices.values():
+        for share in (each.first, each.total):
+            assert share.low <= share.value <= share.high <= max(1.0, share.value)

@@ -44,7 +44,7 @@ from bywire.life.declaration import LIVES, Life
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Flat, Paragraph, Section, TableBlock
 from bywire.report.tables import text_table
-from bywire.report.wording import unit_text
+from bywire.report.wording import readable_units, unit_text
 from bywire.synthesis.study import STUDIES, Study
 
 Object = dict[str, Any]
@@ -217,7 +217,7 @@ def _experiment(experiment: Experiment) -> Object:
         "summary": experiment.summary,
         "assembly": experiment.assembly,
         **described_drive(experiment),
-        "kpis": [{"name": n, "unit": display_unit(u)} for n, u in experiment.kpis.items()],
+        "kpis": [{"name": n, "unit": readable_units(u)} for n, u in experiment.kpis.items()],
         "options": option_rows(experiment.options, experiment.defaults),
         "changed_with": "--set options.NAME=VALUE",
     }  # fmt: skip

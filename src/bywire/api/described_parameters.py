@@ -93,8 +93,10 @@ def _class_of(cls: type[Any], name: str) -> type[Any]:
 
 def described_kpi(name: str, definition: str) -> Object:
     """Return a key figure's meaning, its unit, and the experiments that tell it."""
+    from bywire.report.wording import readable_units
+
     known = {e.name: e.kpis[name] for e in EXPERIMENTS.all().values() if name in e.kpis}
-    units = sorted({display_unit(unit) for unit in known.values()})
+    units = sorted({readable_units(unit) for unit in known.values()})
     return {"summary": definition, "unit": " or ".join(units), "experiments": ", ".join(known)}
 
 

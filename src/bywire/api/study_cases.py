@@ -11,6 +11,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bywire.api.study_tables import figure_text
 from bywire.bench import running
 from bywire.bench.bench import Bench
 from bywire.bench.bench_text import bench_text
@@ -117,7 +118,7 @@ class ShownCases:
         return " (closer to the limit than its error)" if is_close else ""
 
     def _figure(self, name: str, row: int) -> str:
-        return amount(float(self.findings.figure(name)[row]), self.findings.units[name])
+        return figure_text(self.findings, name, float(self.findings.figure(name)[row]))
 
     def _write_bench(self, bench: Bench, path: Path) -> Path:
         what = "Most probable failing" if self.findings.rare else "Worst"

@@ -10,16 +10,19 @@ import numpy as np
 
 from bywire.api.study_rare import rare_figures
 from bywire.api.study_sensitivity import sensitivity_figures
-from bywire.api.study_tables import shown_figures
+from bywire.api.study_tables import shown_figures, strongest
 from bywire.bench.requirements import limit_of
 from bywire.report.document import Block, FigureBlock
-from bywire.studies.findings import Findings
+from bywire.report.study.drawn_cases import LINES, POINTS, DrawnCases, drawn_cases
+from bywire.studies.findings import Findings, Judgment
 from bywire.studies.plan import CHUNK
 from bywire.studies.statistics import running_share
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+
+    from bywire.report.study.case_axis import CaseAxis
 
 _DRIVERS = 3  # quantities that a key figure is drawn over
 _AXES = 9  # of parallel coordinates
@@ -37,6 +40,7 @@ def load_drawing() -> None:
         convergence,
         histograms,
         influence_bars,
+        parallel_coordinates,
         scatter,
     )
 
@@ -54,7 +58,7 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
     if not findings.spreads:
         return []
     if findings.rare:
-        return [*rare_figures(findings), *_scatters(findings), *_overlays(recordings)]
+        return [*rare_figures(findings), *_scatters(findings), *_overlays(findings, recordings)]
     band = "; the shaded band holds 90 % of them" if findings.plan.is_sampled else ""
     blocks: list[Block] = [
         FigureBlock(
@@ -68,14 +72,16 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
         blocks.append(FigureBlock(
             partial(_influences, findings),
             f"What drives the key figures: {'partial ' * bool(findings.plan.correlations)}rank "
-            "correlations with their intervals. Pale: not "
-            "distinct from none.", "influences",
+            "correlations with their intervals. Pale: not distinct from none."
+            f"{' A choice has none.' if _has_choices(findings) else ''}"
+            f"{strongest(map(findings.influences, figures))}", "influences",
         ))  # fmt: skip
     if any(findings.effects(name) for name in figures):
         blocks.append(FigureBlock(
             partial(_tornado, findings),
             "How far each quantity alone moves the key figures from what the bench itself gives; "
-            "marks are its levels, dotted the limit.", "tornado",
+            "marks are its levels, dotted the limit."
+            f"{strongest(map(findings.effects, figures))}", "tornado",
         ))  # fmt: skip
     if findings.plan.sensitivity is not None:
         blocks += sensitivity_figures(findings)
@@ -88,23 +94,50 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
             "convergence",
         ))  # fmt: skip
     if findings.judgments:
-        blocks.append(FigureBlock(
-            partial(_parallel, findings),
-            "Every case as a line; in front, those that miss a requirement.", "parallel",
-        ))  # fmt: skip
-        blocks += _overlays(recordings)
+        blocks += [_parallel_block(findings), *_overlays(findings, recordings)]
     return blocks
 
 
 def _scatters(findings: Findings) -> list[Block]:
     return [
-        FigureBlock(
-            partial(_scatter, findings, name),
-            f"{name.replace('_', ' ')} over what drives it most; crosses miss the limit.",
-            f"scatter-{name}",
-        )
-        for judgment in findings.judgments if findings.drivers(name := judgment.demand.kpi)
+        _scatter_block(findings, judgment)
+        for judgment in findings.judgments if findings.drivers(judgment.demand.kpi)
     ]  # fmt: skip
+
+
+def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
+    name, met = judgment.demand.kpi, judgment.met
+    known = np.isfinite(findings.figure(name))
+    cases = drawn_cases(met, POINTS, known=known)
+    crosses = (
+        "all meet the limit" if not cases.all_missed
+        else "crosses miss the limit" if cases.all_met else "all miss the limit"
+    )  # fmt: skip
+    lacking = met.size - int(np.count_nonzero(known))
+    said = [
+        f"{name.replace('_', ' ')} over what drives it most; {crosses}.",
+        cases.caption("meet the limit", "miss it"),
+        f"{lacking} cases without it are left out." if lacking else "",
+        "Cases gather where failures are: shares of them are no probabilities."
+        if findings.rare else "",
+    ]  # fmt: skip
+    return FigureBlock(
+        partial(_scatter, findings, name, cases), " ".join(filter(None, said)), f"scatter-{name}"
+    )
+
+
+def _parallel_block(findings: Findings) -> Block:
+    met = np.all([j.met for j in findings.judgments], axis=0)
+    cases = drawn_cases(met, LINES, LINES)
+    thinned = cases.caption("meet all requirements", "miss one")
+    missed = "in front, those that miss a requirement"
+    said = missed if cases.all_missed else "all meet all requirements"
+    text = f"Cases as lines; {said}. {thinned}" if thinned else f"Every case as a line; {said}."
+    return FigureBlock(partial(_parallel, findings, cases), text, "parallel")
+
+
+def _has_choices(findings: Findings) -> bool:
+    return any(not v.unit for v in findings.plan.varied)
 
 
 def _limit(findings: Findings, name: str) -> float | None:
@@ -141,19 +174,26 @@ def _tornado(findings: Findings) -> Figure:
     return tornado({name: found for name, found in each.items() if found}, findings.units, limits)
 
 
-def _scatter(findings: Findings, name: str) -> Figure:
-    from bywire.report.study.scatter import Axis, scatter
+def _axis(findings: Findings, name: str) -> CaseAxis:
+    """Return the axis of a quantity that varies, or of a key figure."""
+    from bywire.report.study.case_axis import CaseAxis, choice_axis
 
-    units = {v.name: v.unit for v in findings.plan.varied}
-    judgment = next(j for j in findings.judgments if j.demand.kpi == name)
-    drivers = [
-        Axis(each, units[each], np.asarray(findings.cases[each], dtype=float))
-        for each in findings.drivers(name)[:_DRIVERS]
-    ]
-    own = Axis(name, findings.units[name], findings.figure(name))
+    varied = {v.name: v for v in findings.plan.varied}.get(name)
+    if varied is None:
+        return CaseAxis(name, findings.units[name], findings.figure(name))
+    if varied.unit:
+        return CaseAxis(name, varied.unit, np.asarray(findings.cases[name], dtype=float))
+    choices = [str(choice) for choice in varied.distribution.levels(1)]
+    return choice_axis(name, [str(each) for each in findings.cases[name]], choices)
+
+
+def _scatter(findings: Findings, name: str, cases: DrawnCases) -> Figure:
+    from bywire.report.study.scatter import scatter
+
+    drivers = [_axis(findings, each) for each in findings.drivers(name)[:_DRIVERS]]
     limit = _limit(findings, name)
     assert limit is not None
-    return scatter(own, drivers, limit, judgment.met)
+    return scatter(_axis(findings, name), drivers, limit, cases)
 
 
 def _convergence(findings: Findings) -> Figure:
@@ -166,25 +206,24 @@ def _convergence(findings: Findings) -> Figure:
     )  # fmt: skip
 
 
-def _parallel(findings: Findings) -> Figure:
-    from bywire.report.study.scatter import Axis, parallel_coordinates
+def _parallel(findings: Findings, cases: DrawnCases) -> Figure:
+    from bywire.report.study.parallel_coordinates import parallel_coordinates
 
-    units = {v.name: v.unit for v in findings.plan.varied if v.unit}
     figures = [each.demand.kpi for each in findings.judgments]
     ranked = [each for name in figures for each in findings.drivers(name)[:_DRIVERS]]
-    names = list(dict.fromkeys([*ranked, *units]))[: max(_AXES - len(figures), 2)]
-    axes = [Axis(n, units[n], np.asarray(findings.cases[n], dtype=float)) for n in names]
-    axes += [Axis(n, findings.units[n], findings.figure(n)) for n in figures]
-    met = np.all([j.met for j in findings.judgments], axis=0)
+    varied = [v.name for v in findings.plan.varied]
+    names = list(dict.fromkeys([*ranked, *varied]))[: max(_AXES - len(figures), 2)]
+    axes = [_axis(findings, name) for name in (*names, *figures)]
     limits = {name: limit for name in figures if (limit := _limit(findings, name)) is not None}
-    return parallel_coordinates(axes, met, limits)
+    return parallel_coordinates(axes, cases, limits)
 
 
-def _overlays(recordings: Recordings) -> list[Block]:
+def _overlays(findings: Findings, recordings: Recordings) -> list[Block]:
+    which = "most probable failing" if findings.rare else "worst"
     return [
         FigureBlock(
             partial(_overlaid, each),
-            f"The bench itself and the worst cases of each requirement (run: {label}).",
+            f"The bench itself and the {which} case of each requirement (run: {label}).",
             f"worst-{label}", is_long=True,
         )
         for label, each in recordings().items() if len(each) > 1

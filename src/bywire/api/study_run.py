@@ -139,13 +139,15 @@ class StudyRun(Answer):
         UnknownNameError
             When nothing is required of the key figure.
         ParameterError
-            When no case has it.
+            When no case has it, or all have the same.
         """
         required = [each.demand.kpi for each in self.findings.judgments]
         if kpi not in required:
             raise unknown_name("key figure of a requirement", kpi, required)
         if kpi not in self._shown.benches:
-            raise ParameterError(f"there is no {self._shown.kind} case by {kpi} with a result")
+            raise ParameterError(
+                f"there is no {self._shown.kind} case by {kpi}: none has a result, or all are alike"
+            )
         return self._shown.benches[kpi]
 
     def __repr__(self) -> str:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from bywire.api.study_tables import shown_figures
-from bywire.core.units import difference_unit
+from bywire.api.study_tables import figure_text, shown_figures, strongest
 from bywire.report.document import FigureBlock, TableBlock
 from bywire.report.tables import Cell, Column, Table
-from bywire.report.wording import amount, clean
+from bywire.report.wording import clean
 from bywire.studies.findings import Findings
 from bywire.studies.sensitivity import ElementaryEffects, Estimate, VarianceShares
 
@@ -29,7 +28,7 @@ _CAPTIONS = {
 def sensitivity_tables(findings: Findings) -> list[TableBlock]:
     """Return the indices of each key figure of a requirement; of all where nothing is required."""
     return [
-        TableBlock(_table(found, findings.units[name]), f"What drives {name}.",
+        TableBlock(_table(findings, name, found), f"What drives {name}.",
                    title=f"what drives {name}")
         for name in shown_figures(findings) if (found := findings.sensitivity(name).drivers)
     ]  # fmt: skip
@@ -37,9 +36,10 @@ def sensitivity_tables(findings: Findings) -> list[TableBlock]:
 
 def sensitivity_figures(findings: Findings) -> list[FigureBlock]:
     """Return the figure of all indices; none where there are none."""
-    if not any(findings.sensitivity(name).drivers for name in shown_figures(findings)):
+    drivers = [findings.sensitivity(name).drivers for name in shown_figures(findings)]
+    if not any(drivers):
         return []
-    caption = _CAPTIONS[findings.plan.design]
+    caption = _CAPTIONS[findings.plan.design] + strongest(drivers)
     return [FigureBlock(partial(_bars, findings), caption, "sensitivity")]
 
 
@@ -81,33 +81,36 @@ def missing_indices(findings: Findings) -> list[str]:
 
 
 def _table(
-    drivers: Sequence[VarianceShares] | Sequence[ElementaryEffects], unit: str
-) -> Table:
+    findings: Findings, name: str,
+    drivers: Sequence[VarianceShares] | Sequence[ElementaryEffects],
+) -> Table:  # fmt: skip
     columns, rows = [Column("quantity")], []
+    written = partial(figure_text, findings, name, digits=3, is_difference=True)
     for each in drivers:
         if isinstance(each, VarianceShares):
             heads = ["first order", "interval", "total", "interval"]
-            cells = [*_cells(each.first), *_cells(each.total)]
+            cells = [*_cells(each.first, _share), *_cells(each.total, _share)]
         else:
             heads = ["mu*", "interval", "sigma"]
-            of = difference_unit(unit)
-            cells = [*_cells(each.mu_star, of), Cell(amount(each.sigma, of, 3))]
+            cells = [*_cells(each.mu_star, written), Cell(written(each.sigma))]
         rows.append((Cell(clean(each.quantity)), *cells))
     columns += [Column(head, numeric=head != "interval") for head in heads]
     return Table(tuple(columns), tuple(rows))
 
 
-def _cells(of: Estimate, unit: str = "") -> list[Cell]:
-    """Return estimate and interval: of shares where there is no unit."""
-    value, low, high = (
-        amount(each, unit, 3) if unit else f"{round(each, 2) + 0.0:.2f}"  # no -0.00
-        for each in (of.value, of.low, of.high)
-    )
+def _cells(of: Estimate, written: Callable[[float], str]) -> list[Cell]:
+    """Return estimate and interval."""
+    value, low, high = map(written, (of.value, of.low, of.high))
     return [Cell(value, value=of.value), Cell(f"{low} to {high}")]
+
+
+def _share(value: float) -> str:
+    return f"{round(value, 2) + 0.0:.2f}"  # no -0.00
 
 
 def _bars(findings: Findings) -> Figure:
     from bywire.report.study.sensitivity_bars import sensitivity_bars
 
     each = {name: findings.sensitivity(name).drivers for name in shown_figures(findings)}
-    return sensitivity_bars({n: found for n, found in each.items() if found}, findings.units)
+    each = {name: found for name, found in each.items() if found}
+    return sensitivity_bars(each, findings.units, {name: findings.size(name) for name in each})

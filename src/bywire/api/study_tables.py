@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from bywire.core.units import difference_unit
 from bywire.report.document import Listing, TableBlock
+from bywire.report.study.drawn_cases import BARS
 from bywire.report.tables import OUTCOMES, Cell, Column, Table, text_table, value_text
 from bywire.report.wording import amount, clean
 from bywire.studies.effects import Effect
@@ -47,11 +50,41 @@ def demand_table(findings: Findings) -> Table:
 
 
 def _worst(findings: Findings, judgment: Judgment) -> Cell:
-    if judgment.worst is None:
-        return Cell("-")
+    """Return the worst figure that was found; of cases that are all equal, theirs."""
     kpi = judgment.demand.kpi
-    value = float(findings.figure(kpi)[judgment.worst])
-    return Cell(amount(value, findings.units[kpi]), value=value)
+    figures = findings.figure(kpi)
+    known = np.flatnonzero(np.isfinite(figures))
+    if not known.size:
+        return Cell("-")
+    value = float(figures[known[0] if judgment.worst is None else judgment.worst])
+    return Cell(figure_text(findings, kpi, value), value=value)
+
+
+def figure_text(
+    findings: Findings, name: str, value: float, digits: int = 4, *, is_difference: bool = False
+) -> str:
+    """Return a value of a key figure in the unit of the figure's cases, that of its axes too.
+
+    Parameters
+    ----------
+    name
+        The figure.
+    value
+        The value, or a difference of two, in the figure's SI unit; NaN where it is not defined.
+    digits
+        Significant digits.
+    is_difference
+        Whether it is one: of temperatures they are in K.
+    """
+    unit = findings.units[name]
+    return amount(value, difference_unit(unit) if is_difference else unit, digits,
+                  findings.size(name))  # fmt: skip
+
+
+def strongest(drivers: Iterable[Sequence[object]]) -> str:
+    """Return how many of the quantities that drive each figure have bars; empty where all have."""
+    count = max(map(len, drivers), default=0)
+    return f" Shown are the {BARS} strongest of {count} quantities." if count > BARS else ""
 
 
 def percent(value: float, of: Share) -> str:
@@ -79,7 +112,8 @@ def spread_table(findings: Findings) -> Table:
         values = [each.nominal, *middle, each.least, each.largest]
         name = clean(each.name)
         name += f" (not defined in {each.undefined})" if each.undefined else ""
-        rows.append((Cell(name), *(Cell(amount(v, each.unit), value=v) for v in values)))
+        texts = (figure_text(findings, each.name, v) for v in values)
+        rows.append((Cell(name), *(Cell(t, value=v) for t, v in zip(texts, values, strict=True))))
     return Table((Column("name"), *(Column(h, numeric=True) for h in heads)), tuple(rows))
 
 
@@ -111,8 +145,8 @@ def influence_tables(findings: Findings) -> list[TableBlock]:
     each = {name: findings.influences(name) for name in shown_figures(findings)}
     is_partial = bool(findings.plan.correlations)
     return [
-        TableBlock(_influence_table(found, is_partial), f"What drives {name}.",
-                   title=f"what drives {name}")
+        TableBlock(_influence_table(found, is_partial), f"What drives {name}{_more(found)}.",
+                   title=f"what drives {name}{_more(found)}")
         for name, found in each.items() if found
     ]  # fmt: skip
 
@@ -121,13 +155,13 @@ def effect_tables(findings: Findings) -> list[TableBlock]:
     """Return what each quantity alone does to key figures of requirements, or to all."""
     each = {name: findings.effects(name) for name in shown_figures(findings)}
     return [
-        TableBlock(_effect_table(found, findings.units[name]),
+        TableBlock(_effect_table(findings, name, found),
                    f"What each quantity alone does to {name}.", title=f"what moves {name}")
         for name, found in each.items() if found
     ]  # fmt: skip
 
 
-def _effect_table(effects: Sequence[Effect], unit: str) -> Table:
+def _effect_table(findings: Findings, name: str, effects: Sequence[Effect]) -> Table:
     heads = ("from", "to", "at the first", "at the last", "least", "largest", "swing")
     rows = []
     for each in effects:
@@ -135,8 +169,8 @@ def _effect_table(effects: Sequence[Effect], unit: str) -> Table:
         figures = [float(each.figures[0]), float(each.figures[-1]), each.least, each.largest]
         rows.append((
             Cell(each.quantity), *map(Cell, ends),
-            *(Cell(amount(v, unit), value=v) for v in figures),
-            Cell(amount(each.swing, difference_unit(unit)), value=each.swing),
+            *(Cell(figure_text(findings, name, v), value=v) for v in figures),
+            Cell(figure_text(findings, name, each.swing, is_difference=True), value=each.swing),
         ))  # fmt: skip
     return Table((Column("quantity"), *(Column(h, numeric=True) for h in heads)), tuple(rows))
 
@@ -146,6 +180,12 @@ def shown_figures(findings: Findings) -> list[str]:
     required = [demand.kpi for demand in findings.plan.demands]
     known = [each.name for each in findings.spreads]
     return [name for name in required if name in known] or known
+
+
+def _more(influences: Sequence[Influence]) -> str:
+    """Return how many quantities a table leaves out, and where they are."""
+    rest = len(influences) - _SHOWN
+    return f", the {_SHOWN} strongest, and {rest} more in report.json" if rest > 0 else ""
 
 
 def _influence_table(influences: Sequence[Influence], is_partial: bool) -> Table:

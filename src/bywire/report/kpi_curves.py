@@ -13,9 +13,9 @@ from bywire.bench.bench import Bench
 from bywire.bench.requirements import limit_of
 from bywire.bench.result import Result
 from bywire.core.typing import Array
-from bywire.core.units import display_factor
 from bywire.report import style
 from bywire.report.line_role import Role
+from bywire.report.study.readable_axis import scale_of
 from bywire.report.wording import in_display_unit
 
 _COLUMNS = 2
@@ -67,7 +67,8 @@ def kpi_curves(varied: Varied) -> Figure:
     for axes, name in zip(grid.flat, shown, strict=False):
         style.dress(axes)
         values, errors, unit = shown[name]
-        values, errors = in_display_unit(values, unit)[0], display_factor(unit) * errors
+        scale = scale_of(values, unit)
+        values, errors = scale(values), scale.factor * errors
         known = np.isfinite(errors)
         axes.errorbar(abscissa[known], values[known], errors[known],
                       fmt="none", ecolor=style.BLUE, elinewidth=0.8, capsize=2.0)  # fmt: skip
@@ -76,14 +77,13 @@ def kpi_curves(varied: Varied) -> Figure:
         if name in varied.bench.requirements:
             look = style.STROKES[Role.LIMIT]
             bound = limit_of(name, varied.bench.requirements[name], unit)[1]
-            bound = in_display_unit(bound, unit)[0]
-            axes.axhline(bound, color=look.color, linestyle=look.linestyle,
+            axes.axhline(scale(bound), color=look.color, linestyle=look.linestyle,
                          linewidth=look.linewidth)  # fmt: skip
             missed = _missed(name, varied.results)
             axes.plot(abscissa[missed], values[missed], color=look.color, marker="x",
                       linestyle="none", markersize=6.0)  # fmt: skip
         style.few_ticks(axes, 4)
-        axes.set_ylabel(style.axis_label(name.replace("_", " "), unit, "\n"))
+        axes.set_ylabel(scale.label(name.replace("_", " "), "\n"))
     for spare in list(grid.flat)[len(shown) :]:
         spare.set_visible(False)
     for axes in list(grid.flat)[max(count - _COLUMNS, 0) : count]:

@@ -83,17 +83,21 @@ BAND_ORDER = 2.4
 """drawing order of a ripple that fills an area: behind every line"""
 
 
-def new_figure(height: float, heights: Sequence[float] = (1.0,)) -> tuple[Figure, list[Axes]]:
-    """Return a figure with panels one above the other that share their abscissa.
+def new_figure(
+    height: float, heights: Sequence[float] = (1.0,), *, is_shared: bool = True
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with panels one above the other.
 
-    ``height``: height of the figure [inch]; ``heights``: relative heights of the panels.
+    ``height``: height of the figure [inch]; ``heights``: relative heights of the panels;
+    ``is_shared``: whether they share their abscissa, which else may show another quantity in each.
     """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(WIDTH, height), layout="constrained", facecolor="white")
     grid = figure.subplots(
-        len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": list(heights)}
-    )
+        len(heights), 1, sharex=is_shared, squeeze=False,
+        gridspec_kw={"height_ratios": list(heights)},
+    )  # fmt: skip
     panels: list[Axes] = list(grid[:, 0])
     for axes in panels:
         dress(axes)

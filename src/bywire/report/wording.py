@@ -51,7 +51,44 @@ def in_display_unit(value: F, symbol: str) -> tuple[F, str]:
     return convert(value, symbol, unit), unit
 
 
-def amount(value: float | None, symbol: str, digits: int = 4) -> str:
+def readable_unit(size: float, symbol: str) -> str:
+    """Return the unit in which a figure of a size reads best.
+
+    Times below 1 s are in ms and lengths from 1 m on, those of roads and not of pistons, in m.
+
+    Parameters
+    ----------
+    size
+        Largest magnitude that is written, in ``symbol``.
+    symbol
+        SI unit, or ``"%"``.
+
+    Examples
+    --------
+    >>> readable_unit(0.06, "s"), readable_unit(41.0, "m"), readable_unit(0.002, "m")
+    ('ms', 'm', 'mm')
+    """
+    if symbol == "s" and abs(size) < 1.0:
+        return "ms"
+    if symbol == "m" and abs(size) >= 1.0:
+        return "m"
+    return display_unit(symbol)
+
+
+def readable_units(symbol: str) -> str:
+    """Return all units in which figures of an SI unit are written, whatever their size.
+
+    Examples
+    --------
+    >>> readable_units("m"), readable_units("Pa")
+    ('mm or m', 'bar')
+    """
+    return " or ".join(dict.fromkeys(readable_unit(size, symbol) for size in (0.0, math.inf)))
+
+
+def amount(
+    value: float | None, symbol: str, digits: int = 4, like: float | None = None
+) -> str:
     """Return a value with its unit in ``digits`` significant digits.
 
     Parameters
@@ -62,6 +99,10 @@ def amount(value: float | None, symbol: str, digits: int = 4) -> str:
         Unit in the syntax of pint; SI units are shown in their display unit.
     digits
         Significant digits.
+    like
+        Largest magnitude of the figure that it is a value of, in ``symbol``: decides the unit, so
+        that a figure of many cases has one, see `readable_unit`. By default that of the value
+        itself, and times are in s.
 
     Examples
     --------
@@ -69,13 +110,17 @@ def amount(value: float | None, symbol: str, digits: int = 4) -> str:
     ('25 bar', '-', '0.034', '1190 Hz')
     >>> amount(0.0125, "m"), amount(41.07, "m")
     ('12.5 mm', '41.07 m')
+    >>> amount(0.962, "s"), amount(0.962, "s", like=0.962), amount(0.9, "m", like=1.1)
+    ('0.962 s', '962 ms', '0.9 m')
     """
     if value is None:
         return "-"
     if math.isnan(value):
         return "not defined"
-    is_long = symbol == "m" and abs(value) >= 1.0
-    number, unit = (value, "m") if is_long else in_display_unit(float(value), symbol)
+    if like is None and symbol == "s":
+        number, unit = float(value), "s"
+    else:
+        number, unit = _readable(float(value), value if like is None else like, symbol)
     written = unit_text(unit)
     figures = f"{number:.{digits}g}"
     if "e+" in figures:  # 1.19e+03
@@ -149,11 +194,8 @@ def _readable_difference(number: float, value: float, symbol: str) -> tuple[floa
 
 def _readable(number: float, value: float, symbol: str) -> tuple[float, str]:
     """Return a number in the unit in which a value reads best."""
-    if symbol == "s" and abs(value) < 1.0:
-        return 1e3 * number, "ms"
-    if symbol == "m" and abs(value) >= 1.0:  # of roads, not of pistons
-        return number, "m"
-    return in_display_unit(float(number), symbol)
+    unit = readable_unit(value, symbol)
+    return convert(float(number), symbol, unit), unit
 
 
 def range_text(leaf: Leaf) -> str:

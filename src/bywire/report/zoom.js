@@ -159,7 +159,8 @@
     };
 
     svg.replaceWith(place);
-    place.append(svg, mark, here, tools);
+    place.append(svg, mark, here);
+    place.after(tools);  // beside the caption: in the figure they would cover what an axis says
     place.tabIndex = 0;
     place.setAttribute("role", "group");
     place.setAttribute("aria-label", HINT);
@@ -187,7 +188,6 @@
       event.preventDefault();
     }, { passive: false });
     place.addEventListener("dblclick", (event) => {
-      if (tools.contains(event.target)) return;
       if (view[2] < full[2] || isTimed()) act.whole(); else act.zoom(0.4, at(event));
     });
 

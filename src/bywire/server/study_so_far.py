@@ -7,9 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bywire.api.study_tables import percent
-from bywire.core.typing import Array
-from bywire.report.wording import amount
+from bywire.api.study_tables import figure_text, percent
 from bywire.studies.findings import Findings
 
 _BINS = 30
@@ -34,7 +32,7 @@ def so_far(findings: Findings) -> list[dict[str, Any]]:
     if not findings.plan.is_sampled or not len(findings.cases):
         return []
     return [
-        {"text": text, **_bars(findings.figure(name), findings.units[name])}
+        {"text": text, **_bars(findings, name)}
         for name, text in (_judged(findings) if findings.judgments else _spread(findings))
     ]
 
@@ -52,13 +50,16 @@ def _judged(findings: Findings) -> Iterator[tuple[str, str]]:
 
 def _spread(findings: Findings) -> Iterator[tuple[str, str]]:
     for each in findings.spreads[:_MOST]:
-        mean, sd = (amount(value, each.unit) for value in (each.mean, each.sd))
+        mean = figure_text(findings, each.name, each.mean)
+        sd = figure_text(findings, each.name, each.sd, is_difference=True)
         yield each.name, f"{each.name}: mean {mean}, standard deviation {sd}"
 
 
-def _bars(values: Array, unit: str) -> dict[str, Any]:
+def _bars(findings: Findings, name: str) -> dict[str, Any]:
+    values = findings.figure(name)
     known = values[np.isfinite(values)]
     if not known.size:
         return {"counts": [], "ends": []}
     counts, edges = np.histogram(known, _BINS)
-    return {"counts": counts.tolist(), "ends": [amount(float(edges[k]), unit) for k in (0, -1)]}
+    ends = [figure_text(findings, name, float(edges[k])) for k in (0, -1)]
+    return {"counts": counts.tolist(), "ends": ends}

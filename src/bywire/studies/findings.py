@@ -27,6 +27,7 @@ from bywire.studies.statistics import (
     Outcome,
     Quantile,
     Share,
+    correlation_ratio,
     influences,
     judged,
     quantile,
@@ -62,7 +63,7 @@ class Judgment:
         whether all do.
     worst
         Row of the case that is worst of all, or of the most probable failing one of a rare failure;
-        None where no case has the figure.
+        None where no case has the figure, or all that do have the same.
     failure
         How probable it is that the requirement is missed, of a study of rare failures: shares of
         its cases are no probabilities.
@@ -145,6 +146,11 @@ class Findings:
         """Return a key figure of every case, shape (cases,)."""
         return np.asarray(self.cases[name], dtype=float)
 
+    def size(self, name: str) -> float:
+        """Return the largest magnitude of a key figure in any case; 0 where none has it."""
+        values = self.figure(name)
+        return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+
     @cached_property
     def judgments(self) -> tuple[Judgment, ...]:
         """Every requirement, in the order of the file."""
@@ -193,16 +199,21 @@ class Findings:
         return effects(self.plan.varied, self.plan.levels, columns, self.figure(name))
 
     def drivers(self, name: str) -> Sequence[str]:
-        """Return the quantities that a key figure goes with, the strongest first; choices apart."""
+        """Return the quantities that a key figure goes with, the strongest first.
+
+        By importance, by indices, or by the size of rank correlations, beside which choices have
+        their correlation ratio: they have no order.
+        """
         if self.rare:
-            numbers = {v.name for v in self.plan.varied if v.unit}
             return [i.quantity for each in self.rare if each.demand.kpi == name
-                    for i in each.importance if i.quantity in numbers]  # fmt: skip
-        if self.plan.sensitivity is None:
-            return [each.quantity for each in self.influences(name)]
-        numbers = {v.name for v in self.plan.varied if v.unit}
-        ranked = [each.quantity for each in self.sensitivity(name).drivers]
-        return [each for each in ranked if each in numbers]
+                    for i in each.importance]  # fmt: skip
+        if self.plan.sensitivity is not None:
+            return [each.quantity for each in self.sensitivity(name).drivers]
+        figure = self.figure(name)
+        sizes = {each.quantity: abs(each.correlation) for each in self.influences(name)}
+        sizes |= {v.name: correlation_ratio(self.cases[v.name], figure)
+                  for v in self.plan.varied if not v.unit}  # fmt: skip
+        return sorted(filter(sizes.__getitem__, sizes), key=lambda quantity: -sizes[quantity])
 
     @cached_property
     def failures(self) -> Mapping[int, str]:
@@ -292,6 +303,8 @@ class Findings:
         sign = -1.0 if compare.startswith("<") else 1.0
         known = np.isfinite(values)
         worst = int(np.argmin(np.where(known, sign * values, np.inf))) if known.any() else None
+        if known.sum() > 1 and np.ptp(values[known]) == 0.0:
+            worst = None  # whichever were named, it would be no worse than the others
         told = replace(share(int(met.sum()), count, confidence), low=surely.low, high=may.high)
         return Judgment(demand, met, told, int(near.sum()), outcome, worst)
 

@@ -154,8 +154,8 @@ def _variance_shares(
     drivers = [
         VarianceShares(
             name,
-            _estimate(indices["S1"][k], indices["S1_conf"][k]),
-            _estimate(indices["ST"][k], indices["ST_conf"][k], least=0.0),
+            _estimate(indices["S1"][k], indices["S1_conf"][k], most=1.0),
+            _estimate(indices["ST"][k], indices["ST_conf"][k], least=0.0, most=1.0),
         )
         for k, name in enumerate(names)
     ]
@@ -181,6 +181,12 @@ def _elementary_effects(
     return Sensitivity(sorted(drivers, key=lambda each: -each.mu_star.value))
 
 
-def _estimate(value: float, reach: float, least: float = -np.inf) -> Estimate:
-    """Return an estimate with its interval, which ends at the least value that can be."""
-    return Estimate(float(value), max(float(value - reach), least), float(value + reach))
+def _estimate(
+    value: float, reach: float, least: float = -np.inf, most: float = np.inf
+) -> Estimate:
+    """Return an estimate with its interval, which ends where values end that can be.
+
+    An estimate may scatter beyond such an end: then the interval ends at the estimate.
+    """
+    low, high = max(value - reach, min(least, value)), min(value + reach, max(most, value))
+    return Estimate(float(value), float(low), float(high))

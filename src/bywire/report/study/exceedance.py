@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.line_role import Role
-from bywire.report.wording import in_display_unit
+from bywire.report.study.readable_axis import few_labels, scale_of
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,15 @@ class Curve:
 
 
 def exceedance(curves: Sequence[Curve]) -> Figure:
-    """Draw every curve over a logarithmic probability, a panel each."""
-    figure, panels = style.new_figure(0.5 + 2.0 * len(curves), [1.0] * len(curves))
+    """Draw every curve over a logarithmic probability, a panel with an abscissa of its own each."""
+    figure, panels = style.new_figure(
+        0.5 + 2.0 * len(curves), [1.0] * len(curves), is_shared=False
+    )
     look = style.STROKES[Role.LIMIT]
     for axes, each in zip(panels, curves, strict=True):
         known = each.probability > 0.0
-        values = in_display_unit(each.values[known], each.unit)[0]
-        limit = in_display_unit(each.limit, each.unit)[0]
+        scale = scale_of(np.append(each.values[known], each.limit), each.unit)
+        values, limit = scale(each.values[known]), scale(each.limit)
         axes.fill_between(values, each.low[known], each.high[known], color=style.SHADE,
                           label="interval")  # fmt: skip
         axes.plot(values, each.probability[known], color=style.BLUE, label="estimate")
@@ -58,6 +60,7 @@ def exceedance(curves: Sequence[Curve]) -> Figure:
         axes.set_yscale("log")
         axes.set_ylabel("probability [-]")
         axes.set_ylim(top=2.0, bottom=0.3 * float(np.min(each.probability[known], initial=0.1)))
-        axes.set_xlabel(style.axis_label(each.name.replace("_", " "), each.unit))
+        few_labels(axes.xaxis, style.WIDTH - 1.0)
+        axes.set_xlabel(scale.label(each.name.replace("_", " ")))
     style.legend_above(panels[0])
     return figure

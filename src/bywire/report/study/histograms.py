@@ -15,12 +15,19 @@ from matplotlib.patches import Patch, Polygon
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.line_role import Role
-from bywire.report.study.readable_axis import beyond, few_labels, limit_text, scale_of
+from bywire.report.study.legend import legend_outside
+from bywire.report.study.readable_axis import (
+    beyond,
+    few_labels,
+    limit_text,
+    name_beyond,
+    scale_of,
+    size_of,
+)
 
 _COLUMNS = 2
 _HEIGHT = 1.5  # of a panel [inch]
 _ROOM = 2.7  # width of a panel [inch]
-_HEADROOM = 1.25  # for the text above the bars
 _BINS = 60  # at most
 
 
@@ -68,24 +75,19 @@ def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
     for axes, (name, spread) in zip(grid.flat, spreads.items(), strict=False):
         style.dress(axes)
         scale = scale_of(spread.values, spread.unit)
-        values = scale.factor * spread.values[np.isfinite(spread.values)]
+        values = scale(spread.values[np.isfinite(spread.values)])
         _draw_counts(axes, values)
         if has_band:
             axes.axvspan(*np.quantile(values, (0.05, 0.95)), color=style.SHADE, zorder=0)
         for at, look in ((spread.nominal, own), (spread.limit, bound)):
             if at is None or not np.isfinite(at):
                 continue
-            if look is bound and (far := beyond(scale.factor * at, values)):
-                text = limit_text(at, spread.unit)
-                axes.set_ylim(top=_HEADROOM * axes.get_ylim()[1])
-                axes.text(
-                    0.99 if far > 0 else 0.01, 0.98, f"{text} →" if far > 0 else f"← {text}",
-                    transform=axes.transAxes, ha="right" if far > 0 else "left",
-                    va="top", color=look.color, fontsize=style.TEXT_SIZE,
-                )  # fmt: skip
+            if look is bound and (far := beyond(scale(at), values)):
+                text = limit_text(at, spread.unit, size_of(spread.values))
+                name_beyond(axes, text, far, look.color)
                 continue
             has_limit |= look is bound
-            axes.axvline(scale.factor * at, color=look.color, linestyle=look.linestyle,
+            axes.axvline(scale(at), color=look.color, linestyle=look.linestyle,
                          linewidth=look.linewidth)  # fmt: skip
         style.few_ticks(axes, 3)
         few_labels(axes.xaxis, _ROOM)
@@ -100,8 +102,7 @@ def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
         lines.append(Line2D([], [], color=bound.color, linestyle=":", label="limit"))
     if has_band:
         lines.append(Patch(color=style.SHADE, label="90 % of the cases"))
-    figure.legend(handles=lines, loc="outside upper left", ncols=3, frameon=False,
-                  fontsize=style.TEXT_SIZE)  # fmt: skip
+    legend_outside(figure, lines)
     return figure
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bywire.report import style
+from bywire.report.study.drawn_cases import BARS
 from bywire.studies.statistics import Influence
 
-_MOST = 8  # bars of a panel
 _BAR = 0.24  # height [inch]
 
 
@@ -19,7 +19,7 @@ def influence_bars(influences: Mapping[str, Sequence[Influence]]) -> Figure:
 
     Quantities whose interval holds zero are pale: they cannot be told from none.
     """
-    shown = {name: list(each)[:_MOST] for name, each in influences.items()}
+    shown = {name: list(each)[:BARS] for name, each in influences.items()}
     counts = [max(len(each), 1) for each in shown.values()]
     figure, panels = style.new_figure(0.7 * len(counts) + _BAR * sum(counts), counts)
     for axes, (name, each) in zip(panels, shown.items(), strict=True):

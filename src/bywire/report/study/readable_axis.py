@@ -3,29 +3,41 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal, overload
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.ticker import MaxNLocator, ScalarFormatter
+from matplotlib.ticker import FixedLocator, MaxNLocator, ScalarFormatter
 
-from bywire.core.quantities import display_unit
 from bywire.core.typing import Array
-from bywire.core.units import display_factor
+from bywire.core.units import convert, difference_unit
 from bywire.report import style
-from bywire.report.wording import measured_amount, unit_text
+from bywire.report.wording import amount, readable_unit, unit_text
 
-_CHARACTER = 0.62 * style.TEXT_SIZE / 72.0  # width of a digit [inch], rounded off
+CHARACTER = 0.62 * style.TEXT_SIZE / 72.0
+"""width of a digit [inch], rounded off"""
 _GAP = 2  # characters between two labels, at least
 _PLAIN = (1e-2, 1e5)  # the largest magnitude that is written without a power of ten
 
 
 @dataclass(frozen=True)
 class Scale:
-    """How an axis writes values: times ``factor``, in ``unit``."""
+    """How an axis writes values: times ``factor``, plus ``offset``, in ``unit``."""
 
     factor: float
     unit: str
+    offset: float = 0.0
+
+    @overload
+    def __call__(self, values: float) -> float: ...
+    @overload
+    def __call__(self, values: Array) -> Array: ...
+    def __call__(self, values: float | Array) -> float | Array:
+        """Return values as they are written."""
+        return self.factor * values + self.offset
 
     def label(self, name: str, gap: str = " ") -> str:
         """Return the label of the axis; ``gap`` stands between name and unit."""
@@ -35,8 +47,8 @@ class Scale:
 def scale_of(values: Array, symbol: str) -> Scale:
     """Return the scale in which values read best.
 
-    That is the display unit, ms for times below 1 s, with a power of ten where figures are too
-    small or too large to be written out.
+    That is the unit that tables write them in, see `bywire.report.wording.readable_unit`, with a
+    power of ten where figures are too small or too large to be written out.
 
     Parameters
     ----------
@@ -48,19 +60,37 @@ def scale_of(values: Array, symbol: str) -> Scale:
     Examples
     --------
     >>> scale_of(np.array([0.06]), "s"), scale_of(np.array([1.1e6]), "N/m")
-    (Scale(factor=1000.0, unit='ms'), Scale(factor=1e-06, unit='10⁶ N/m'))
+    (Scale(factor=1000.0, unit='ms', offset=0.0), Scale(factor=1e-06, unit='10⁶ N/m', offset=0.0))
     """
-    factor, unit = display_factor(symbol), display_unit(symbol)
-    if unit == "degC":  # an axis has a factor and no offset
-        unit = "K"
-    largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
-    if symbol == "s" and 0.0 < largest < 1.0:
-        factor, unit = 1e3, "ms"
-    text, largest = unit_text(unit), factor * largest
-    if largest == 0.0 or _PLAIN[0] <= largest < _PLAIN[1]:
-        return Scale(factor, text)
+    known = values[np.isfinite(values)]
+    unit = readable_unit(size_of(values), symbol)
+    offset = float(convert(0.0, symbol, unit))
+    plain = Scale(_factor(symbol, unit), unit_text(unit), offset)
+    largest = float(np.max(np.abs(plain(known)), initial=0.0))
+    if largest == 0.0 or offset or _PLAIN[0] <= largest < _PLAIN[1]:
+        return plain
     power = 3 * math.floor(math.log10(largest) / 3.0)
-    return Scale(factor * 10.0**-power, f"{unit_text(f'10**{power}')} {text}".strip())
+    return Scale(plain.factor * 10.0**-power, f"{unit_text(f'10**{power}')} {plain.unit}".strip())
+
+
+def size_of(values: Array) -> float:
+    """Return the largest magnitude of values; 0 without any."""
+    return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+
+
+def difference_scale(size: float, symbol: str) -> Scale:
+    """Return the scale of differences of a figure: in its unit, of temperatures in K.
+
+    ``size``: largest magnitude of the figure, in ``symbol``.
+    """
+    of = difference_unit(symbol)
+    unit = readable_unit(size, of)
+    return Scale(_factor(of, unit), unit_text(unit))
+
+
+def _factor(symbol: str, unit: str) -> float:
+    """Return by what numbers of one unit are multiplied in another."""
+    return float(convert(1.0, symbol, unit)) - float(convert(0.0, symbol, unit))
 
 
 def write_out(axis: Axis) -> None:
@@ -85,14 +115,23 @@ def few_labels(axis: Axis, room: float, most: int = 5) -> None:
     write_out(axis)
     formatter = axis.get_major_formatter()
     low, high = sorted(axis.get_view_interval())
-    for count in range(most, 0, -1):
-        locator = MaxNLocator(nbins=count, steps=[1, 2, 2.5, 5, 10], min_n_ticks=1)
-        axis.set_major_locator(locator)
-        places = [at for at in locator.tick_values(low, high) if low <= at <= high]
-        longest = max(map(len, formatter.format_ticks(places)), default=0)
+
+    def fits(places: Sequence[float]) -> bool:
+        longest = max(map(len, formatter.format_ticks(list(places))), default=0)
         step = np.min(np.diff(places), initial=high - low)
-        is_apart = room * step >= (high - low) * (longest + _GAP) * _CHARACTER
-        if len(places) <= most and is_apart:
+        is_apart = room * step >= (high - low) * (longest + _GAP) * CHARACTER
+        return len(places) <= most and bool(is_apart)
+
+    rows = []
+    for count in range(most + 1, 0, -1):  # about so many intervals
+        locator = MaxNLocator(nbins=count, steps=[1, 2, 2.5, 5, 10], min_n_ticks=1)
+        rows.append([at for at in locator.tick_values(low, high) if low <= at <= high])
+    # A single value tells no scale: the ends of a finer row, if all of it has no room, tell it.
+    ends = [[row[0], row[-1]] for row in rows if len(row) > 1]
+    several = [row for row in rows if len(row) > 1]
+    for places in (*several, *ends, *rows):
+        axis.set_major_locator(FixedLocator(places))
+        if fits(places):
             return
 
 
@@ -105,6 +144,33 @@ def beyond(limit: float, values: Array) -> int:
     return int(limit > high + reach) - int(limit < low - reach)
 
 
-def limit_text(limit: float, symbol: str) -> str:
-    """Return what stands at the edge of an axis that does not reach a limit."""
-    return f"limit {measured_amount(limit, symbol, 0.0)}"
+def limit_text(limit: float, symbol: str, size: float) -> str:
+    """Return what stands at the edge of an axis that does not reach a limit.
+
+    ``size``: largest magnitude on the axis, in ``symbol``, whose unit it takes.
+    """
+    return f"limit {amount(limit, symbol, like=size)}"
+
+
+def name_beyond(
+    axes: Axes, text: str, far: int, color: str, place: Literal["left", "right"] | None = None
+) -> None:
+    """Name a limit that an abscissa does not reach above the axes, where nothing is drawn.
+
+    Parameters
+    ----------
+    axes
+        Axes without a title there.
+    text
+        That of `limit_text`.
+    far
+        The side on which the limit lies, see `beyond`.
+    color
+        Of the text.
+    place
+        Where it stands; at that side by default.
+    """
+    axes.set_title(
+        f"{text} →" if far > 0 else f"← {text}", loc=place or ("right" if far > 0 else "left"),
+        fontsize=style.TEXT_SIZE, color=color,
+    )  # fmt: skip

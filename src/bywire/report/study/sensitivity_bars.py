@@ -10,19 +10,22 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from bywire.core.typing import Array
-from bywire.core.units import display_factor
 from bywire.report import style
+from bywire.report.study.drawn_cases import BARS
+from bywire.report.study.legend import legend_outside
+from bywire.report.study.readable_axis import difference_scale
 from bywire.studies.sensitivity import ElementaryEffects, VarianceShares
 
 Drivers = Sequence[VarianceShares] | Sequence[ElementaryEffects]
 
-_MOST = 8  # quantities of a panel
 _BAR = 0.34  # height of a quantity [inch]
 _THICK = 0.38  # of one of its two bars, in the distance of quantities
 _LABELS = {VarianceShares: ("total", "first order"), ElementaryEffects: ("mu*", "sigma")}
 
 
-def sensitivity_bars(drivers: Mapping[str, Drivers], units: Mapping[str, str]) -> Figure:
+def sensitivity_bars(
+    drivers: Mapping[str, Drivers], units: Mapping[str, str], sizes: Mapping[str, float]
+) -> Figure:
     """Draw the indices of every key figure, the strongest quantity on top.
 
     Parameters
@@ -31,31 +34,27 @@ def sensitivity_bars(drivers: Mapping[str, Drivers], units: Mapping[str, str]) -
         Key figure -> its indices, the strongest first; at least one.
     units
         SI unit of every key figure, or ``"%"``.
+    sizes
+        Largest magnitude of every key figure, in that unit.
     """
-    shown: dict[str, Drivers] = {name: each[:_MOST] for name, each in drivers.items()}
+    shown: dict[str, Drivers] = {name: each[:BARS] for name, each in drivers.items()}
     counts = [len(each) for each in shown.values()]
-    figure = Figure(
-        figsize=(style.WIDTH, 0.4 + 0.75 * len(counts) + _BAR * sum(counts)),
-        layout="constrained", facecolor="white",
-    )  # fmt: skip
     # Each with an abscissa of its own: effects have the units of their figures.
-    panels = figure.subplots(
-        len(counts), 1, squeeze=False, gridspec_kw={"height_ratios": [c + 0.5 for c in counts]}
-    )[:, 0]
+    figure, panels = style.new_figure(
+        0.4 + 0.75 * len(counts) + _BAR * sum(counts), [c + 0.5 for c in counts], is_shared=False
+    )
     for axes, (name, each) in zip(panels, shown.items(), strict=True):
-        style.dress(axes)
         axes.set_title(style.plain(name.replace("_", " ")), fontsize=style.TEXT_SIZE, loc="left")
         is_share = isinstance(each[0], VarianceShares)
-        _draw(axes, each, 1.0 if is_share else display_factor(units[name]))
+        scale = difference_scale(sizes[name], units[name])
+        _draw(axes, each, 1.0 if is_share else scale.factor)
         axes.set_xlabel(
-            "share of the variance [-]" if is_share
-            else style.axis_label("elementary effect", units[name])
-        )  # fmt: skip
+            "share of the variance [-]" if is_share else scale.label("elementary effect")
+        )
     labels = _LABELS[type(next(iter(shown.values()))[0])]
     colors = (style.BLUE, style.ORANGE)
     handles = [Patch(color=c, label=text) for c, text in zip(colors, labels, strict=True)]
-    figure.legend(handles=handles, loc="outside upper right", ncols=2, frameon=False,
-                  fontsize=style.TEXT_SIZE)  # fmt: skip
+    legend_outside(figure, handles, "right")
     return figure
 
 

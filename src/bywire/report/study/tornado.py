@@ -12,10 +12,19 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from bywire.report import style
-from bywire.report.study.readable_axis import beyond, few_labels, limit_text, scale_of
+from bywire.report.study.drawn_cases import BARS
+from bywire.report.study.legend import legend_outside
+from bywire.report.study.readable_axis import (
+    Scale,
+    beyond,
+    few_labels,
+    limit_text,
+    name_beyond,
+    scale_of,
+    size_of,
+)
 from bywire.studies.effects import Effect
 
-_MOST = 8  # quantities of a panel
 _BAR = 0.28  # height of a quantity [inch]
 
 
@@ -34,31 +43,25 @@ def tornado(
     limits
         Limits of the key figures that have one, in their unit; only named where they lie far off.
     """
-    shown = {name: each[:_MOST] for name, each in effects.items()}
+    shown = {name: each[:BARS] for name, each in effects.items()}
     counts = [len(each) for each in shown.values()]
-    figure = Figure(
-        figsize=(style.WIDTH, 0.4 + 0.75 * len(counts) + _BAR * sum(counts)),
-        layout="constrained", facecolor="white",
-    )  # fmt: skip
-    panels = figure.subplots(
-        len(counts), 1, squeeze=False, gridspec_kw={"height_ratios": [c + 0.5 for c in counts]}
-    )[:, 0]
+    figure, panels = style.new_figure(
+        0.4 + 0.75 * len(counts) + _BAR * sum(counts), [c + 0.5 for c in counts], is_shared=False
+    )
     has_limit = False
     for axes, (name, each) in zip(panels, shown.items(), strict=True):
-        style.dress(axes)
         axes.set_title(style.plain(name.replace("_", " ")), fontsize=style.TEXT_SIZE, loc="left")
         figures = np.concatenate([[e.nominal, *e.figures] for e in each])
         figures = figures[np.isfinite(figures)]
         scale = scale_of(figures, units[name])
-        _draw(axes, each, scale.factor)
+        _draw(axes, each, scale)
         if (limit := limits.get(name)) is not None:
             if far := beyond(limit, figures):
-                text = limit_text(limit, units[name])
-                axes.set_title(f"{text} →" if far > 0 else f"← {text}", loc="right",
-                               fontsize=style.TEXT_SIZE)  # fmt: skip
+                text = limit_text(limit, units[name], size_of(figures))
+                name_beyond(axes, text, far, style.BLACK, "right")
             else:
                 has_limit = True
-                axes.axvline(scale.factor * limit, color=style.BLACK, linewidth=1.0, linestyle=":")
+                axes.axvline(scale(limit), color=style.BLACK, linewidth=1.0, linestyle=":")
         few_labels(axes.xaxis, style.WIDTH - 2.5)
         axes.set_xlabel(scale.label(name.replace("_", " ")))
     handles: list[Artist] = [
@@ -68,20 +71,19 @@ def tornado(
     if has_limit:
         handles.append(Line2D([], [], color=style.BLACK, linewidth=1.0, linestyle=":",
                               label="limit"))  # fmt: skip
-    figure.legend(handles=handles, loc="outside upper right", ncols=3, frameon=False,
-                  fontsize=style.TEXT_SIZE)  # fmt: skip
+    legend_outside(figure, handles, "right")
     return figure
 
 
-def _draw(axes: Axes, effects: Sequence[Effect], factor: float) -> None:
+def _draw(axes: Axes, effects: Sequence[Effect], scale: Scale) -> None:
     """Draw of each quantity what its lower and its upper end make, from the bench's own figure."""
-    middle = factor * effects[0].nominal
+    middle = scale(effects[0].nominal)
     for place, effect in zip(range(len(effects))[::-1], effects, strict=True):
         for end, color in ((0, style.BLUE), (-1, style.ORANGE)):
-            at = factor * float(effect.figures[end])
+            at = scale(float(effect.figures[end]))
             if np.isfinite(at):
                 axes.barh(place, at - middle, left=middle, height=0.7, color=color)
-        known = factor * effect.figures[np.isfinite(effect.figures)]
+        known = scale(effect.figures[np.isfinite(effect.figures)])
         axes.plot(known, np.full(known.size, place), "|", color=style.BLACK, markersize=6.0)
     axes.set_yticks(
         range(len(effects))[::-1], [style.plain(each.quantity, 40) for each in effects]

@@ -1,0 +1,21 @@
+"""The one legend of a figure whose panels share what their lines mean."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+from matplotlib.artist import Artist
+from matplotlib.figure import Figure
+
+from bywire.report import style
+
+
+def legend_outside(
+    figure: Figure, handles: Sequence[Artist], place: Literal["left", "right"] = "left"
+) -> None:
+    """Put one legend above all panels of a figure, at its left or right end."""
+    figure.legend(
+        handles=list(handles), ncols=3, frameon=False, fontsize=style.TEXT_SIZE,
+        loc="outside upper left" if place == "left" else "outside upper right",
+    )  # fmt: skip

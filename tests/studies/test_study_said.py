@@ -1,0 +1,86 @@
+"""What reports of studies say is true: units, what is left out, who misses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bywire.api.study_figures import study_figures
+from bywire.api.study_tables import influence_tables, spread_table
+from bywire.bench.kpis.kpi import Kpi
+from bywire.report.document import FigureBlock
+from bywire.report.study.readable_axis import scale_of
+from bywire.studies.chunk import CASE, FAILURE, WARNINGS
+from bywire.studies.findings import Findings
+from bywire.studies.study_file import read_study
+
+QUANTITIES = ("motor.R_m", "motor.K_e", "motor.L_m", "gear.J_mot", "seal.T_pr", "caliper.K_pd",
+              "supply.V_bat")  # fmt: skip
+CASES = 1000
+BENCH = 'experiment = "hard-braking"\nparameters = "dardanelli2010"\n'
+
+
+@pytest.fixture
+def found(study):
+    """Return a function that makes findings of one key figure, which rises with all that varies."""
+
+    def make(name: str, values: np.ndarray, limit: str) -> Findings:
+        varied = "".join(f'"{each}" = "+-5 %"\n' for each in QUANTITIES)
+        text = f'[vary]\n{varied}[requirements]\n{name} = "{limit}"\n'
+        plan = read_study(study(text, bench=BENCH))
+        rng = np.random.default_rng(1)
+        columns = {each: np.full(values.size, math.nan)
+                   for each in plan.bench.definition.kpis_with(plan.bench.chosen_options)}
+        columns |= {each: values + rng.normal(size=values.size) for each in QUANTITIES}
+        columns |= {CASE: np.arange(values.size), name: values}
+        columns |= {FAILURE: np.full(values.size, ""), WARNINGS: np.full(values.size, "")}
+        return Findings(plan, pd.DataFrame(columns), (Kpi(name, float(values[0]), "s", "A time."),))
+
+    return make
+
+
+def captions(findings: Findings) -> Mapping[str, str]:
+    blocks = study_figures(findings, dict)
+    return {each.name: each.caption for each in blocks if isinstance(each, FigureBlock)}
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "unit"), [(0.05, 0.07, "ms"), (0.9, 1.1, "s"), (2.0, 3.0, "s")]
+)
+def test_a_figure_has_one_unit_in_its_row_and_on_its_axis(found, low, high, unit):
+    values = np.linspace(low, high, CASES)
+    findings = found("rise_time", values, "<= 5 s with 90 %")
+    (row,) = spread_table(findings).rows
+    assert {cell.text.split()[-1] for cell in row[1:]} == {unit}
+    assert scale_of(values, "s").unit == unit
+
+
+def test_a_table_of_drivers_says_how_many_it_leaves_out(found):
+    findings = found("rise_time", np.linspace(0.05, 0.07, CASES), "<= 60 ms with 90 %")
+    (table,) = influence_tables(findings)
+    assert len(table.table.rows) == 5
+    said = "What drives rise_time, the 5 strongest, and 2 more in report.json."
+    assert table.caption == said
+
+
+def test_captions_say_who_is_drawn_and_who_misses(found):
+    values = np.linspace(0.05, 0.07, CASES)
+    every = captions(found("rise_time", values, "<= 60 ms with 90 %"))
+    assert "crosses miss the limit" in every["scatter-rise_time"]
+    assert every["parallel"].endswith("Drawn are 300 of 500 cases that meet all requirements and "
+                                      "300 of 500 cases that miss one.")  # fmt: skip
+    none = captions(found("rise_time", values, "<= 80 ms with 90 %"))
+    assert "crosses" not in none["scatter-rise_time"]
+    assert "miss" not in none["parallel"]
+    lacking = captions(found("rise_time", np.where(values < 0.06, values, np.nan), "<= 60 ms"))
+    assert lacking["scatter-rise_time"].endswith("500 cases without it are left out.")
+
+
+def test_no_more_points_are_left_out_than_are_said(found):
+    values = np.linspace(0.05, 0.07, 9000)
+    said = captions(found("rise_time", values, "<= 69.5 ms with 90 %"))["scatter-rise_time"]
+    assert "Drawn are 4000 of 8775 cases that meet the limit and all 225 that miss it." in said
