@@ -19,7 +19,8 @@ from bywire.bench.result import Result
 from bywire.report.document import Attachment, recording_file
 from bywire.report.wording import amount
 from bywire.studies.chunk import case_bench
-from bywire.studies.findings import Findings, Judgment
+from bywire.studies.findings import Findings
+from bywire.studies.judgment import Judgment
 
 if TYPE_CHECKING:
     import xarray as xr

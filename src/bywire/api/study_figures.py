@@ -14,7 +14,8 @@ from bywire.api.study_tables import shown_figures, strongest
 from bywire.bench.requirements import limit_of
 from bywire.report.document import Block, FigureBlock
 from bywire.report.study.drawn_cases import LINES, POINTS, DrawnCases, drawn_cases
-from bywire.studies.findings import Findings, Judgment
+from bywire.studies.findings import Findings
+from bywire.studies.judgment import Judgment
 from bywire.studies.plan import CHUNK
 from bywire.studies.statistics import running_share
 

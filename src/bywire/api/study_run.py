@@ -40,8 +40,10 @@ from bywire.report.document import (
     spaced,
 )
 from bywire.report.subject import Subject
-from bywire.studies.findings import Findings, Judgment, Spread
+from bywire.studies.findings import Findings
+from bywire.studies.judgment import Judgment
 from bywire.studies.plan import StudyPlan
+from bywire.studies.spread import Spread
 from bywire.studies.store import StudyStore
 
 if TYPE_CHECKING:

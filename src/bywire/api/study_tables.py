@@ -13,7 +13,8 @@ from bywire.report.study.drawn_cases import BARS
 from bywire.report.tables import OUTCOMES, Cell, Column, Table, text_table, value_text
 from bywire.report.wording import amount, clean
 from bywire.studies.effects import Effect
-from bywire.studies.findings import Findings, Judgment
+from bywire.studies.findings import Findings
+from bywire.studies.judgment import Judgment
 from bywire.studies.plan import StudyPlan
 from bywire.studies.sought_design import WORST
 from bywire.studies.statistics import Influence, Share

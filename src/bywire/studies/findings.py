@@ -14,24 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.requirements import is_met, limit_of
+from bywire.bench.requirements import limit_of
 from bywire.core.typing import Array
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.effects import ONE, Effect, effects
-from bywire.studies.failure_probability import FailureProbability
+from bywire.studies.judgment import Judgment, close_to, judgment_of
 from bywire.studies.plan import Demand, StudyPlan
 from bywire.studies.rare_failures import RareFailure
 from bywire.studies.sensitivity import Sensitivity, sensitivity
+from bywire.studies.spread import Spread, spread_of
 from bywire.studies.statistics import (
     Influence,
-    Outcome,
-    Quantile,
-    Share,
     correlation_ratio,
     influences,
-    judged,
-    quantile,
-    share,
 )
 from bywire.studies.worst_case import WorstCase
 
@@ -39,74 +34,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-QUANTILES = (0.05, 0.5, 0.95)
-"""shares of the cases below the quantiles that are shown"""
-
-
-@dataclass(frozen=True)
-class Judgment:
-    """A requirement over all cases.
-
-    Parameters
-    ----------
-    demand
-        The requirement.
-    met
-        Whether each case meets it, shape (cases,); a case without a result does not.
-    share
-        How often, and the interval of the probability, whatever cases that are too close to the
-        limit are.
-    undecided
-        Cases no further from the limit than their figure may be off by the step.
-    outcome
-        Whether it is met with the probability that is wanted; of one that every case has to meet,
-        whether all do.
-    worst
-        Row of the case that is worst of all, or of the most probable failing one of a rare failure;
-        None where no case has the figure, or all that do have the same.
-    failure
-        How probable it is that the requirement is missed, of a study of rare failures: shares of
-        its cases are no probabilities.
-    """
-
-    demand: Demand
-    met: NDArray[np.bool_]
-    share: Share
-    undecided: int
-    outcome: Outcome
-    worst: int | None
-    failure: FailureProbability | None = None
-
-
-@dataclass(frozen=True)
-class Spread:
-    """A key figure over all cases; values in ``unit``, NaN where no case has it.
-
-    Parameters
-    ----------
-    name, unit
-        The figure.
-    nominal
-        What the bench itself gives.
-    undefined
-        Cases in which it is not defined, or without a result.
-    mean, sd
-        Mean and standard deviation.
-    quantiles
-        Those of `QUANTILES`, with intervals.
-    least, largest
-        Ends.
-    """
-
-    name: str
-    unit: str
-    nominal: float
-    undefined: int
-    mean: float
-    sd: float
-    quantiles: tuple[Quantile, ...]
-    least: float
-    largest: float
 
 
 @dataclass(frozen=True, repr=False)
@@ -163,7 +90,9 @@ class Findings:
         """Every key figure that any case has."""
         nominal = {kpi.name: kpi.value for kpi in self.nominal}
         return tuple(
-            self._spread(name, unit, nominal.get(name, math.nan))
+            spread_of(
+                name, unit, nominal.get(name, math.nan), self.figure(name), self.plan.confidence
+            )
             for name, unit in (self.units if len(self.cases) else {}).items()
             if np.isfinite(self.figure(name)).any()
         )  # fmt: skip
@@ -284,36 +213,10 @@ class Findings:
     def is_close(self, demand: Demand) -> NDArray[np.bool_]:
         """Return which cases are no further from a limit than their figure may be off."""
         _, bound = limit_of(demand.kpi, demand.limit, self.units[demand.kpi])
-        return np.asarray(np.abs(self.figure(demand.kpi) - bound) <= self._error(demand.kpi))
+        return close_to(bound, self.figure(demand.kpi), self._error(demand.kpi))
 
     def _judgment(self, demand: Demand) -> Judgment:
-        values, near = self.figure(demand.kpi), self.is_close(demand)
-        compare, bound = limit_of(demand.kpi, demand.limit, self.units[demand.kpi])
-        met = is_met(values, compare, bound)
-        count, confidence = values.size, self.plan.confidence
-        may, surely = (
-            share(int(each.sum()), count, confidence) for each in (met | near, met & ~near)
+        kpi = demand.kpi
+        return judgment_of(
+            demand, self.units[kpi], self.figure(kpi), self._error(kpi), self.plan.confidence
         )
-        if demand.probability is not None:
-            outcome = judged(may, surely, demand.probability)
-        elif may.count < count:
-            outcome = "missed"
-        else:
-            outcome = "met" if surely.count == count else "undecided"
-        sign = -1.0 if compare.startswith("<") else 1.0
-        known = np.isfinite(values)
-        worst = int(np.argmin(np.where(known, sign * values, np.inf))) if known.any() else None
-        if known.sum() > 1 and np.ptp(values[known]) == 0.0:
-            worst = None  # whichever were named, it would be no worse than the others
-        told = replace(share(int(met.sum()), count, confidence), low=surely.low, high=may.high)
-        return Judgment(demand, met, told, int(near.sum()), outcome, worst)
-
-    def _spread(self, name: str, unit: str, nominal: float) -> Spread:
-        values = self.figure(name)
-        known = values[np.isfinite(values)]
-        return Spread(
-            name, unit, nominal, values.size - known.size, float(known.mean()),
-            float(known.std(ddof=1)) if known.size > 1 else math.nan,
-            tuple(quantile(known, p, self.plan.confidence) for p in QUANTILES),
-            float(known.min()), float(known.max()),
-        )  # fmt: skip
