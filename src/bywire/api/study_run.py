@@ -153,8 +153,8 @@ class StudyRun(Answer):
         plan, findings = self.plan, self.findings
         if not len(self.cases):
             return self._empty()
-        subject = Subject(plan.name, plan.bench.definition.summary, plan.bench.parameters,
-                          plan.bench.par)  # fmt: skip
+        summary = plan.bench.summary([each.name for each in plan.varied])
+        subject = Subject(plan.name, summary, plan.bench.parameters, plan.bench.par)
         is_rare = bool(findings.rare)
         table = failure_table(findings) if is_rare else demand_table(findings)
         demands = TableBlock(table, width=120)
