@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+_BRIEF = 3  # tables of drivers that a terminal shows
 
 
 @dataclass(frozen=True, repr=False)
@@ -165,6 +166,7 @@ class StudyRun(Answer):
             else sensitivity_tables(findings) if is_indexed
             else influence_tables(findings) + effect_tables(findings)
         )  # fmt: skip
+        more = len(drivers) - _BRIEF
         unindexed = [Listing(said)] if (said := missing_indices(findings)) else []
         judged: list[Block] = [demands] if plan.demands else []
         texts = self._shown.texts()
@@ -186,7 +188,8 @@ class StudyRun(Answer):
                 subject.provenance(f"Chunks of the study: {self.folder}."),
             ],
             brief=spaced([
-                *([demands] if judged else []), spreads, *drivers[:3],
+                *([demands] if judged else []), spreads, *drivers[:_BRIEF],
+                *([f"and {more} more such tables in the report"] if more > 0 else []),
                 *([Listing(missing, "Cases without a result")] if missing else []),
             ]),
             data=self._data,
