@@ -140,6 +140,8 @@ def test_a_parameter_a_group_a_signal_and_a_key_figure(bywire: Bywire) -> None:
     figure = only(bywire("list", "overshoot", "--json"), "KPI")
     assert figure["unit"] == "%"
     assert "hard-braking" in figure["experiments"].split(", ")
+    distance = only(bywire("list", "stopping_distance", "--json"), "KPI")
+    assert distance["unit"] == "mm or m"  # as reports write it, by its size
     refused(bywire("list", "motor.R_n"), "unknown name 'motor.R_n'", "'motor.R_m'")
 
 

@@ -11,6 +11,7 @@ from bywire.report.wording import (
     duration,
     error_text,
     measured_amount,
+    readable_units,
     unit_text,
 )
 
@@ -44,6 +45,19 @@ def test_units_are_written_as_in_print(symbol: str, written: str) -> None:
 )
 def test_amounts_are_in_display_units(value: float | None, symbol: str, written: str) -> None:
     assert amount(value, symbol) == written
+
+
+@pytest.mark.parametrize(
+    ("value", "symbol", "like", "written"),
+    [(0.9, "m", 41.0, "0.9 m"), (0.9, "m", 0.9, "900 mm"), (0.06, "s", 0.09, "60 ms"),
+     (0.06, "s", 1.2, "0.06 s"), (0.06, "s", None, "0.06 s"), (2e6, "Pa", 0.0, "20 bar")],
+)  # fmt: skip
+def test_a_figure_of_many_values_has_the_unit_of_the_largest(
+    value: float, symbol: str, like: float | None, written: str
+) -> None:
+    assert amount(value, symbol, like=like) == written
+    if like is not None:
+        assert written.split()[1] in readable_units(symbol).split(" or ")
 
 
 def test_axis_labels_name_quantity_and_unit() -> None:

@@ -82,7 +82,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="apply-release",
     assembly="emb-caliper",
-    summary="ramp to 25 kN, hold, ramp down, park: tracking, holding current, release",
+    summary="ramp to {F_top:kN}, hold, ramp down, park: tracking, holding current, release",
     options=Options,
     defaults=Options(F_top=25e3, t_ramp=0.5, t_hold=0.5, duration=2.0),
     cases=cases,

@@ -53,7 +53,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="approach",
     assembly="emb-approach",
-    summary="linear benchmark of 2015: step over a clearance of 5 mm, no contact",
+    summary="linear benchmark of 2015: step over a clearance of {x_to}, no contact",
     options=Options,
     defaults=Options(x_to=5e-3, duration=0.1),
     cases=cases,

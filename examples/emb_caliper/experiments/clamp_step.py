@@ -72,7 +72,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="clamp-step",
     assembly="emb-caliper",
-    summary="step of the force demand, from the parked piston to 25 kN",
+    summary="step of the force demand, from the parked piston to {F_to:kN}",
     options=Options,
     defaults=Options(F_from=0.0, F_to=25e3, duration=0.8, settle=0.02),
     cases=cases,

@@ -64,7 +64,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="power-off",
     assembly="emb-caliper",
-    summary="25 kN, then no current: what clamp force the friction holds",
+    summary="{F_from:kN}, then no current: what clamp force the friction holds",
     options=Options,
     defaults=Options(F_from=25e3, circuit="open", duration=1.0),
     cases=cases,

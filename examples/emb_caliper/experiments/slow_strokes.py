@@ -93,7 +93,7 @@ def _current_at(run: xr.Dataset, level: float, moving: Array) -> float:
 EXPERIMENT = Experiment(
     name="slow-strokes",
     assembly="emb-caliper",
-    summary="up to 30 kN and back at constant motor speeds: friction over load and speed",
+    summary="up to {F_top:kN} and back at constant motor speeds: friction over load and speed",
     options=Options,
     defaults=Options(F_top=30e3, speeds=(20.0, 50.0, 120.0), record=2e-4),
     cases=cases,

@@ -83,7 +83,7 @@ class Replay(Answer):
         """Return how well it fits, stretch by stretch, with figures and tracked parameters."""
         bench, inputs = self.bench, ", ".join(map(str, self.replayed.inputs.data_vars))
         subject = Subject(
-            bench.name or bench.experiment, bench.definition.summary, bench.parameters,
+            bench.name or bench.experiment, bench.summary(), bench.parameters,
             self.replayed.run.par,
         )  # fmt: skip
         table = TableBlock(fit_table(self.fits), width=110)

@@ -97,7 +97,7 @@ class BenchResult(Result, Answer):
         notes += [Listing(beside)] if beside else []
         return Document(
             bench.name or bench.experiment,
-            f"{bench.definition.summary}; parameter set {bench.parameters}",
+            f"{bench.summary()}; parameter set {bench.parameters}",
             sections=lambda: [
                 outcome(self, self.rows, notes),
                 Section("Figures", [*self._figures(), *source_says(self)]),

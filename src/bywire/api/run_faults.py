@@ -80,7 +80,8 @@ class FaultCampaign(Answer):
         """Return the table of faults, coverage, and when each is too much and seen."""
         plan, findings = self.findings.plan, self.findings
         bench = plan.bench
-        subject = Subject(plan.name, bench.definition.summary, bench.parameters, bench.par)
+        varied = [each.name for each in plan.varied]
+        subject = Subject(plan.name, bench.summary(varied), bench.parameters, bench.par)
         table = TableBlock(self._table(), width=0)
         residuals = TableBlock(self._residual_table(), width=120)
         kinds = ", ".join(f"{n} {kind}" for kind, n in findings.kinds().most_common())

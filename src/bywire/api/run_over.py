@@ -106,7 +106,7 @@ class BenchRange(Answer):
         bench = self.bench
         kpis = self._kpis()
         title = bench.name or bench.experiment
-        subject = Subject(title, bench.definition.summary, bench.parameters, bench.par)
+        subject = Subject(title, bench.summary([self.name]), bench.parameters, bench.par)
         pieces = [kpis[k : k + _COLUMNS] for k in range(0, len(kpis), _COLUMNS)]
         tables = [TableBlock(self._table(piece), width=110) for piece in pieces]
         verdicts = list(self._verdict_texts())

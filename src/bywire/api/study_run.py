@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+_BRIEF = 3  # tables of drivers that a terminal shows
 
 
 @dataclass(frozen=True, repr=False)
@@ -160,8 +161,8 @@ class StudyRun(Answer):
         plan, findings = self.plan, self.findings
         if not len(self.cases):
             return self._empty()
-        subject = Subject(plan.name, plan.bench.definition.summary, plan.bench.parameters,
-                          plan.bench.par)  # fmt: skip
+        summary = plan.bench.summary([each.name for each in plan.varied])
+        subject = Subject(plan.name, summary, plan.bench.parameters, plan.bench.par)
         is_rare = bool(findings.rare)
         table = failure_table(findings) if is_rare else demand_table(findings)
         demands = TableBlock(table, width=120)
@@ -172,6 +173,7 @@ class StudyRun(Answer):
             else sensitivity_tables(findings) if is_indexed
             else influence_tables(findings) + effect_tables(findings)
         )  # fmt: skip
+        more = len(drivers) - _BRIEF
         unindexed = [Listing(said)] if (said := missing_indices(findings)) else []
         judged: list[Block] = [demands] if plan.demands else []
         figures = [spreads] if findings.spreads else []
@@ -195,7 +197,8 @@ class StudyRun(Answer):
                 subject.provenance(f"Chunks of the study: {self.folder}."),
             ],
             brief=spaced([
-                *([demands] if judged else []), *figures, *drivers[:3],
+                *([demands] if judged else []), *figures, *drivers[:_BRIEF],
+                *([f"and {more} more such tables in the report"] if more > 0 else []),
                 *([Listing(missing, "Cases without a result")] if missing else []),
             ]),
             data=self._data,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -181,6 +181,14 @@ class Bench:
     def chosen_stimulus(self) -> Stimulus | None:
         """Validated stimulus of a plain section; None where none is given."""
         return self.chosen_stimuli.get("")
+
+    def summary(self, varied: Collection[str] = ()) -> str:
+        """Return what its experiment does in one line, with the options that it has.
+
+        ``varied``: quantities that take several values, ``options.NAME`` among them.
+        """
+        own = {name.removeprefix("options.") for name in varied if name.startswith("options.")}
+        return self.definition.summary_with(self.chosen_options, own)
 
     def cases(self) -> tuple[Case, ...]:
         """Return the runs that the experiment consists of, with settling times as they are run."""

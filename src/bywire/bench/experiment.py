@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.bench.experiment_summary import Summary, summary_of
 from bywire.bench.kpis import hysteresis, sine_sweep, step_response, tracking
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.noise import put_noise
@@ -144,7 +145,9 @@ class Experiment:
     assembly
         Name of the assembly that it tests.
     summary
-        One line for listings.
+        One line for listings and below the titles of reports. What it says of options has to be
+        true with others too: names of options in braces, if need be with a unit,
+        ``"stop from {v_0:km/h}"``, become their values, see `summary_with`.
     options
         Class of its options, each with unit and range.
     defaults
@@ -213,6 +216,15 @@ class Experiment:
     named: Callable[[Any], Mapping[str, str]] | None = None
     begins_at: Mapping[str, str] = field(default_factory=dict)
     compared: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        template = getattr(self.summary, "template", self.summary)
+        object.__setattr__(self, "summary", summary_of(template, self.defaults))
+
+    def summary_with(self, options: Any, varied: Collection[str] = ()) -> str:
+        """Return the summary with the values of options; ``varied``: those that have several."""
+        assert isinstance(self.summary, Summary)
+        return summary_of(self.summary.template, options, varied)
 
     def kpis_with(self, options: Any) -> dict[str, str]:
         """Return the unit of every key figure by name, those that the options leave out apart."""

@@ -47,6 +47,8 @@ _COMMON: dict[str, tuple[float, str]] = {
     "%": (1e-2, "1"),
     "": (1.0, "1"),
 }
+# Further ones that texts are written in: of those above, numbers read keep their last digits.
+_WRITTEN: dict[str, tuple[float, str]] = {"km/h": (1.0 / 3.6, "m/s"), "kN": (1e3, "N")}
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*", re.DOTALL)
 # Names, products, quotients and small powers; nothing that would make pint compute. A separator
 # between two names is required: without one, a long word could be split in a billion ways.
@@ -238,9 +240,15 @@ def _wanted(symbol: str) -> str:
     return _WORDS.get(symbol, symbol)
 
 
-def shown(value: float, symbol: str) -> str:
-    """Return a value as the edges show it, for instance ``25 bar``."""
-    unit = display_unit(symbol)
+def shown(value: float, symbol: str, unit: str = "") -> str:
+    """Return a value as the edges show it, for instance ``25 bar``, or in another unit.
+
+    Examples
+    --------
+    >>> shown(25e5, "Pa"), shown(100.0 / 3.6, "m/s", "km/h")
+    ('25 bar', '100 km/h')
+    """
+    unit = unit or display_unit(symbol)
     number = convert(value, symbol, unit)
     return f"{number:.6g}" + ("" if unit == "1" else f" {unit}")
 
@@ -251,7 +259,7 @@ def convert(value: F, symbol: str, unit: str) -> F:
         return value
     if {symbol, unit} == {"K", "degC"}:
         return value - ICE if unit == "degC" else value + ICE  # type: ignore[operator,return-value]
-    common = _COMMON.get(unit)
+    common = _COMMON.get(unit, _WRITTEN.get(unit))
     if common is not None and common[1] == symbol:
         return value / common[0]  # type: ignore[operator,return-value]
     factor: float = registry().Quantity(1.0, symbol).to(unit).magnitude

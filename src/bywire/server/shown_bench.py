@@ -50,5 +50,5 @@ def shown_bench(path: Path, name: str) -> ShownBench:
         return ShownBench(name, experiments()[name], trouble=str(error))
     # By their preview: the runs themselves may begin where others ended, and these take a while.
     cases = bench.cases_with(bench.par, bench.chosen_options, bench.definition.preview)
-    summary = f"{bench.definition.summary}; parameters {bench.parameters}"
+    summary = f"{bench.summary()}; parameters {bench.parameters}"
     return ShownBench(name, summary, tuple(case.label for case in cases))

@@ -72,7 +72,7 @@ class Unit:
         head = {
             "modelName": f"{bench.name or bench.experiment}, {self.faces.part}",
             "description": f"{self.made.run.model.name} of the bench "
-                           f"{bench.name or bench.experiment}: {bench.definition.summary}",
+                           f"{bench.name or bench.experiment}: {bench.summary()}",
             "generationTool": f"bywire {__version__}",
         }  # fmt: skip
         arguments = (self.made, self.faces, self.identifier, self.token, head)

@@ -43,7 +43,7 @@ def documentation(made: Exported, faces: Interface, begins_anywhere: bool, versi
     is_exchanged = faces.kind == "model-exchange"
     facts = [
         ("Model", made.run.model.name),
-        ("Experiment", f"{bench.experiment}, run {made.case.label!r}: {bench.definition.summary}"),
+        ("Experiment", f"{bench.experiment}, run {made.case.label!r}: {bench.summary()}"),
         ("Parameter set", bench.parameters),
         ("Time 0", f"{shown(made.case.settle, 's')} before time zero of the bench's recording"),
         *(() if is_exchanged else (

@@ -228,7 +228,7 @@ def _shown(symbol: str) -> Mapping[str, float]:
 
 def _summary(made: Exported) -> str:
     label = f", run {made.case.label}" if len(made.bench.cases()) > 1 else ""
-    return f"{made.bench.definition.summary}{label}; parameters {made.bench.parameters}"
+    return f"{made.bench.summary()}{label}; parameters {made.bench.parameters}"
 
 
 def _footer(made: Exported) -> str:

@@ -49,7 +49,7 @@ def judged(options: Options) -> dict[str, Any]:
 EXPERIMENT = Experiment(
     name="current-step",
     assembly="motorcycle-brake",
-    summary="step of 0.73 A in the closed current loop (Fig. 3)",
+    summary="step of {i_step} in the closed current loop (Fig. 3)",
     options=Options,
     defaults=Options(i_step=0.73, duration=0.04, record=1e-4),
     cases=cases,

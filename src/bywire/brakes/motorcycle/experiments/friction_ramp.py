@@ -95,7 +95,7 @@ _LOOP = units_of("hysteresis", "occupation", resolved={"drive": "A", "drive*resp
 EXPERIMENT = Experiment(
     name="friction-ramp",
     assembly="motorcycle-brake",
-    summary="slow current ramp to 5 A and back, without and with dither (Fig. 5, eq. 17)",
+    summary="slow current ramp to {i_max} and back, without and with dither (Fig. 5, eq. 17)",
     options=Options,
     defaults=Options(i_max=5.0, slope=0.2, f_filter=20.0, smoothing=0.02),
     cases=cases,

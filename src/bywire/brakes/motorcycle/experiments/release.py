@@ -90,7 +90,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="release",
     assembly="motorcycle-brake",
-    summary="release from 37 bar: time to empty, residual pressure, energy returned",
+    summary="release from {p_from}: time to empty, residual pressure, energy returned",
     options=Options,
     defaults=Options(
         p_from=37e5, how="controlled", t_ramp=0.2, p_empty=0.5e5, duration=1.5, settle=1.0

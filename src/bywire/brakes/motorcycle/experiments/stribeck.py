@@ -69,7 +69,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="stribeck",
     assembly="motorcycle-brake",
-    summary="friction torque over speed at 2, 20 and 40 bar (Fig. 4)",
+    summary="friction torque over speed at {pressures} (Fig. 4)",
     options=Options,
     defaults=Options(pressures=(2e5, 20e5, 40e5), omega_max=2.0),
     cases=lambda *_: (),

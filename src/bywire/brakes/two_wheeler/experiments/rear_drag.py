@@ -87,7 +87,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="rear-drag",
     assembly="two-wheeler-whole-rear",
-    summary="the rider lets the whole rear brake go at 20 m/s: what drags on",
+    summary="the rider lets the whole rear brake go at {v_0}: what drags on",
     options=Options,
     defaults=Options(v_0=20.0, p_rear=20e5, hold=0.5, surface="dry-asphalt", duration=2.0),
     cases=cases,

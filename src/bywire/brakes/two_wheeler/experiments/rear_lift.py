@@ -77,7 +77,7 @@ def _lift(run: xr.Dataset, off: np.ndarray) -> dict[str, float | tuple[float, st
 EXPERIMENT = Experiment(
     name="rear-lift",
     assembly="two-wheeler-by-wire",
-    summary="front brake alone from 30 m/s on dry asphalt, 27 bar; lift control is a parameter",
+    summary="front brake alone from {v_0}, {p_front}; lift control is a parameter",
     options=Options,
     defaults=Options(v_0=30.0, p_front=27e5, p_rate=60e5, grip=1.2, duration=1.5),
     cases=cases,

@@ -233,7 +233,8 @@ _DEFAULTS = Options(
 EXPERIMENT = Experiment(
     name="repeated-stops",
     assembly="two-wheeler-by-wire",
-    summary="ten stops from 100 km/h at 8 m/s^2 every 30 s with brakes that warm up, then parked",
+    summary="{stops} stops from {v_0:km/h} at {deceleration} every {pause} with brakes that warm "
+    "up, then parked",
     options=Options,
     defaults=_DEFAULTS,
     cases=cases,

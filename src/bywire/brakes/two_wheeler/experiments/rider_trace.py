@@ -98,7 +98,7 @@ def _shares(run: xr.Dataset) -> dict[str, float]:
 EXPERIMENT = Experiment(
     name="rider-trace",
     assembly="two-wheeler-by-wire",
-    summary="stop from 30 m/s on wet asphalt by a rider's trace, built in or given by stimuli",
+    summary="stop from {v_0} on {surface} by a rider's trace, built in or given by stimuli",
     options=Options,
     defaults=Options(v_0=30.0, surface="wet-asphalt", duration=8.0),
     cases=cases,

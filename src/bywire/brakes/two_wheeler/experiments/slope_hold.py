@@ -121,7 +121,7 @@ def _slope(t: Array, v: Array, gradient: float) -> float:
 EXPERIMENT = Experiment(
     name="slope-hold",
     assembly="two-wheeler-by-wire",
-    summary="stop from 3 m/s on a slope of 5 %, held for 20 s, then let go",
+    summary="stop from {v_0} on a slope of {gradient:%}, held until {t_release}, then let go",
     options=Options,
     defaults=Options(
         v_0=3.0, p_front=40e5, p_rear=40e5, gradient=0.05, t_release=23.0, duration=25.0

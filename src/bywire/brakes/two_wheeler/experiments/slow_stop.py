@@ -89,7 +89,7 @@ def _rest(run: xr.Dataset, end: float) -> dict[str, float | tuple[float, str]]:
 EXPERIMENT = Experiment(
     name="slow-stop",
     assembly="two-wheeler-by-wire",
-    summary="stop from 3 m/s without control, then held on level road or slope",
+    summary="stop from {v_0} without control, then held on level road or slope",
     options=Options,
     defaults=Options(v_0=3.0, p_front=40e5, p_rear=40e5, gradient=0.0, duration=5.0),
     cases=cases,

@@ -46,7 +46,7 @@ def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tupl
 EXPERIMENT = Experiment(
     name="straight-stop",
     assembly="two-wheeler-by-wire",
-    summary="panic stop from 100 km/h, 40 bar on both brakes, on any surface",
+    summary="panic stop from {v_0:km/h} with {p_front} in front and {p_rear} behind, on {surface}",
     options=Options,
     defaults=Options(
         v_0=_FROM, p_front=40e5, p_rear=40e5, surface="dry-asphalt", duration=0.0

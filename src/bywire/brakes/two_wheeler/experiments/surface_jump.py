@@ -91,7 +91,7 @@ def _recovery(run: xr.Dataset, options: Options) -> dict[str, float | tuple[floa
 EXPERIMENT = Experiment(
     name="surface-jump",
     assembly="two-wheeler-by-wire",
-    summary="panic stop from 30 m/s, dry asphalt turns wet after 15 m",
+    summary="panic stop from {v_0}, {first} turns {further} after {x_change:m}",
     options=Options,
     defaults=Options(
         v_0=30.0,

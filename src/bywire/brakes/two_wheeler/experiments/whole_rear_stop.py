@@ -53,7 +53,7 @@ def price(run: xr.Dataset, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="whole-rear-stop",
     assembly="two-wheeler-whole-rear",
-    summary="panic stop with the whole motorcycle brake by wire at the rear wheel, 40 bar",
+    summary="panic stop with the whole motorcycle brake by wire at the rear wheel, {p_rear}",
     options=Options,
     defaults=Options(
         v_0=30.0, p_front=40e5, p_rear=40e5, surface="wet-asphalt", duration=0.0

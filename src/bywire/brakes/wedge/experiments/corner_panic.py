@@ -116,7 +116,7 @@ def _ideal(v_0: float, par: WedgeCornerParameters) -> float:
 EXPERIMENT = Experiment(
     name="corner-panic",
     assembly="wedge-corner",
-    summary="the wedge brake stops a quarter of a car from 100 km/h on wet road, by slip control",
+    summary="the wedge brake stops a quarter of a car from {v_0:km/h} on {surface} by slip control",
     options=Options,
     defaults=Options(
         v_0=100.0 / 3.6, M_brake=1500.0, surface="wet-asphalt", T_disc=293.15, duration=5.0

@@ -109,7 +109,7 @@ def _stop(held: xr.Dataset, end: float, options: Options) -> dict[str, float | t
 EXPERIMENT = Experiment(
     name="corner-stop",
     assembly="wedge-corner",
-    summary="the wedge brake stops a quarter of a car from 50 km/h with 600 N m, and holds it",
+    summary="the wedge brake stops a quarter of a car from {v_0:km/h} with {M_brake}, and holds it",
     options=Options,
     defaults=Options(
         v_0=50.0 / 3.6, M_brake=600.0, surface="dry-asphalt", T_disc=293.15, t_hold=5.5, t_end=0.5

@@ -131,7 +131,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="disc-stop",
     assembly="wedge-brake",
-    summary="300 N m until the disc stands, held and released; both readings of a stopped disc",
+    summary="{M_brake} until the disc stands, held and released; both readings of a stopped disc",
     options=Options,
     defaults=Options(M_brake=300.0, Omega_0=5.0, t_hold=1.5, t_end=0.3, settle=0.05),
     cases=cases,

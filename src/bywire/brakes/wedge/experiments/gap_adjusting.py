@@ -103,7 +103,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="gap-adjusting",
     assembly="wedge-brake",
-    summary="applications with 0.25 mm too much clearance, which the adjuster takes away",
+    summary="applications with {more} too much clearance, which the adjuster takes away",
     options=Options,
     defaults=Options(
         M_brake=200.0, more=0.25e-3, applications=5, t_hold=0.25, t_pause=0.25, settle=0.05

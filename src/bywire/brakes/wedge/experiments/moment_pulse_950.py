@@ -67,7 +67,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="moment-pulse-950",
     assembly="wedge-brake",
-    summary="moment pulse of 950 N m on the software rate limit (Fig. 9)",
+    summary="moment pulse of {M_high} on the software rate limit (Fig. 9)",
     options=Options,
     defaults=Options(M_high=950.0, t_pulse=0.2, t_end=0.3, omega_gap=60.0, settle=0.05),
     cases=cases,

@@ -120,7 +120,7 @@ def _pulse(run: xr.Dataset, options: Options) -> tuple[float, str]:
 EXPERIMENT = Experiment(
     name="moment-pulses",
     assembly="wedge-brake",
-    summary="moment step to 200 N m, then pulses to 80 % (Fig. 7)",
+    summary="moment step to {M_high}, then pulses to {low:%} (Fig. 7)",
     options=Options,
     defaults=Options(
         M_high=200.0, low=0.8, t_hold=0.5, t_low=0.2, t_high=0.2, pulses=3, settle=0.05

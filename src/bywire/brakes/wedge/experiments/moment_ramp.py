@@ -100,7 +100,7 @@ def _followed(run: xr.Dataset, begin: float, end: float) -> tuple[float, float, 
 EXPERIMENT = Experiment(
     name="moment-ramp",
     assembly="wedge-brake",
-    summary="moment step to 200 N m, down to 160 N m, slow ramp back (Fig. 8)",
+    summary="moment step to {M_high}, down to {M_low}, slow ramp back (Fig. 8)",
     options=Options,
     defaults=Options(
         M_high=200.0, M_low=160.0, t_hold=0.5, t_low=0.3, t_ramp=1.0, t_end=0.3, settle=0.05

@@ -115,7 +115,7 @@ def _fall(run: xr.Dataset) -> tuple[float, str]:
 EXPERIMENT = Experiment(
     name="moment-release",
     assembly="wedge-brake",
-    summary="release from 500 N m: times, residual drag, clearance regained, energy",
+    summary="release from {M_hold}: times, residual drag, clearance regained, energy",
     options=Options,
     defaults=Options(M_hold=500.0, settle=0.6, duration=0.4),
     cases=cases,

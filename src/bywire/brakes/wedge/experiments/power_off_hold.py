@@ -71,7 +71,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="power-off-hold",
     assembly="wedge-brake",
-    summary="power off at 500 N m: what dry friction holds, for how long",
+    summary="power off at {M_hold}: what dry friction holds, for how long",
     options=Options,
     defaults=Options(M_hold=500.0, settle=0.6, duration=2.0),
     cases=cases,
