@@ -151,7 +151,7 @@ def test_a_cluster_computes_the_same_until_its_workers_are_gone(study):
     distributed = pytest.importorskip("distributed")
     plan = read_study(study())
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0"
     ) as cluster:
         ((_, theirs),) = Cluster(cluster.scheduler_address).computed(plan, [1])
         with Cluster(cluster.scheduler_address).opened(plan) as compute:

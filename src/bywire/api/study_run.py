@@ -10,14 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bywire.api.study_cases import ShownCases
+from bywire.api.study_data import findings_data
 from bywire.api.study_figures import study_figures
-from bywire.api.study_rare import (
-    failure_table,
-    importance_tables,
-    rare_data,
-)
+from bywire.api.study_rare import failure_table, importance_tables
 from bywire.api.study_remarks import failure_texts, noted, unfinished, warned
-from bywire.api.study_sensitivity import drivers_data, missing_indices, sensitivity_tables
+from bywire.api.study_sensitivity import missing_indices, sensitivity_tables
 from bywire.api.study_tables import (
     correlated,
     demand_table,
@@ -41,9 +38,7 @@ from bywire.report.document import (
 )
 from bywire.report.subject import Subject
 from bywire.studies.findings import Findings
-from bywire.studies.judgment import Judgment
 from bywire.studies.plan import StudyPlan
-from bywire.studies.spread import Spread
 from bywire.studies.store import StudyStore
 
 if TYPE_CHECKING:
@@ -231,59 +226,7 @@ class StudyRun(Answer):
         return Banner(text, "bad" if "missed" in outcomes else "open")
 
     def _data(self) -> dict[str, Any]:
-        findings = self.findings
         return {
-            "study": self.plan.name,
-            "status": self.status,
-            "folder": str(self.folder),
-            "design": self.plan.design,
-            "seed": self.plan.seed,
-            "cases": len(self.cases),
-            "of": self.plan.total,
-            "confidence": self.plan.confidence,
-            "failed": len(findings.failures),
-            "requirements": [
-                self._judgment_data(each)
-                for each in (findings.judgments if len(self.cases) else ())
-            ],
-            "kpis": {
-                each.name: {
-                    "unit": each.unit, "nominal": each.nominal, "least": each.least,
-                    "largest": each.largest, "undefined": each.undefined,
-                    **(_spread_data(each) if self.plan.is_sampled else {}),
-                    **drivers_data(findings, each.name),
-                }
-                for each in findings.spreads
-            },
-            "warnings": self.warnings,
-            "notes": self.notes,
+            "study": self.plan.name, "status": self.status, "folder": str(self.folder),
+            **findings_data(self.findings), "warnings": self.warnings, "notes": self.notes,
         }  # fmt: skip
-
-    def _judgment_data(self, judgment: Judgment) -> dict[str, Any]:
-        """Return a requirement for JSON; of cases that were not drawn, without a probability."""
-        demand, share = judgment.demand, judgment.share
-        probability = {"probability": share.value, "low": share.low, "high": share.high}
-        rare = {}
-        if judgment.failure is not None:
-            (of,) = [each for each in self.findings.rare if each.demand == demand]
-            rare = rare_data(judgment.failure, of)
-        return rare | {
-            "kpi": demand.kpi, "limit": demand.limit, "wanted": demand.probability,
-            "outcome": judgment.outcome, "met": share.count,
-            **(probability if self.plan.is_sampled else {}),
-            "undecided_cases": judgment.undecided,
-            "worst_case": (
-                None if judgment.worst is None else self.findings.number(judgment.worst)
-            ),
-        }  # fmt: skip
-
-
-def _spread_data(spread: Spread) -> dict[str, Any]:
-    """Return mean and quantiles of drawn cases for JSON."""
-    return {
-        "mean": spread.mean, "sd": spread.sd,
-        "quantiles": [
-            {"probability": q.probability, "value": q.value, "low": q.low, "high": q.high}
-            for q in spread.quantiles
-        ],
-    }  # fmt: skip
