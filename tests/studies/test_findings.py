@@ -71,6 +71,14 @@ def test_the_worst_of_a_lower_limit_is_the_smallest(found):
     assert found([19.0, 25.0, 18.0], limit=">= 20 A").judgments[0].worst == 2
 
 
+def test_a_case_that_ran_without_the_figure_is_the_worst(found):
+    """It misses, and a reader who runs it sees why; one without a result cannot be run."""
+    findings = found([19.0, math.nan, math.nan, 25.0])
+    cases = findings.cases.assign(**{FAILURE: ["", "it left the numbers", "", ""]})
+    (judgment,) = Findings(findings.plan, cases, findings.nominal).judgments
+    assert (judgment.worst, judgment.outcome) == (2, "missed")
+
+
 def test_no_case_is_the_worst_where_all_are_equal(found):
     assert found([0.0] * 200).judgments[0].worst is None
     assert found([0.0, math.nan, 0.0]).judgments[0].worst is None

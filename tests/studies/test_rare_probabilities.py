@@ -124,6 +124,10 @@ def test_it_is_said_how_probable_other_limits_are(method):
     assert found.outcome(0.999, 0.0) == "met"
     assert found.outcome(0.999, 0.9) == "undecided"
     assert found.outcome(0.999999, 0.0) == "missed"
+    # The interval that is shown is the one that decides.
+    shown = found.within(0.9)
+    assert (shown.low, shown.high) == (found.below(-0.9).low, found.below(0.9).high)
+    assert shown.value == found.estimate.value
 
 
 @pytest.mark.parametrize("method", [subset, importance])

@@ -5,6 +5,7 @@ In a study of rare failures, the most probable failing one.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -73,6 +74,12 @@ class ShownCases:
         kpi = judgment.demand.kpi
         if row in self.findings.failures:
             return f"{kpi}: case {self.named(row)}, which has no result"
+        if not math.isfinite(self.findings.figure(kpi)[row]):
+            (why,) = [each.note for each in self.results[kpi].kpis if each.name == kpi]
+            return (
+                f"{kpi} is not defined in case {self.named(row)}{why and f': {why}'}; "
+                f"{self.kind}-{kpi}.toml runs it"
+            )
         return (
             f"{kpi} = {self._figure(kpi, row)}{self._doubt(judgment, row)} in case "
             f"{self.named(row)}; {self.kind}-{kpi}.toml runs it"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from bywire.report.wording import amount, clean
 from bywire.studies.failure_probability import FailureProbability, Interval
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan
-from bywire.studies.rare_failures import RareFailure
+from bywire.studies.rare_failures import Importance, RareFailure
 from bywire.studies.sought_design import IMPORTANCE, SUBSET
 from bywire.studies.statistics import Outcome
 
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _POINTS = 200  # of a curve
+_VALUES = 3  # single values of a quantity that are shown
+_SEEN = 0.005  # share of failing cases from which on one is
 
 
 def failure_table(findings: Findings) -> Table:
@@ -35,11 +38,12 @@ def failure_table(findings: Findings) -> Table:
         assert failure is not None
         assert wanted is not None
         probable = failure.estimate
+        close = f" ({each.undecided} too close)" if each.undecided else ""
         rows.append((
             Cell(clean(f"{each.demand.kpi} {each.demand.limit}")),
             Cell(_value(probable), value=probable.value), Cell(_ends(probable)),
             Cell("-" if np.isnan(probable.variation) else f"{100.0 * probable.variation:.2g} %"),
-            Cell(str(failure.runs), value=failure.runs), Cell(f"{1.0 - wanted:.3g}"),
+            Cell(f"{failure.runs}{close}", value=failure.runs), Cell(f"{1.0 - wanted:.3g}"),
             OUTCOMES[each.outcome],
         ))  # fmt: skip
     columns = [Column(head, numeric="interval" not in head) for head in heads]
@@ -79,8 +83,13 @@ def rare_data(failure: FailureProbability, findings: RareFailure) -> dict[str, A
         "levels": [{"margin": x.margin, "probability": x.probability} for x in failure.levels],
         "reliability_index": failure.first_order,
         "failing_case": findings.case,
-        "importance": {i.quantity: {"score": i.score, "factor": i.factor}
-                       for i in findings.importance},
+        "importance": {
+            i.quantity: {
+                "score": i.score, "factor": i.factor,
+                **({"shares": {str(v): n for v, n in i.shares.items()}} if i.shares else {}),
+            }
+            for i in findings.importance
+        },
     }  # fmt: skip
 
 
@@ -129,7 +138,9 @@ def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
     failure = each.failure
     if failure.state == "budget spent":
         so_far = f"it is no more probable than {failure.estimate.high:.2g}"
-        return (f"the budget of {plan.cases} cases is spent before failure was come to ({so_far})"
+        seen = f"{failure.failed} failing cases are too few for an estimate; "
+        so_far = seen * bool(failure.failed) + so_far
+        return (f"the budget of {plan.cases} cases is spent before the last level ({so_far})"
                 + (": extend the study" if outcome == "undecided" else ""))  # fmt: skip
     if failure.state == "level":
         return "too many cases have the same figure to tell worse ones: take 'monte-carlo'"
@@ -154,9 +165,10 @@ def _importance_table(findings: Findings, each: RareFailure) -> Table:
     rows = [
         (
             Cell(clean(i.quantity)),
-            Cell(_shown(each.point.get(i.quantity), varied[i.quantity].unit)),
+            Cell(_place(i, each, varied[i.quantity].unit)),
             Cell(value_text(varied[i.quantity].nominal, varied[i.quantity].unit or "1")),
-            Cell(f"{i.score:+.2f}", value=i.score), Cell(f"{i.factor:.2f}", value=i.factor),
+            Cell("-" if math.isnan(i.score) else f"{i.score:+.2f}", value=i.score),
+            Cell(f"{i.factor:.2f}", value=i.factor),
         )
         for i in each.importance
     ]  # fmt: skip
@@ -167,9 +179,18 @@ def _importance_table(findings: Findings, each: RareFailure) -> Table:
     ), tuple(rows))  # fmt: skip
 
 
-def _shown(value: float | str | None, unit: str) -> str:
-    if value is None:
+def _place(importance: Importance, failure: RareFailure, unit: str) -> str:
+    """Return where failures lie in a quantity: its value, or how many have each single value."""
+    if importance.quantity not in failure.point:
         return "-"
+    if not importance.shares:
+        return _shown(failure.point[importance.quantity], unit)
+    ranked = sorted(importance.shares.items(), key=lambda pair: -pair[1])
+    shown = [f"{_shown(v, unit)} {100.0 * share:.0f} %" for v, share in ranked if share >= _SEEN]
+    return ", ".join(shown[:_VALUES] + ["..."] * (len(shown) > _VALUES))
+
+
+def _shown(value: float | str, unit: str) -> str:
     return value if isinstance(value, str) else amount(float(value), unit)
 
 

@@ -15,7 +15,7 @@ from bywire.studies.sensitivity import VarianceShares
 from bywire.studies.sought_design import WORST
 
 _REASONS = 10  # that are named
-_WIDE = 0.3  # of an interval of shares of the variance, that tells little
+_WIDE = 0.15  # reach of an interval of shares of the variance to either side, that tells little
 
 
 def warned(findings: Findings, of_the_bench: list[str]) -> list[str]:
@@ -28,9 +28,26 @@ def warned(findings: Findings, of_the_bench: list[str]) -> list[str]:
             f"{len(failed)} of {count} cases have no result; they count as missing every "
             "requirement"
         )
-    elif count and not findings.spreads:
-        said.append("no key figure is defined in any case: look at the bench itself, bywire run")
+    if findings.spreads:
+        said += _undefined(findings)
+    elif count and not failed:
+        said.append("no key figure is defined in any case: look at the bench alone, bywire run")
     return said + (state_texts(findings) if findings.rare and count else [])
+
+
+def _undefined(findings: Findings) -> list[str]:
+    """Return which figures of requirements are not defined in cases that ran."""
+    required = {each.demand.kpi for each in findings.judgments} if len(findings.cases) else set()
+    cases: dict[int, list[str]] = {}
+    for each in findings.spreads:
+        lacking = each.undefined - len(findings.failures)
+        if lacking and each.name in required:
+            cases.setdefault(lacking, []).append(each.name)
+    return [
+        f"{', '.join(names)}: not defined in {number} of {len(findings.cases)} cases, which count "
+        "as missing what is required"
+        for number, names in cases.items()
+    ]
 
 
 def unfinished(plan: StudyPlan, cases: int, resume: str) -> str:
@@ -117,13 +134,13 @@ def _wide_shares(findings: Findings) -> list[str]:
     wide = [
         name for name in shown_figures(findings)
         if any(
-            isinstance(each, VarianceShares) and each.total.high - each.total.low > _WIDE
-            for each in findings.sensitivity(name).drivers[:1]
+            isinstance(each, VarianceShares) and max(each.first.reach, each.total.reach) > _WIDE
+            for each in findings.sensitivity(name).drivers
         )
     ]  # fmt: skip
     if not wide:
         return []
     return [
-        f"{', '.join(wide)}: {design.base} groups do not tell shares within +-{_WIDE / 2:g}; "
+        f"{', '.join(wide)}: {design.base} groups do not tell shares within +-{_WIDE:g}; "
         "name more cases in the study file, and run it into another folder"
     ]

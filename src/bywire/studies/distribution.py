@@ -39,8 +39,9 @@ class Distribution:
     below, above
         ``below(x)``, ``above(x)``: probability of values below and above; None of single values,
         which end at ``low`` and ``high``.
-    singles
-        Single values that it has [SI], or texts; none of what has any value.
+    singles, weights
+        Single values that it has [SI], or texts, and the probability of each; none of what has any
+        value.
     """
 
     kind: str
@@ -51,6 +52,7 @@ class Distribution:
     below: Callable[[float], float] | None = None
     above: Callable[[float], float] | None = None
     singles: tuple[Any, ...] = ()
+    weights: tuple[float, ...] = ()
 
     @property
     def is_discrete(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from bywire.core.typing import Array
@@ -91,8 +91,8 @@ class FailureProbability:
         ``below(x)``: estimate of the probability that the margin is <= x, in the figure's unit.
     levels
         How the estimate came about.
-    runs
-        Cases used.
+    runs, failed
+        Cases used, and how many of them failed.
     span
         Least and largest margin of which ``below`` has something to say; none where it has not.
     place, scores
@@ -101,6 +101,9 @@ class FailureProbability:
     center
         Where failures lie: the mean of their scores, or FORM's design point; None where it is not
         known.
+    failing
+        Scores of failing cases, as probable as they are, shape (cases, quantities); None of another
+        method than subset simulation.
     first_order
         FORM's reliability index beta; NaN of another method.
     why
@@ -112,12 +115,26 @@ class FailureProbability:
     below: Callable[[float], Interval]
     levels: tuple[Level, ...]
     runs: int
+    failed: int
     span: tuple[float, float] | None = None
     place: int | None = None
     scores: Array | None = None
     center: Array | None = None
+    failing: Array | None = None
     first_order: float = math.nan
     why: str = ""
+
+    def within(self, error: float) -> Interval:
+        """Return the estimate with the interval that decides.
+
+        Parameters
+        ----------
+        error
+            As of `outcome`.
+        """
+        low, high = self.below(-error).low, self.below(error).high
+        known = self.estimate
+        return replace(known, low=min(low, known.low), high=max(high, known.high))
 
     def outcome(self, wanted: float, error: float) -> Outcome:
         """Return whether a requirement is met with a probability.
@@ -130,7 +147,7 @@ class FailureProbability:
             What the figure may be off by, in its unit: cases this close to the limit count for
             neither side.
         """
-        allowed = 1.0 - wanted
-        if self.below(error).high <= allowed:
+        decides, allowed = self.within(error), 1.0 - wanted
+        if decides.high <= allowed:
             return "met"
-        return "missed" if self.below(-error).low > allowed else "undecided"
+        return "missed" if decides.low > allowed else "undecided"

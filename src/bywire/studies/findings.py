@@ -197,12 +197,12 @@ class Findings:
         """Return a requirement of which shares of the cases say nothing."""
         among, wanted = self._judgment(rare.demand), rare.demand.probability
         assert wanted is not None
-        numbers = np.asarray(self.cases[CASE])
+        numbers, error = np.asarray(self.cases[CASE]), self._error(rare.demand.kpi)
         return replace(
             among,
-            outcome=rare.failure.outcome(wanted, self._error(rare.demand.kpi)),
+            outcome=rare.failure.outcome(wanted, error),
             worst=None if rare.case is None else int(np.flatnonzero(numbers == rare.case)[0]),
-            failure=rare.failure,
+            failure=replace(rare.failure, estimate=rare.failure.within(error)),
         )
 
     def _error(self, name: str) -> float:
@@ -217,6 +217,8 @@ class Findings:
 
     def _judgment(self, demand: Demand) -> Judgment:
         kpi = demand.kpi
+        failed = self._texts(FAILURE) != ""
         return judgment_of(
-            demand, self.units[kpi], self.figure(kpi), self._error(kpi), self.plan.confidence
-        )
+            demand, self.units[kpi], self.figure(kpi), failed, self._error(kpi),
+            self.plan.confidence,
+        )  # fmt: skip

@@ -33,8 +33,9 @@ class Judgment:
         Whether it is met with the probability that is wanted; of one that every case has to meet,
         whether all do.
     worst
-        Row of the case that is worst of all, or of the most probable failing one of a rare failure;
-        None where no case has the figure, or all that do have the same.
+        Row of the case that is worst of all, or of the most probable failing one of a rare failure.
+        Worse than any other is a case that ran and does not have the figure. None where none ran,
+        or all have the same.
     failure
         How probable it is that the requirement is missed, of a study of rare failures: shares of
         its cases are no probabilities.
@@ -50,8 +51,9 @@ class Judgment:
 
 
 def judgment_of(
-    demand: Demand, unit: str, figure: Array, error: float, confidence: float
-) -> Judgment:
+    demand: Demand, unit: str, figure: Array, failed: NDArray[np.bool_], error: float,
+    confidence: float,
+) -> Judgment:  # fmt: skip
     """Return a requirement judged over cases.
 
     Parameters
@@ -60,6 +62,8 @@ def judgment_of(
         The requirement.
     unit, figure
         Its key figure in every case, shape (cases,); NaN where a case does not have it.
+    failed
+        Whether a case has no result, shape (cases,).
     error
         What the figure may be off by, in ``unit``: cases closer to the limit count for neither
         side.
@@ -77,9 +81,8 @@ def judgment_of(
     else:
         outcome = "met" if surely.count == count else "undecided"
     told = replace(share(int(met.sum()), count, confidence), low=surely.low, high=may.high)
-    return Judgment(
-        demand, met, told, int(near.sum()), outcome, _worst(figure, compare.startswith("<"))
-    )
+    worst = _worst(figure, failed, compare.startswith("<"))
+    return Judgment(demand, met, told, int(near.sum()), outcome, worst)
 
 
 def close_to(bound: float, figure: Array, error: float) -> NDArray[np.bool_]:
@@ -87,9 +90,12 @@ def close_to(bound: float, figure: Array, error: float) -> NDArray[np.bool_]:
     return np.asarray(np.abs(figure - bound) <= error)
 
 
-def _worst(figure: Array, is_upper: bool) -> int | None:
+def _worst(figure: Array, failed: NDArray[np.bool_], is_upper: bool) -> int | None:
     """Return the row of the case that is worst by an upper or a lower limit."""
     known = np.isfinite(figure)
+    lacking = np.flatnonzero(~known & ~failed)
+    if lacking.size:
+        return int(lacking[0])
     if not known.any() or (known.sum() > 1 and np.ptp(figure[known]) == 0.0):
         return None  # whichever were named, it would be no worse than the others
     return int(np.argmin(np.where(known, -figure if is_upper else figure, np.inf)))

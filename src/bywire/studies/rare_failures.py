@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bywire.core.typing import Progress, silent
 from bywire.studies.computing import Executor
+from bywire.studies.distribution import Distribution
 from bywire.studies.failure_probability import FailureProbability
 from bywire.studies.importance_sampling import importance_sampling
 from bywire.studies.plan import CHUNK, Demand, StudyPlan
@@ -33,14 +36,19 @@ class Importance:
     quantity
         Its name.
     score
-        Normal score of where failures lie: standard deviations off the middle, with their sign.
+        Normal score of where failures lie: standard deviations off the middle, with their sign; NaN
+        of single values, which have no middle.
     factor
-        Importance factor: share of the squared distance, 0 to 1.
+        Importance factor: share of the squared distance, 0 to 1. That of single values is twice the
+        relative entropy of failing cases to all, as it is of a normal score that is moved.
+    shares
+        Share of failing cases that has each single value; empty of other quantities.
     """
 
     quantity: str
     score: float
     factor: float
+    shares: Mapping[Any, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -59,7 +67,8 @@ class RareFailure:
         Quantities, the most important first; none where it is not known where failures lie.
     point
         Values of what varies where failures lie [SI]: at the design point, or at the mean normal
-        scores of failing cases; empty where that is not known.
+        scores of failing cases, and of single values the most frequent one; empty where that is not
+        known.
     """
 
     demand: Demand
@@ -113,27 +122,49 @@ def _failure(plan: StudyPlan, cases: RequirementCases) -> RareFailure:
             cases.drawn, cases.searched, count, plan.cases, plan.seed, plan.confidence, CHUNK,
             cases.report,
         )  # fmt: skip
+    # Points that were asked for again, as by derivatives at the same place, are the same cases.
+    failure = replace(failure, runs=len({*cases.numbers}))
     case = None if failure.place is None else cases.numbers[failure.place]
-    importance = _importance(plan, failure)
+    importance = importance_of(plan, failure)
     point = {}
     if importance and failure.center is not None:
         values = plan.values_at(np.asarray(failure.center)[None, :])
         point = {name: column[0].item() for name, column in values.items()}
+        point |= {i.quantity: max(i.shares, key=i.shares.__getitem__)
+                  for i in importance if i.shares}  # fmt: skip
     return RareFailure(cases.demand, failure, case, importance, point)
 
 
-def _importance(plan: StudyPlan, failure: FailureProbability) -> tuple[Importance, ...]:
+def importance_of(plan: StudyPlan, failure: FailureProbability) -> tuple[Importance, ...]:
     """Return importance factors: those of Hasofer and Lind's design point, or of the mean failure.
 
     Of correlated quantities they are of their own normal scores.
     """
     is_rare = failure.estimate.value < 0.5  # else failures lie everywhere
-    if failure.center is None or not np.any(failure.center) or not is_rare:
+    if failure.center is None or not is_rare:
         return ()
-    scores = plan.scored.correlated(failure.center)
-    shares = scores**2 / (scores @ scores)
-    each = [
-        Importance(v.name, float(score), float(part))
-        for v, score, part in zip(plan.varied, scores, shares, strict=True)
+    squares = plan.scored.correlated(failure.center) ** 2
+    scores = plan.scored.correlated(failure.center).tolist()
+    shares: list[dict[Any, float]] = [{} for _ in scores]
+    if failure.failing is not None:
+        for k, each in enumerate(plan.varied):
+            if each.distribution.is_discrete:
+                column = plan.values_at(failure.failing)[each.name].tolist()
+                count = Counter(column)
+                shares[k] = {x: count[x] / len(column) for x in each.distribution.singles}
+                squares[k], scores[k] = 2.0 * _entropy(shares[k], each.distribution), math.nan
+    if not squares.sum() > 0.0:
+        return ()
+    found = [
+        Importance(v.name, float(score), float(square / squares.sum()), share)
+        for v, score, square, share in zip(plan.varied, scores, squares, shares, strict=True)
     ]
-    return tuple(sorted(each, key=lambda i: -i.factor))
+    return tuple(sorted(found, key=lambda i: -i.factor))
+
+
+def _entropy(shares: Mapping[Any, float], distribution: Distribution) -> float:
+    """Return the relative entropy of shares of single values to their probabilities."""
+    return sum(
+        p * math.log(p / weight)
+        for p, weight in zip(shares.values(), distribution.weights, strict=True) if p > 0.0
+    )  # fmt: skip

@@ -17,11 +17,20 @@ _ROUNDING = 1e-12  # share of a figure below which its differences are those of 
 
 @dataclass(frozen=True)
 class Estimate:
-    """An estimate and its interval, in the unit of what it is of."""
+    """An estimate and its interval, in the unit of what it is of.
+
+    Parameters
+    ----------
+    value, low, high
+        Estimate, and ends of the interval.
+    reach
+        How far the interval would reach to either side, did values not end anywhere.
+    """
 
     value: float
     low: float
     high: float
+    reach: float
 
 
 @dataclass(frozen=True)
@@ -189,4 +198,4 @@ def _estimate(
     An estimate may scatter beyond such an end: then the interval ends at the estimate.
     """
     low, high = max(value - reach, min(least, value)), min(value + reach, max(most, value))
-    return Estimate(float(value), float(low), float(high))
+    return Estimate(float(value), float(low), float(high), float(reach))

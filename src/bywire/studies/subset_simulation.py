@@ -181,11 +181,15 @@ def _found(
         estimate = Interval(math.nan, math.nan, 0.0, high)
         below = partial(_end_of, below, ends[-1] if ends else math.inf, estimate)
     nearest = trail.nearest
+    failing = None
+    if state == "done":
+        failing = subsets[-1].scores[subsets[-1].margins <= 0.0]
     return FailureProbability(
-        state, estimate, below, levels, trail.runs,
+        state, estimate, below, levels, trail.runs, trail.failed,
         _span(subsets, ends[-1]) if subsets else None,
         place=nearest[0] if nearest else None, scores=nearest[1] if nearest else None,
-        center=_mean_failure(subsets[-1]) if state == "done" else None,
+        center=failing.mean(axis=0) if failing is not None and len(failing) else None,
+        failing=failing,
     )  # fmt: skip
 
 
@@ -209,8 +213,3 @@ def _span(subsets: list[_Subset], end: float) -> tuple[float, float] | None:
     if known.size < _SEEN:
         return None
     return min(float(np.sort(known)[_SEEN - 1]), end), float(np.median(subsets[0].margins))
-
-
-def _mean_failure(last: _Subset) -> Array | None:
-    failed = last.scores[last.margins <= 0.0]
-    return failed.mean(axis=0) if failed.size else None
