@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 import bywire
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
+from bywire.bench.key_figures import key_figures_of
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError
 from bywire.core.model import ASSEMBLIES
@@ -57,6 +59,18 @@ def test_every_one_runs_with_its_defaults_and_gives_what_it_declares(name: str) 
     for recording in result.recordings.values():
         assert all(v.attrs["units"] and v.attrs["long_name"] for v in recording.variables.values())
     assert result.as_object()["kpis"].keys() == {kpi.name for kpi in result.kpis}
+
+
+@pytest.mark.parametrize("name", sorted(GENERIC_EXPERIMENTS.all()))
+def test_cases_side_by_side_have_the_figures_of_single_runs(name: str) -> None:
+    """To the last digit: sums go in the order of time, however rows lie in memory."""
+    driven = name in ("open-loop", "tracking")
+    options = {"output": "x", "share": 0.5} if name == "duty" else {}
+    made = bench(name, options, stimulus=STEP if driven else {})
+    benches = [made, *(replace(made, overrides={"m": M * (1.0 + 0.01 * k)}) for k in range(1, 8))]
+    figures = key_figures_of(benches)
+    for k, each in enumerate(benches):
+        assert figures.kpis(k) == bywire.run(each, estimate_error=False).kpis
 
 
 @pytest.mark.parametrize("parameters", ["dardanelli2010", "roberts2003"])

@@ -51,6 +51,18 @@ def test_estimates_come_back_as_they_were(study, written):
     assert np.corrcoef(R, L)[0, 1] == pytest.approx(0.2, abs=0.05)
 
 
+def test_pure_numbers_have_no_unit(study, written):
+    said = estimate()
+    entry = said["estimates"]["braking"]
+    entry["parameters"]["seal.k_brk_p"] = {"value": 2.6, "unit": "1", "standard_deviation": 0.1}
+    names = [*NAMES, "seal.k_brk_p"]
+    entry["correlation"] = {"names": names, "matrix": np.eye(4).tolist()}
+    written(said)
+    plan = read_study(study('[measured]\nfile = "id"\ntruncate = true\n'))
+    law = next(v.distribution for v in plan.varied if v.name == "seal.k_brk_p")
+    assert law.quantile(np.array([0.5]))[0] == pytest.approx(2.6)
+
+
 def test_some_of_them_and_cut_off(study, written):
     written(estimate(value=0.02))
     refused = r"\[measured\] motor.R_m: .* leaves what is admissible.*truncate = true"

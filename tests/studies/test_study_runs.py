@@ -303,6 +303,14 @@ def test_results_in_python(study, tmp_path):
         result.worst("overshoot")
 
 
+def test_the_file_of_the_worst_case_runs_it_to_the_last_digit(study, tmp_path):
+    result = bywire.run_study(study(), tmp_path / "out", cases=64)
+    result.write(tmp_path / "out")
+    again = bywire.run(bywire.load(tmp_path / "out" / "worst-peak_current.toml"))
+    row = result.findings.judgments[0].worst
+    assert again.kpi("peak_current").value == result.cases["peak_current"][row]
+
+
 def test_a_damaged_chunk_is_computed_again_and_that_is_said(study, tmp_path):
     path = study(VARY)
     before = bywire.run_study(path, tmp_path / "out", cases=128, workers=1)

@@ -97,5 +97,5 @@ def _text(name: str, value: Any, symbol: str) -> str:
         return str(value).lower()
     if isinstance(value, Sequence):
         return f"[{', '.join(_text(name, node, symbol) for node in value)}]"
-    number = value if isinstance(value, int) else float(f"{float(value):.12g}")
+    number = value if isinstance(value, int) else float(value)  # all digits: it runs the same
     return json.dumps(f"{number} {symbol}") if symbol != "1" else f"{number}"

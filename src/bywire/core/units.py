@@ -155,9 +155,9 @@ def _number(text: str, symbol: str, name: str, nominal: float) -> float:
     size, unit = float(match[1]), match[2]
     common = _COMMON.get(unit)
     if common is not None and common[1] == symbol:
-        return _rounded(size * common[0])
+        return _converted(size, size * common[0])
     if (unit, symbol) == ("degC", "K"):
-        return _rounded(size + ICE)
+        return _converted(size, size + ICE)
     import pint
 
     try:
@@ -165,7 +165,7 @@ def _number(text: str, symbol: str, name: str, nominal: float) -> float:
         wanted = registry().Quantity(1.0, "" if symbol == "1" else symbol)
         if symbol in _NO_MATTER_OF_RAD and _base(quantity) != _base(wanted):
             raise pint.DimensionalityError(unit, symbol)
-        return _rounded(float(quantity.to(wanted.units).magnitude))
+        return _converted(size, float(quantity.to(wanted.units).magnitude))
     except pint.DimensionalityError:
         raise UnitError(
             f"{name} = {text!r} has the wrong unit: {unit or 'a pure number'} cannot be "
@@ -231,9 +231,9 @@ def _as_pint(unit: str) -> str:
     return _MOMENT.sub(lambda m: "*m*s" if m[1] else "*m", spelled)
 
 
-def _rounded(number: float) -> float:
-    """Return 0.009 for 9 mm, and not 0.009000000000000001."""
-    return float(f"{number:.15g}")
+def _converted(size: float, number: float) -> float:
+    """Return 0.009 for 9 mm, and not 0.009000000000000001; what is in SI already as it is."""
+    return size if number == size else float(f"{number:.15g}")
 
 
 def _wanted(symbol: str) -> str:

@@ -21,7 +21,7 @@ PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps
 def unread(stages: Stages) -> frozenset[str]:
     """Return the half increments and reactions that no stage reads.
 
-    They need not be kept.
+    They need not be kept. Those of velocities with dry friction are read where a substep is cut.
     """
     roots = [node for pass_ in (stages.fast, stages.exact) for nodes in pass_.values()
              for node in nodes]  # fmt: skip
@@ -32,6 +32,7 @@ def unread(stages: Stages) -> frozenset[str]:
         for kind in ("d", "r")
         for k in range(len(stages.fast[kind]))
         if stages.graph.leaf(kind, k) not in read
+        and not (kind == "d" and k in stages.velocities)
     )
 
 

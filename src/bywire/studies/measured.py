@@ -111,14 +111,20 @@ def varied_as_measured(
         if name not in leaves:
             raise unknown_name("parameter of [measured]", name, leaves)
         leaf, unit = leaves[name], chosen.units[name]
-        entry = {"kind": "normal", "mean": f"{value!r} {unit}",
-                 "sd": f"{chosen.deviations[name]!r} {unit}"}  # fmt: skip
+        entry = {"kind": "normal", "mean": _text(value, unit),
+                 "sd": _text(chosen.deviations[name], unit)}  # fmt: skip
         ends = {"low": leaf.low, "high": leaf.high} if truncate else {}
-        entry |= {key: f"{x!r} {leaf.unit.symbol}" for key, x in ends.items() if math.isfinite(x)}
+        symbol = leaf.unit.symbol
+        entry |= {key: _text(x, symbol) for key, x in ends.items() if math.isfinite(x)}
         nominal = float(values[name])
         law = read_distribution(name, entry, leaf, nominal, "[measured]", _TRUNCATE)
         varied.append(Varied(name, leaf.unit.symbol, nominal, law))
     return tuple(varied), dict(chosen.correlations)
+
+
+def _text(value: float, unit: str) -> str:
+    """Return a value as a study file has it; a pure number has no unit."""
+    return repr(value) if unit == "1" else f"{value!r} {unit}"
 
 
 def read_measured(path: Path) -> Measured:

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.kpis.kpi import Undefined, Values, measure
-from bywire.bench.kpis.samples import defect, integral, signal
+from bywire.bench.kpis.samples import defect, integral, signal, total
 from bywire.core.typing import Array
 
 
@@ -130,4 +130,4 @@ def derated_after(data: Warming) -> Array | Values | Undefined:
 def final_output(data: Warming) -> Array | Undefined:
     """Mean of the output in the last tenth of the time."""
     late = data.t >= data.t[-1] - 0.1 * (data.t[-1] - data.t[0])
-    return np.asarray(np.mean(data.output[..., late], axis=-1))
+    return np.asarray(total(data.output[..., late]) / np.count_nonzero(late))
