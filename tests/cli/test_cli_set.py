@@ -145,3 +145,4 @@ def test_bad_shares_and_patterns(bywire, bench, change, texts):
 def test_a_share_of_zero_is_refused(bywire, bench):
     path = bench(f"{BRAKING}[set]\nseal.T_pr = 0\n")
     refused(bywire("run", path, "--set", "seal.T_pr=+50%"), "a share of 0 changes nothing")
+    refused(bywire("run", path, "--set", "motor_heat.T_a=+5%"), "share of a temperature", "in K")

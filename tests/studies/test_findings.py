@@ -10,6 +10,7 @@ import pytest
 from scipy import stats
 
 from bywire.bench.kpis.kpi import Kpi
+from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.findings import Findings
 from bywire.studies.statistics import correlation_ratio
@@ -109,3 +110,14 @@ def test_choices_are_ranked_among_what_drives_a_figure(found, study, share):
     assert ratio == pytest.approx(told, abs=0.05 if share == 0.0 else 0.01)
     wanted = ["adc.law", "motor.R_m"] if share > 1.0 else ["motor.R_m", "adc.law"]
     assert mixed.drivers("peak_current") == wanted[: 2 - (ratio == 0.0)]
+
+
+def test_what_a_study_does_not_have_is_named(found):
+    findings = found([19.0, 20.0, 21.0])
+    asked = (findings.figure, findings.influences, findings.effects, findings.drivers,
+             findings.sensitivity)  # fmt: skip
+    for ask in asked:
+        with pytest.raises(UnknownNameError, match="did you mean 'peak_current'"):
+            ask("peak_curent")
+    with pytest.raises(ParameterError, match="'monte-carlo' has no indices"):
+        findings.sensitivity("peak_current")

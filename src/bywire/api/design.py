@@ -26,6 +26,7 @@ from bywire.api.design_inputs import (
 )
 from bywire.api.loop_case import loop_case, over_range, spread
 from bywire.bench.running import Progress
+from bywire.core.arguments import whole_number
 from bywire.core.blas import on_one_thread
 from bywire.core.errors import ParameterError
 from bywire.report.answer import use_case
@@ -109,6 +110,7 @@ def design(
     InputError
         For names that are unknown, values out of range, and requirements that make no sense.
     """
+    whole_number("seed", seed, 0, 2**63 - 1)
     if schedule and vary:
         raise ParameterError("schedule and vary: gains by region are not chosen for drawn models")
     if probability_wanted(probability) is not None and not vary:

@@ -15,7 +15,7 @@ import xarray as xr
 
 from bywire.bench.running import Progress
 from bywire.core.arguments import whole_number
-from bywire.core.errors import ParameterError, quoted
+from bywire.core.errors import ParameterError
 from bywire.core.typing import Array, silent
 from bywire.core.units import difference_unit
 from bywire.life.life_file import read_life
@@ -252,8 +252,6 @@ def project_life(
     KeyboardInterrupt
         When interrupted.
     """
-    if not isinstance(source, (str, Path)):
-        raise ParameterError(f"life = {quoted(source)}: name a life file, see docs/life.md")
     shown = progress or silent
     plan = read_life(source, overrides)
     require_checkable(check, plan)

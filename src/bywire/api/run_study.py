@@ -15,7 +15,7 @@ from bywire.bench.result import Result
 from bywire.bench.running import Progress
 from bywire.core.brake import loaded_files
 from bywire.core.callers import is_command_line
-from bywire.core.errors import FileError, InputError, ParameterError, quoted
+from bywire.core.errors import FileError, InputError
 from bywire.core.field_notes import field_notes
 from bywire.core.typing import silent
 from bywire.report.answer import use_case
@@ -85,8 +85,6 @@ def run_study(
     KeyboardInterrupt
         When interrupted; finished chunks stay.
     """
-    if not isinstance(study, (str, Path)):
-        raise ParameterError(f"study = {quoted(study)}: name a study file, see docs/studies.md")
     source = Path(study)
     store = StudyStore(Path(out) if out is not None else Path(source.stem))
     plan = with_cases(_by(engine, read_study(source, overrides)), store, cases)

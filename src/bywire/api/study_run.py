@@ -141,7 +141,7 @@ class StudyRun(Answer):
         """
         required = [each.demand.kpi for each in self.findings.judgments]
         if kpi not in required:
-            raise unknown_name("key figure of a requirement", kpi, required)
+            raise unknown_name("key figure of a requirement", str(kpi), required)
         if kpi not in self._shown.benches:
             raise ParameterError(
                 f"there is no {self._shown.kind} case by {kpi}: none has a result, or all are alike"

@@ -9,7 +9,7 @@ from typing import Any
 
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
-from bywire.core.units import Written
+from bywire.core.units import Written, difference_unit
 
 _SHARE = re.compile(r"\s*([+-]\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*%\s*")
 _PATTERN = re.compile(r"[*?\[]")
@@ -37,7 +37,7 @@ def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
     UnknownNameError
         When a pattern matches nothing.
     ParameterError
-        When a share is wanted of what is no quantity, or of zero.
+        When a share is wanted of what is no quantity, of zero, or of a temperature.
     """
     if not any(is_relative(name, value) for name, value in changes.items()):
         return dict(changes)
@@ -58,6 +58,9 @@ def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
                 )
         spread |= dict.fromkeys(names, changes[pattern])
     spread |= {name: value for name, value in changes.items() if not _PATTERN.search(name)}
+    for name, value in spread.items():
+        if name in leaves and share_of(value) is not None:
+            require_share(name, str(value), leaves[name].unit.symbol)
     return {
         name: value if (share := share_of(value)) is None or name not in values
         else _scaled(name, value, share, values[name], name in leaves)
@@ -75,6 +78,28 @@ def share_of(value: object) -> float | None:
     """
     match = _SHARE.fullmatch(value) if isinstance(value, str) else None
     return None if match is None else float(match[1].replace(" ", "")) / 100.0
+
+
+def require_share(name: str, text: str, symbol: str) -> None:
+    """Refuse a share of what has no natural zero: 5 % of 20 degC are 1 K to one, 15 K to another.
+
+    Parameters
+    ----------
+    name, text
+        What is changed, and by which share.
+    symbol
+        Its SI unit.
+
+    Raises
+    ------
+    ParameterError
+        For temperatures.
+    """
+    if difference_unit(symbol) != symbol:
+        raise ParameterError(
+            f"{name} = {quoted(text)}: a share of a temperature says nothing, for its zero may be "
+            "this one or that: give a temperature, or a width in K"
+        )
 
 
 def _scaled(name: str, text: str, share: float, value: Any, is_quantity: bool) -> Any:

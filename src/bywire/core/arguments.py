@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import operator
+import os
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from numbers import Real
@@ -103,6 +104,7 @@ _KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "float": ("a number", lambda v: isinstance(v, Real) and not isinstance(v, bool)),
     "bool": ("True or False", lambda v: isinstance(v, (bool, np.bool_))),
     "str": ("a text", lambda v: isinstance(v, str)),
+    "Path": ("a path", lambda v: isinstance(v, os.PathLike)),
     "Mapping": ("a mapping of names to values", lambda v: isinstance(v, Mapping)),
     "Sequence": (
         "a list",

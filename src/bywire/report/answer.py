@@ -80,9 +80,12 @@ class Answer(ABC):
 
         Raises
         ------
+        ParameterError
+            For what is no path.
         FileError
             When the folder cannot be made or written to.
         """
+        require_kinds(Answer.write, (self, folder), {})
         return write_document(self.document(), Path(folder))
 
     def __str__(self) -> str:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import limit_of
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.effects import ONE, Effect, effects
@@ -70,7 +71,14 @@ class Findings:
         return bench.definition.kpis_with(bench.chosen_options)
 
     def figure(self, name: str) -> Array:
-        """Return a key figure of every case, shape (cases,)."""
+        """Return a key figure of every case in its unit, shape (cases,); NaN where one has it not.
+
+        Raises
+        ------
+        UnknownNameError
+            For a figure that the study does not have.
+        """
+        self._require(name)
         return np.asarray(self.cases[name], dtype=float)
 
     def size(self, name: str) -> float:
@@ -109,10 +117,22 @@ class Findings:
         return known[name]
 
     def sensitivity(self, name: str) -> Sensitivity:
-        """Return the indices of a key figure, in a study whose design is made for them."""
+        """Return the indices of a key figure, in a study whose design is made for them.
+
+        Raises
+        ------
+        UnknownNameError
+            For a figure that the study does not have.
+        ParameterError
+            Of another design.
+        """
+        self._require(name)
         known, design = self._sensitivities, self.plan.sensitivity
+        if design is None:
+            raise ParameterError(
+                f"a study of {self.plan.design!r} has no indices: 'sobol-indices' and 'morris' have"
+            )
         if name not in known:
-            assert design is not None
             names = [v.name for v in self.plan.varied]
             singles = [v.name for v in self.plan.varied if v.distribution.is_discrete]
             known[name] = sensitivity(
@@ -122,6 +142,7 @@ class Findings:
 
     def effects(self, name: str) -> Sequence[Effect]:
         """Return what each quantity alone does to a key figure, where the design shows that."""
+        self._require(name)
         if self.plan.design != ONE or not len(self.cases):
             return []
         columns = [self.cases[v.name].tolist() for v in self.plan.varied]
@@ -169,6 +190,10 @@ class Findings:
             next(iter(each)) + ", and so on" * (len(each) > 1): each.total()
             for each in said.values()
         }
+
+    def _require(self, name: str) -> None:
+        if name not in self.units:
+            raise unknown_name("key figure", str(name), self.units)
 
     def _texts(self, column: str) -> NDArray[np.object_]:
         """Return a text of every case, shape (cases,); pandas would be slow to hand over each."""
