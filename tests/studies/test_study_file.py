@@ -13,6 +13,8 @@ from bywire.core.errors import InputError
 from bywire.studies.study_file import read_study
 
 RELEASE = 'experiment = "release"\nparameters = "dardanelli2010"\n'
+PULSES = 'experiment = "moment-pulses"\nparameters = "roberts2003"\n'
+STOPS = 'experiment = "repeated-stops"\nparameters = "sport600"\n'
 OPEN_LOOP = """
 experiment = "open-loop"
 parameters = "dardanelli2010"
@@ -156,6 +158,45 @@ def test_what_is_wrong_is_said_with_the_files_name(study, text, texts):
 def test_what_is_wrong_with_a_choice_among_the_options_is_said(study, text, said):
     with pytest.raises(InputError, match=re.escape(said)):
         read_study(study(f"[vary]\n{text}\n", RELEASE))
+
+
+@pytest.mark.parametrize(
+    ("bench", "text", "texts"),
+    [
+        (PULSES, '"options.pulses" = { kind = "uniform", low = 1, high = 3 }',
+         ["[vary] options.pulses is a whole number, >= 1 and <= 100", "'uniform'",
+          "kind = 'discrete', values = [2, 3, 4]"]),
+        (PULSES, '"options.pulses" = "+-30 %"', ["is a whole number", "'tolerance'"]),
+        (PULSES, '"options.pulses" = { kind = "discrete", values = [1, 2.5] }',
+         ["[vary] options.pulses.values: 2.5 is not", "a whole number, >= 1 and <= 100"]),
+        (PULSES, '"options.pulses" = { kind = "discrete", values = [0, 2] }', ["leave out 0"]),
+        (STOPS, '"options.stops" = { kind = "triangular", low = 8, high = 12 }',
+         ["options.stops is a whole number, >= 1 and <= 200", "values = [9, 10, 11]"]),
+        (STOPS, '"options.stops" = { kind = "discrete", values = [10, "+11 %"] }',
+         ["11.1 is not admissible"]),
+    ],
+)  # fmt: skip
+def test_whole_numbers_have_single_values(study, bench, text, texts):
+    with pytest.raises(InputError) as refused:
+        read_study(study(f"[vary]\n{text}\n", bench))
+    for each in texts:
+        assert each in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "visited"),
+    [("grid", {1, 3, 11}), ("corners", {1, 3, 11}), ("one-at-a-time", {1, 3, 11}),
+     ("monte-carlo", {1, 11}), ("latin-hypercube", {1, 11}), ("sobol", {1, 11})],
+)  # fmt: skip
+def test_designs_visit_whole_numbers(study, kind, visited):
+    text = '[vary]\n"options.pulses" = { kind = "discrete", values = [1, "11"] }\n'
+    plan = read_study(study(f'{text}[design]\nkind = "{kind}"\n', PULSES))
+    assert {*plan.values(0)["options.pulses"].tolist()} == visited
+
+
+def test_a_share_of_a_whole_number_may_be_whole(study):
+    text = '[vary]\n"options.stops" = { kind = "discrete", values = ["-10 %", "+10 %"] }\n'
+    assert read_study(study(text, STOPS)).varied[0].distribution.singles == (9.0, 11.0)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from bywire.bench.values import number, plain_text
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.units import difference_unit, parse, shown
-from bywire.studies.admissible import admitted
+from bywire.studies.admissible import admitted, require_single_values, whole
 from bywire.studies.distribution import Distribution
 from bywire.studies.laws import Law, LogNormal, Normal, Triangular, Uniform, truncated_normal
 from bywire.studies.single_values import (
@@ -67,6 +67,7 @@ def read_distribution(
     kind = entry["kind"]
     if not isinstance(kind, str) or kind not in _KINDS:
         raise unknown_name(f"kind of {title} {name}", choice_text(kind), _KINDS)
+    require_single_values(f"{title} {name}", kind, leaf, nominal)
     known, make = _KINDS[kind]
     for key in entry.keys() - {"kind", "together"}:
         if key not in known:
@@ -213,7 +214,8 @@ def _discrete(entry: _Entry) -> Distribution:
     values = entry.section.get("values")
     if not isinstance(values, list) or not values:
         raise entry.refused("it needs values = [...]")
-    read = [replace(entry, section={"values": value}).level("values") for value in values]
+    each = [replace(entry, section={"values": value}).level("values") for value in values]
+    read = whole(entry.where, each, entry.leaf)
     weights = weights_of(entry.where, entry.section, len(read))
     texts = list(map(entry.amount, read))
     require_several(entry.where, read, texts)

@@ -188,6 +188,11 @@ def _together(
             raise unknown_name(kind, choice_text(each), leaves)
         if isinstance(values[each], tuple):
             raise ParameterError(f"[vary] {name}.together {each} is a table: single numbers vary")
+        if leaves[each].is_whole:
+            raise ParameterError(
+                f"[vary] {name}.together {each} is a whole number, which keeps no ratio: vary it "
+                "by itself, or leave it as in the bench"
+            )
     if given and not values.get(name):
         raise ParameterError(f"[vary] {name} is zero in the bench: nothing can keep its ratio")
     return tuple(given)
