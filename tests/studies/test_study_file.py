@@ -250,12 +250,26 @@ def test_rare_values_are_levels_too(study):
         ("bench = 2010-05-27", "bench = 2010-05-27:"),
         ("", "bench is missing"),
         ('bench = "none.toml"', "none.toml"),
+        ('bench = "hard-brakin"', "did you mean hard-braking"),
+        ('bench = "studi.toml"', "studi.toml: No such file or directory: check the path"),
+        ('bench = "study.toml"', "study.toml: this is a study and not a bench"),
     ],
 )
 def test_a_study_needs_a_bench(tmp_path, line, said):
     path = tmp_path / "study.toml"
     path.write_text(f'{line}\n[vary]\n"motor.R_m" = "+-5 %"\n')
     with pytest.raises(InputError, match=said):
+        read_study(path)
+
+
+def test_a_bench_in_the_folder_beside_is_named(tmp_path):
+    for folder in ("benches", "studies"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "benches" / "braking.toml").write_text(RELEASE)
+    path = tmp_path / "studies" / "braking_study.toml"
+    path.write_text('bench = "braking.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n')
+    meant = "did you mean .*studies/../benches/braking.toml"
+    with pytest.raises(InputError, match=meant):
         read_study(path)
 
 

@@ -10,7 +10,9 @@ from typing import Any
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
+from bywire.bench.bench_source import names_experiment
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_of_few
+from bywire.data.file_kinds import STUDY, require_kind
 from bywire.data.toml_file import read_toml
 from bywire.studies.demand_section import read_demands
 from bywire.studies.design_rules import require_agreement
@@ -44,6 +46,7 @@ def read_study(
     file = Path(path)
     content = read_toml(file, "study file")
     try:
+        require_kind(content, STUDY, file)
         return _plan(content, file, overrides)
     except InputError as error:
         raise type(error)(f"{file}: {error}") from None
@@ -100,7 +103,7 @@ def read_bench(
             "or an experiment of 'bywire list'"
         )
     changes = bench_file.flattened(content.get("set", {}))
-    there = source if bench_file.names_experiment(source) else folder / source
+    there = source if names_experiment(source) else folder / source
     for key, value in changes.items():
         if not isinstance(value, str):
             raise ParameterError(f"[set] {key} = {quoted(value)}: write the value as a text, "
