@@ -343,5 +343,5 @@ def test_json_round_trip():
 
 def test_whole_numbers_are_known_as_such():
     assert [name for name, leaf in leaf_fields(Counted).items() if leaf.is_whole] == ["turns", "n"]
-    with pytest.raises(ParameterError, match="turns = 2.5 is not .* a whole number, >= 1"):
+    with pytest.raises(ParameterError, match=r"turns = 2\.5 is not .* a whole number, >= 1"):
         Counted.create({"turns": 2.5, "n": 1, "share": 0.5})
