@@ -50,6 +50,15 @@ def test_what_every_case_has_to_meet_and_one_does_not(bywire, study, tmp_path):
     assert "bywire: requirement missed: peak_current <= 18.57 A" in outcome.lines
 
 
+def test_a_choice_has_no_polynomial(bywire, study, tmp_path):
+    choice = '[vary]\n"adc.law" = { values = ["ideal", "quantized"] }\n'
+    study.write_text(STUDY.replace("[vary]\n", choice))
+    bywire("study", "run", study, "--out", tmp_path / "out")
+    for at in ((), ("--at", "adc.law=ideal"), ("--at", "motor.R_m=+1%")):
+        refused(bywire("study", "surrogate", tmp_path / "out", *at),
+                "adc.law: a choice has no polynomial", "a study for each of its values")  # fmt: skip
+
+
 def test_an_unfinished_study_says_so(bywire, study, tmp_path):
     out = tmp_path / "out"
     bywire("study", "run", study, "--out", out, "--cases", "128")
