@@ -122,6 +122,12 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
          ["'simulatoin': known are name, bench, vary"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nof = ["motor.R_m", "motor.K_e"]\n'
          "value = 0.5", ["'motor.K_e'", "correlation"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n"adc.law" = { values = ["ideal", "quantized"] }\n'
+         '[[correlation]]\nof = ["motor.R_m", "adc.law"]\nvalue = 0.5',
+         ["[[correlation]] of motor.R_m and adc.law", "adc.law is a choice"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\ntime = 5',
+         ["[design] time = 5 has the wrong unit", "'1.5 s'"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\ntime = 0', ["time = 0 must be above zero"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n"motor.K_e" = "+-5 %"\n[[correlation]]\n'
          'of = ["motor.R_m", "motor.K_e"]\nvalue = 1.0', ["between -1 and 1"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[set]\n"motor.K_e" = 0.3', ["write the value as a text"]),
@@ -240,6 +246,28 @@ def test_rare_values_are_levels_too(study):
         '[vary]\n"adc.law" = { values = ["ideal", "quantized"], weights = [1, 100000] }\n'
         '[design]\nkind = "grid"\n'))  # fmt: skip
     assert plan.values(0)["adc.law"].tolist() == ["quantized", "ideal", "quantized"]
+
+
+@pytest.mark.parametrize("kind", ["monte-carlo", "latin-hypercube", "sobol"])
+def test_correlated_single_values_rise_however_they_are_listed(study, kind):
+    """An index among them would be correlated else, and its sign be that of the listing."""
+
+    def drawn(values: str, correlation: str) -> np.ndarray:
+        plan = read_study(study(
+            '[vary]\n"motor.R_m" = "+-5 %"\n"supply.V_bat" = { kind = "discrete", '
+            f'{values} }}\n{correlation}[design]\nkind = "{kind}"\n'))  # fmt: skip
+        chunks = [plan.values(k) for k in range(8)]
+        return np.array([np.concatenate([c[n] for c in chunks]) for n in plan.values(0)])
+
+    rising = 'values = ["11 V", "12 V", "14 V"], weights = [1, 1, 2]'
+    others = ('values = ["14 V", "11 V", "12 V"], weights = [2, 1, 1]',
+              'values = ["12 V", "11 V", "14 V"], weights = [1, 1, 2]')  # fmt: skip
+    said = '[[correlation]]\nof = ["motor.R_m", "supply.V_bat"]\nvalue = 0.8\n'
+    wanted = drawn(rising, said)
+    assert 0.6 < np.corrcoef(wanted)[0, 1] < 0.8
+    for values in others:
+        np.testing.assert_array_equal(drawn(values, said), wanted)
+    assert not np.array_equal(drawn(others[0], ""), drawn(rising, ""))  # in their order, as ever
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,10 @@ class Distribution:
         ``below(x)``, ``above(x)``: probability of values below and above; None of single values,
         which end at ``low`` and ``high``.
     singles
-        Single values that it has [SI], or texts; none of what has any value.
+        Single values that it has [SI], or texts, in the order in which probabilities go through
+        them; none of what has any value.
+    weights
+        Probability of each of them.
     """
 
     kind: str
@@ -51,6 +54,7 @@ class Distribution:
     below: Callable[[float], float] | None = None
     above: Callable[[float], float] | None = None
     singles: tuple[Any, ...] = ()
+    weights: tuple[float, ...] = ()
 
     @property
     def is_discrete(self) -> bool:

@@ -14,11 +14,12 @@ from bywire.bench.bench_source import names_experiment
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_of_few
 from bywire.data.file_kinds import STUDY, require_kind
 from bywire.data.toml_file import read_toml
+from bywire.studies.correlation_section import in_order, read_correlations
 from bywire.studies.demand_section import read_demands
 from bywire.studies.design_rules import require_agreement
 from bywire.studies.design_section import read_design
 from bywire.studies.plan import StudyPlan
-from bywire.studies.vary_section import read_all_varied, read_correlations
+from bywire.studies.vary_section import read_all_varied
 
 _KEYS = ("name", "bench", "vary", "measured", "correlation", "design", "set", "requirements")
 
@@ -69,9 +70,9 @@ def _plan(
     varied, measured = read_all_varied(bench, content, file.parent)
     if not varied:
         raise ParameterError("[vary] is empty: say what varies, such as \"motor.R_m\" = '+-10 %'")
-    said = read_correlations(content.get("correlation", []), varied, measured)
+    said = {**measured, **read_correlations(content.get("correlation", []), varied, measured)}
     plan = StudyPlan(
-        name, bench, varied, demands=demands, correlations={**measured, **said},
+        name, bench, in_order(varied, said), demands=demands, correlations=said,
         **read_design(content.get("design", {})),
     )  # fmt: skip
     require_agreement(plan)
