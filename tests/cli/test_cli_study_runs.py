@@ -55,8 +55,8 @@ def test_a_choice_has_no_polynomial(bywire, study, tmp_path):
     study.write_text(STUDY.replace("[vary]\n", choice))
     bywire("study", "run", study, "--out", tmp_path / "out")
     for at in ((), ("--at", "adc.law=ideal"), ("--at", "motor.R_m=+1%")):
-        refused(bywire("study", "surrogate", tmp_path / "out", *at),
-                "adc.law: a choice has no polynomial", "a study for each of its values")  # fmt: skip
+        outcome = bywire("study", "surrogate", tmp_path / "out", *at)
+        refused(outcome, "adc.law: a choice has no polynomial", "a study for each of its values")
 
 
 def test_an_unfinished_study_says_so(bywire, study, tmp_path):

@@ -13,7 +13,7 @@ BENCH, STUDY, LIFE, CAMPAIGN = "bench", "study", "life", "campaign"
 _COMMANDS = {BENCH: "bywire run", STUDY: "bywire study run", LIFE: "bywire life",
              CAMPAIGN: "bywire faults"}  # fmt: skip
 _WORDS = {BENCH: "a bench", STUDY: "a study", LIFE: "a life", CAMPAIGN: "a campaign of faults"}
-_HEADS = {BENCH: "experiment", STUDY: "bench", LIFE: "life", CAMPAIGN: "bench"}
+HEADS = {BENCH: "experiment", STUDY: "bench", LIFE: "life", CAMPAIGN: "bench"}
 """the key that each cannot do without"""
 _OF_CAMPAIGNS = ("campaign", "criteria")
 _NEVER_IN_STUDIES = {*_OF_CAMPAIGNS, "values", "residuals", "rates", "reaction"}
@@ -65,8 +65,8 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
         Without the file's name in front.
     """
     kind = kind_of(content)
-    head = _HEADS[wanted]
-    if not kind or kind == wanted or (head in content and head != _HEADS[kind]):
+    head = HEADS[wanted]
+    if not kind or kind == wanted or (head in content and head != HEADS[kind]):
         return
     raise ParameterError(
         f"this is {_WORDS[kind]} and not {_WORDS[wanted]}: '{_COMMANDS[kind]} {file}' takes it"
