@@ -172,6 +172,7 @@ def test_what_is_wrong_with_a_choice_among_the_options_is_said(study, text, said
         (PULSES, '"options.pulses" = { kind = "uniform", low = 1, high = 3 }',
          ["[vary] options.pulses is a whole number, >= 1 and <= 100", "'uniform'",
           "kind = 'discrete', values = [2, 3, 4]"]),
+        (PULSES, '"options.pulses" = { sd = "5 %" }', ["kind is missing: add kind = 'discrete' ("]),
         (PULSES, '"options.pulses" = "+-30 %"', ["is a whole number", "'tolerance'"]),
         (PULSES, '"options.pulses" = { kind = "discrete", values = [1, 2.5] }',
          ["[vary] options.pulses.values: 2.5 is not", "a whole number, >= 1 and <= 100"]),

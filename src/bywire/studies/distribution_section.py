@@ -63,7 +63,7 @@ def read_distribution(
             "such as { kind = 'normal', sd = '5 %' }"
         )
     if "kind" not in entry:
-        raise _without_kind(f"{title} {name}", entry)
+        raise _without_kind(f"{title} {name}", entry, leaf)
     kind = entry["kind"]
     if not isinstance(kind, str) or kind not in _KINDS:
         raise unknown_name(f"kind of {title} {name}", choice_text(kind), _KINDS)
@@ -82,10 +82,11 @@ def read_distribution(
     return admitted(f"{title} {name}", made, leaf, advice)
 
 
-def _without_kind(where: str, entry: Mapping[str, Any]) -> ParameterError:
+def _without_kind(where: str, entry: Mapping[str, Any], leaf: Leaf) -> ParameterError:
     """Return the error of a section that does not say what kind of distribution it is."""
     given = entry.keys() - {"together"}
     near = [kind for kind, (keys, _) in _KINDS.items() if given and given <= {*keys}]
+    near = [DISCRETE] if leaf.is_whole else near
     which = " or ".join(map(repr, near or _KINDS))
     others = f" (there are {', '.join(_KINDS)})" if near else ""
     return ParameterError(f"{where} = {quoted(entry)}: kind is missing: add kind = {which}{others}")
