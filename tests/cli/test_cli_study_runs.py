@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from command_line import BRAKING, QUICK, no_half_files, refused
 
+from bywire.api.run_study import study_report
+from bywire.core.errors import FileError
 from emulated_driver import EmulatedDriver, emulated
 
 STUDY = 'bench = "bench.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n[design]\ncases = 64\n'
@@ -46,6 +50,15 @@ def test_what_every_case_has_to_meet_and_one_does_not(bywire, study, tmp_path):
     assert "bywire: requirement missed: peak_current <= 18.57 A" in outcome.lines
 
 
+def test_a_choice_has_no_polynomial(bywire, study, tmp_path):
+    choice = '[vary]\n"adc.law" = { values = ["ideal", "quantized"] }\n'
+    study.write_text(STUDY.replace("[vary]\n", choice))
+    bywire("study", "run", study, "--out", tmp_path / "out")
+    for at in ((), ("--at", "adc.law=ideal"), ("--at", "motor.R_m=+1%")):
+        outcome = bywire("study", "surrogate", tmp_path / "out", *at)
+        refused(outcome, "adc.law: a choice has no polynomial", "a study for each of its values")
+
+
 def test_an_unfinished_study_says_so(bywire, study, tmp_path):
     out = tmp_path / "out"
     bywire("study", "run", study, "--out", out, "--cases", "128")
@@ -62,6 +75,32 @@ def test_bad_input_is_one_error(bywire, study, tmp_path):
     refused(bywire("study", "tolerances.toml"), "bywire study run tolerances.toml")
 
 
+@pytest.mark.parametrize(
+    "command", [("resume",), ("extend", "--cases", "99"), ("report",), ("status",), ("surrogate",)]
+)
+def test_a_file_is_no_folder_of_a_study(bywire, study, tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    name, *more = command
+    texts = "is a study file, and the folder of a study is wanted", f"'bywire study run {study}' m"
+    refused(bywire("study", name, study, *more), str(study), *texts)
+    for kept in (tmp_path / "results" / study.stem, tmp_path / study.stem):
+        kept.mkdir(parents=True)
+        (kept / "study.json").write_text("{}")
+        wanted = f"did you mean {kept.relative_to(tmp_path)}?"
+        refused(bywire("study", name, study, *more), wanted)
+        refused(bywire("study", name, kept / "study.json", *more), f"did you mean {kept}?")
+    with pytest.raises(FileError, match="is a study file"):
+        study_report(study)
+
+
+@pytest.mark.parametrize("command", ["resume", "report"])
+def test_a_folder_that_cannot_be_written_has_no_option(bywire, tmp_path, command):
+    (tmp_path / "file").touch()
+    outcome = bywire("study", command, tmp_path / "file" / "folder")
+    refused(outcome, "cannot write to the output folder", "you may write there")
+    assert "--out" not in outcome.err
+
+
 def test_a_graphics_processor_that_is_not_there_is_no_study(bywire, study, tmp_path):
     driver = EmulatedDriver()
     driver.count = 0
@@ -76,3 +115,28 @@ def test_help_names_both_kinds_of_studies(bywire):
     outcome = bywire("study", "--help")
     assert outcome.status == 0
     assert all(word in outcome.out for word in ("run", "resume", "extend", "report", "size"))
+
+
+@pytest.mark.parametrize("place", ["", "studies"])
+@pytest.mark.parametrize("word", ["tolerances", "tolrances"])
+def test_the_name_of_a_study_file_is_no_sizing_study(
+    bywire, study, tmp_path, monkeypatch, place, word
+):
+    monkeypatch.chdir(tmp_path)
+    there = Path(place, study.name)
+    (tmp_path / place).mkdir(exist_ok=True)
+    study.rename(tmp_path / there)
+    (tmp_path / "tolerance.toml").write_text('life = "wedge-pads"\n')  # near, and no study
+    refused(bywire("study", word), f"the study file {there} is run by 'bywire study run {there}'")
+    refused(bywire("study", "run", word), f"did you mean {there}?")
+    assert not (tmp_path / word).exists()
+
+
+def test_a_study_that_is_nothing_says_what_is_wanted(bywire, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    texts = "unknown sizing study 'foo': known are actuator-sizing", "'bywire study run FILE'"
+    refused(bywire("study", "foo"), *texts)
+    refused(bywire("study", "drive-trian"), "did you mean 'drive-train'?")
+    for name in ("foo", "foo.toml", "foo/bar.toml"):
+        refused(bywire("study", "run", name), f"cannot read study file {name}", "check the path")
+    assert not any(tmp_path.iterdir())

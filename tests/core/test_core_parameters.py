@@ -56,6 +56,17 @@ class Outer(ParameterSet):
         return self
 
 
+class Counted(ParameterSet):
+    """Numbers of which two are whole."""
+
+    turns: Annotated[float, Unit("1"), Field(ge=1, multiple_of=1)]
+    """how often"""
+    n: Annotated[int, Unit("1"), Field(ge=1)]
+    """how many"""
+    share: Fraction
+    """how much"""
+
+
 VALUES: dict[str, Any] = {
     "inner.R": 0.35, "inner.law": "paper", "share": 0.9, "table": (0.0, 1e5, 2e5), "n": 3,
     "on": True, "note": "as built", "long": 2.0, "short": 1.0,
@@ -328,3 +339,9 @@ def test_fields_cannot_be_changed_by_who_reads_them():
 
 def test_json_round_trip():
     assert Outer.model_validate_json(made().model_dump_json()) == made()
+
+
+def test_whole_numbers_are_known_as_such():
+    assert [name for name, leaf in leaf_fields(Counted).items() if leaf.is_whole] == ["turns", "n"]
+    with pytest.raises(ParameterError, match=r"turns = 2\.5 is not .* a whole number, >= 1"):
+        Counted.create({"turns": 2.5, "n": 1, "share": 0.5})

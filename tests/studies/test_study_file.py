@@ -13,6 +13,8 @@ from bywire.core.errors import InputError
 from bywire.studies.study_file import read_study
 
 RELEASE = 'experiment = "release"\nparameters = "dardanelli2010"\n'
+PULSES = 'experiment = "moment-pulses"\nparameters = "roberts2003"\n'
+STOPS = 'experiment = "repeated-stops"\nparameters = "sport600"\n'
 OPEN_LOOP = """
 experiment = "open-loop"
 parameters = "dardanelli2010"
@@ -120,6 +122,12 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
          ["'simulatoin': known are name, bench, vary"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nof = ["motor.R_m", "motor.K_e"]\n'
          "value = 0.5", ["'motor.K_e'", "correlation"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n"adc.law" = { values = ["ideal", "quantized"] }\n'
+         '[[correlation]]\nof = ["motor.R_m", "adc.law"]\nvalue = 0.5',
+         ["[[correlation]] of motor.R_m and adc.law", "adc.law is a choice"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\ntime = 5',
+         ["[design] time = 5 has the wrong unit", "'1.5 s'"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\ntime = 0', ["time = 0 must be above zero"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n"motor.K_e" = "+-5 %"\n[[correlation]]\n'
          'of = ["motor.R_m", "motor.K_e"]\nvalue = 1.0', ["between -1 and 1"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[set]\n"motor.K_e" = 0.3', ["write the value as a text"]),
@@ -156,6 +164,46 @@ def test_what_is_wrong_is_said_with_the_files_name(study, text, texts):
 def test_what_is_wrong_with_a_choice_among_the_options_is_said(study, text, said):
     with pytest.raises(InputError, match=re.escape(said)):
         read_study(study(f"[vary]\n{text}\n", RELEASE))
+
+
+@pytest.mark.parametrize(
+    ("bench", "text", "texts"),
+    [
+        (PULSES, '"options.pulses" = { kind = "uniform", low = 1, high = 3 }',
+         ["[vary] options.pulses is a whole number, >= 1 and <= 100", "'uniform'",
+          "kind = 'discrete', values = [2, 3, 4]"]),
+        (PULSES, '"options.pulses" = { sd = "5 %" }', ["kind is missing: add kind = 'discrete' ("]),
+        (PULSES, '"options.pulses" = "+-30 %"', ["is a whole number", "'tolerance'"]),
+        (PULSES, '"options.pulses" = { kind = "discrete", values = [1, 2.5] }',
+         ["[vary] options.pulses.values: 2.5 is not", "a whole number, >= 1 and <= 100"]),
+        (PULSES, '"options.pulses" = { kind = "discrete", values = [0, 2] }', ["leave out 0"]),
+        (STOPS, '"options.stops" = { kind = "triangular", low = 8, high = 12 }',
+         ["options.stops is a whole number, >= 1 and <= 200", "values = [9, 10, 11]"]),
+        (STOPS, '"options.stops" = { kind = "discrete", values = [10, "+11 %"] }',
+         ["11.1 is not admissible"]),
+    ],
+)  # fmt: skip
+def test_whole_numbers_have_single_values(study, bench, text, texts):
+    with pytest.raises(InputError) as refused:
+        read_study(study(f"[vary]\n{text}\n", bench))
+    for each in texts:
+        assert each in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "visited"),
+    [("grid", {1, 3, 11}), ("corners", {1, 3, 11}), ("one-at-a-time", {1, 3, 11}),
+     ("monte-carlo", {1, 11}), ("latin-hypercube", {1, 11}), ("sobol", {1, 11})],
+)  # fmt: skip
+def test_designs_visit_whole_numbers(study, kind, visited):
+    text = '[vary]\n"options.pulses" = { kind = "discrete", values = [1, "11"] }\n'
+    plan = read_study(study(f'{text}[design]\nkind = "{kind}"\n', PULSES))
+    assert {*plan.values(0)["options.pulses"].tolist()} == visited
+
+
+def test_a_share_of_a_whole_number_may_be_whole(study):
+    text = '[vary]\n"options.stops" = { kind = "discrete", values = ["-10 %", "+10 %"] }\n'
+    assert read_study(study(text, STOPS)).varied[0].distribution.singles == (9.0, 11.0)
 
 
 @pytest.mark.parametrize(
@@ -201,6 +249,28 @@ def test_rare_values_are_levels_too(study):
     assert plan.values(0)["adc.law"].tolist() == ["quantized", "ideal", "quantized"]
 
 
+@pytest.mark.parametrize("kind", ["monte-carlo", "latin-hypercube", "sobol"])
+def test_correlated_single_values_rise_however_they_are_listed(study, kind):
+    """An index among them would be correlated else, and its sign be that of the listing."""
+
+    def drawn(values: str, correlation: str) -> np.ndarray:
+        plan = read_study(study(
+            '[vary]\n"motor.R_m" = "+-5 %"\n"supply.V_bat" = { kind = "discrete", '
+            f'{values} }}\n{correlation}[design]\nkind = "{kind}"\n'))  # fmt: skip
+        chunks = [plan.values(k) for k in range(8)]
+        return np.array([np.concatenate([c[n] for c in chunks]) for n in plan.values(0)])
+
+    rising = 'values = ["11 V", "12 V", "14 V"], weights = [1, 1, 2]'
+    others = ('values = ["14 V", "11 V", "12 V"], weights = [2, 1, 1]',
+              'values = ["12 V", "11 V", "14 V"], weights = [1, 1, 2]')  # fmt: skip
+    said = '[[correlation]]\nof = ["motor.R_m", "supply.V_bat"]\nvalue = 0.8\n'
+    wanted = drawn(rising, said)
+    assert 0.6 < np.corrcoef(wanted)[0, 1] < 0.8
+    for values in others:
+        np.testing.assert_array_equal(drawn(values, said), wanted)
+    assert not np.array_equal(drawn(others[0], ""), drawn(rising, ""))  # in their order, as ever
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [
@@ -209,12 +279,26 @@ def test_rare_values_are_levels_too(study):
         ("bench = 2010-05-27", "bench = 2010-05-27:"),
         ("", "bench is missing"),
         ('bench = "none.toml"', "none.toml"),
+        ('bench = "hard-brakin"', "did you mean hard-braking"),
+        ('bench = "studi.toml"', "studi.toml: No such file or directory: check the path"),
+        ('bench = "study.toml"', "study.toml: this is a study and not a bench"),
     ],
 )
 def test_a_study_needs_a_bench(tmp_path, line, said):
     path = tmp_path / "study.toml"
     path.write_text(f'{line}\n[vary]\n"motor.R_m" = "+-5 %"\n')
     with pytest.raises(InputError, match=said):
+        read_study(path)
+
+
+def test_a_bench_in_the_folder_beside_is_named(tmp_path):
+    for folder in ("benches", "studies"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "benches" / "braking.toml").write_text(RELEASE)
+    path = tmp_path / "studies" / "braking_study.toml"
+    path.write_text('bench = "braking.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n')
+    meant = "did you mean .*studies/../benches/braking.toml"
+    with pytest.raises(InputError, match=meant):
         read_study(path)
 
 

@@ -248,8 +248,10 @@ def test_a_folder_of_another_study_is_refused(study, tmp_path):
     path.write_text(path.read_text().replace("4 %", "5 %"))
     for call in (lambda: bywire.run_study(path, out), lambda: bywire.resume_study(out),
                  lambda: bywire.study_report(out)):  # fmt: skip
-        with pytest.raises(FileError, match="holds another study"):
+        with pytest.raises(FileError, match="holds another study") as refused:
             call()
+        assert "varied motor.R_m: normal, mean" in str(refused.value)
+        assert "quantiles" not in str(refused.value)
     path.unlink()
     with pytest.raises(FileError, match="is gone"):
         bywire.resume_study(out)

@@ -13,6 +13,7 @@ from bywire.api.compared_run import ComparedRun, kept, ran
 from bywire.api.comparison import Comparison
 from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
+from bywire.bench.bench_source import names_experiment
 from bywire.bench.result import Result
 from bywire.bench.result_folder import is_result_folder
 from bywire.bench.running import Progress
@@ -108,7 +109,7 @@ def _is_folder(source: Comparable) -> bool:
     path = Path(source)
     if not path.is_dir():
         return False
-    return is_result_folder(path) or not bench_file.names_experiment(source)
+    return is_result_folder(path) or not names_experiment(source)
 
 
 def _resolved(

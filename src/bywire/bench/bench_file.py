@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import contextlib
-import re
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from bywire.bench.bench import Bench
+from bywire.bench.bench_source import content_of_experiment, meant_by
 from bywire.bench.bench_text import PATHS
-from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.experiment_choice import experiment_of
 from bywire.bench.faults.fault_section import with_units_wanted
 from bywire.bench.faults.injected import checked_sections
-from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.bench.relative_changes import is_relative, settled
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.bench.stimulus_sections import stimulus_sections
 from bywire.bench.values import parsed, require_unit, require_units
-from bywire.core.catalog import PARAMETER_SETS, main_set
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
+from bywire.data.file_kinds import BENCH, require_kind
 from bywire.data.toml_file import read_toml
 
 SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
@@ -29,7 +27,6 @@ SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
 _KEYS = ("experiment", "parameters", "assembly", "name")
 _FAULTS = "faults"
 _SIMULATION = ("step", "record", "seed", "engine")
-_NAME = re.compile(r"[a-z][a-z0-9-]*")
 _TOO_LARGE = "; measured traces go into a file of their own (options.trace)"
 
 
@@ -72,14 +69,15 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
         a share, ``+50%``, is of what the file gives.
     """
     file = Path(path)
-    content = _of_experiment(file, changes) or read_toml(
-        file, "bench file", missing=_nearest, too_large=_TOO_LARGE
+    content = content_of_experiment(file, changes) or read_toml(
+        file, "bench file", missing=meant_by, too_large=_TOO_LARGE
     )
     relative = {
         name: value for name, value in changes.items()
         if is_relative(name, value) and name.partition(".")[0] not in SECTIONS
     }  # fmt: skip
     try:
+        require_kind(content, BENCH, file)
         _require_shape(content)
         plain = {name: value for name, value in changes.items() if name not in relative}
         bench = from_mapping(_changed(content, plain), file.parent, _printable(file.stem))
@@ -143,49 +141,6 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
                 )
             flat[each] = leaf
     return flat
-
-
-def names_experiment(source: str | Path) -> bool:
-    """Return whether a text is the bare name of an experiment, of a brake or of any."""
-    name = str(source)
-    if not _NAME.fullmatch(name):
-        return False
-    return EXPERIMENTS.get(name) is not None or name in _any_brake()
-
-
-def _of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, Any]:
-    """Return the shortest bench file of an experiment; nothing where there is a file instead."""
-    name = str(file)
-    if not _NAME.fullmatch(name) or file.is_file():
-        return {}
-    definition = EXPERIMENTS.get(name)
-    if definition is None and name not in _any_brake():
-        return {}
-    if "parameters" in changes:
-        return {"experiment": name}
-    if definition is None:
-        sets = ", ".join(PARAMETER_SETS.all())
-        raise ParameterError(
-            f"experiment {name!r} is for any brake: say for which, with --set parameters=NAME "
-            f"({sets})"
-        )
-    chosen = main_set(definition.assembly, beside=type(definition.defaults))
-    return {"experiment": name, "parameters": chosen}
-
-
-def _any_brake() -> Mapping[str, GenericExperiment]:
-    return GENERIC_EXPERIMENTS.all()
-
-
-def _nearest(file: Path) -> str:
-    """Return what to do about a file that is not there."""
-    with contextlib.suppress(OSError):
-        there = [path.name for path in file.parent.glob("*.toml")]
-        near = get_close_matches(file.name, there, n=1, cutoff=0.5)
-        near += get_close_matches(str(file), {**EXPERIMENTS.all(), **_any_brake()}, n=1, cutoff=0.7)
-        if near:
-            return f"did you mean {file.with_name(near[0])}?"
-    return "check the path, or name an experiment of 'bywire list'"
 
 
 def _printable(name: str) -> str:

@@ -21,6 +21,7 @@ from bywire.campaigns.residual import Residual, residuals_of
 from bywire.campaigns.simulating import require_small
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.signals import signals_of
+from bywire.data.file_kinds import CAMPAIGN, require_kind
 from bywire.data.toml_file import read_toml
 from bywire.studies.study_file import read_bench
 from bywire.studies.vary_section import read_all_varied
@@ -60,6 +61,7 @@ def read_campaign(
     file = Path(source)
     content = read_toml(file, "campaign file")
     try:
+        require_kind(content, CAMPAIGN, file)
         return _plan({"name": file.stem, **content}, file.parent, overrides)
     except InputError as error:
         raise type(error)(f"{file}: {error}") from None

@@ -24,11 +24,16 @@ def folder(text: str) -> Path:
     return Path(text)
 
 
+ANOTHER = "name another one with --out"
+"""what to do about a folder that cannot be written"""
+
+
 @contextmanager
-def output_folder(out: Path) -> Iterator[None]:
+def output_folder(out: Path, advice: str = ANOTHER) -> Iterator[None]:
     """Make the output folder, so that nothing is computed for one that cannot be written.
 
-    What was made for it and is empty in the end is removed.
+    What was made for it and is empty in the end is removed. ``advice``: what to do about one that
+    cannot be written.
 
     Raises
     ------
@@ -42,7 +47,6 @@ def output_folder(out: Path) -> Iterator[None]:
                 pass
         except OSError as error:
             raise FileError(
-                f"cannot write to the output folder {out}: {error.strerror or error}; name another "
-                "one with --out"
+                f"cannot write to the output folder {out}: {error.strerror or error}; {advice}"
             ) from None
         yield

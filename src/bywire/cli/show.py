@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from bywire.cli import output
-from bywire.cli.output_folder import output_folder
+from bywire.cli.output_folder import ANOTHER, output_folder
 from bywire.cli.progress import progress_bar
 from bywire.core.errors import BywireError
 from bywire.core.interrupts import interrupt_heard
@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 
 
 def show(
-    compute: Callable[[Progress], Answer], out: Path | None = None, as_json: bool = False
-) -> None:
+    compute: Callable[[Progress], Answer], out: Path | None = None, as_json: bool = False,
+    advice: str = ANOTHER,
+) -> None:  # fmt: skip
     """Compute an answer and show it; a full disk must not cost the numbers too.
 
     Parameters
@@ -35,6 +36,8 @@ def show(
         Folder for recordings, figures and the report; none is written without.
     as_json
         Whether one JSON object is printed.
+    advice
+        What to do about a folder that cannot be written.
 
     Raises
     ------
@@ -58,7 +61,7 @@ def show(
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            with nullcontext() if out is None else output_folder(out):
+            with nullcontext() if out is None else output_folder(out, advice):
                 with progress_bar() as progress:
                     answer = compute(progress)
                 document = answer.document()

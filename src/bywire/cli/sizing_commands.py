@@ -18,6 +18,7 @@ from bywire.cli.options import (
     changes,
 )
 from bywire.cli.show import show
+from bywire.cli.study_names import require_sizing
 from bywire.core import option_texts as texts
 
 
@@ -38,6 +39,7 @@ def study_command(
     json: JsonFlag = False,
 ) -> None:
     """Compare designs of a brake at equal demands: the best, what limits it, at what price."""
+    require_sizing(name)
     from bywire.api.study import study
 
     show(lambda progress: study(name, parameters, changes(set_), progress=progress), out, json)

@@ -11,10 +11,12 @@ from typer.core import TyperGroup
 from bywire.cli.options import BenchChanges, JsonFlag, changes
 from bywire.cli.output_folder import folder
 from bywire.cli.show import show
+from bywire.cli.study_names import require_study_file
 from bywire.core import option_texts as texts
 from bywire.core.errors import ParameterError
 
 _SIZE = "size"
+_WRITABLE = "see that you may write there"  # the folder of a study is where its chunks are
 
 
 class _StudyGroup(TyperGroup):
@@ -35,9 +37,20 @@ study_app = typer.Typer(
     help="Run a study of many cases (run FILE), or compare designs of a brake (NAME).",
 )
 
+
+def _study_folder(folder: Path) -> Path:
+    """Return the folder that a command names, before anything is made for it."""
+    from bywire.studies.study_folder import require_no_file
+
+    require_no_file(folder)
+    return folder
+
+
 StudyFolder = Annotated[
-    Path, typer.Argument(help="Folder of the study.", metavar="FOLDER", show_default=False)
-]
+    Path,
+    typer.Argument(help="Folder of the study.", metavar="FOLDER", show_default=False,
+                   callback=_study_folder),
+]  # fmt: skip
 Cases = Annotated[int | None, typer.Option(help=texts.STUDY_CASES)]
 Workers = Annotated[
     int | None, typer.Option(help="Processes; one a core by default, where it is worth it.")
@@ -66,6 +79,7 @@ def study_run_command(
     json: JsonFlag = False,
 ) -> None:
     """Run a bench for many values of what varies: probabilities, spread, what drives them."""
+    require_study_file(study)
     from bywire.api.run_study import run_study
 
     place = out if out is not None else Path(study.stem)
@@ -105,7 +119,7 @@ def report_command(place: StudyFolder, json: JsonFlag = False) -> None:
     """Judge what a study has so far, by the requirements of its file, and write its report."""
     from bywire.api.run_study import study_report
 
-    show(lambda _: study_report(place), place, json)
+    show(lambda _: study_report(place), place, json, _WRITABLE)
 
 
 @study_app.command("status")
@@ -146,5 +160,5 @@ def _resumed(
             place, cases=cases, workers=workers, cluster=cluster, engine=engine,
             progress=progress,
         ),
-        place, as_json,
+        place, as_json, _WRITABLE,
     )  # fmt: skip

@@ -19,6 +19,8 @@ class Leaf:
     high: float
     low_open: bool
     high_open: bool
+    is_whole: bool = False
+    """whether only whole numbers are admissible"""
 
     def admits(self, value: float) -> bool:
         """Return whether a value [SI] lies in the admissible range."""

@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Any, Self, TypeVar, cast
 
 import numpy as np
-from annotated_types import Ge, Gt, Le, Lt
+from annotated_types import Ge, Gt, Le, Lt, MultipleOf
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
@@ -212,6 +212,7 @@ def require_units(cls: type[ParameterSet], prefix: str = "") -> None:
 
 def _leaf(dotted: str, unit: Unit, info: FieldInfo) -> Leaf:
     low, high, low_open, high_open = -math.inf, math.inf, False, False
+    is_whole = info.annotation is int
     for note in (*info.metadata, *_node_notes(info.annotation)):
         if isinstance(note, Gt):
             low, low_open = float(cast(float, note.gt)), True
@@ -221,7 +222,9 @@ def _leaf(dotted: str, unit: Unit, info: FieldInfo) -> Leaf:
             high, high_open = float(cast(float, note.lt)), True
         elif isinstance(note, Le):
             high = float(cast(float, note.le))
-    return Leaf(dotted, unit, low, high, low_open, high_open)
+        elif isinstance(note, MultipleOf):
+            is_whole = is_whole or float(cast(float, note.multiple_of)).is_integer()
+    return Leaf(dotted, unit, low, high, low_open, high_open, is_whole)
 
 
 def _node_notes(annotation: Any) -> Iterator[Any]:

@@ -52,7 +52,8 @@ def _explain(
         return _unknown_choice(name, value, detail["ctx"]["expected"])
     leaf = leaves.get(name) or leaves.get(name.rpartition(".")[0])
     if leaf is not None and kind != "value_error" and not _is_length(detail):
-        wanted = "a whole number, " if kind.startswith("int") else ""
+        is_broken = leaf.is_whole and (kind.startswith("int") or kind == "multiple_of")
+        wanted = "a whole number, " if is_broken else ""
         return _out_of_range(name, value, leaf, wanted, texts.get(name, ""))
     if _is_length(detail):
         return _wrong_count(name, detail, texts)

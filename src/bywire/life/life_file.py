@@ -13,6 +13,7 @@ from bywire.bench.values import parsed, require_units
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.units import parse
+from bywire.data.file_kinds import LIFE, require_kind
 from bywire.data.toml_file import read_toml
 from bywire.life.declaration import LIVES, Life, StopConditions
 from bywire.life.plan import CONDITION, LifePlan
@@ -51,6 +52,7 @@ def read_life(
     is_name = file.suffix != ".toml" and not file.is_file()
     content = {"life": str(source)} if is_name else read_toml(file, "life file")
     try:
+        require_kind(content, LIFE, file)
         return _plan(content, file.stem, overrides)
     except InputError as error:
         if is_name:

@@ -10,13 +10,13 @@ from typing import Any
 
 from bywire.bench.result_folder import RECORD
 from bywire.core.errors import FileError
+from bywire.data.file_kinds import BENCH, CAMPAIGN, HEADS, LIFE, STUDY, kind_of
 from bywire.data.format_registry import FORMATS
 from bywire.data.toml_file import LARGEST, read_toml
 from bywire.server.place import Place
 
 _DEEP, _MOST = 4, 5000  # folders in folders, and files, that are looked at
 _LEFT_OUT = ("node_modules", "__pycache__", "venv", "chunks")
-_OF_CAMPAIGNS = ("campaign", "criteria")  # what campaign files have and study files do not
 REPORT = ".html"
 
 
@@ -114,14 +114,11 @@ def _note_toml(there: Contents, path: Path, name: str) -> None:
         content: dict[str, Any] = read_toml(path, "file")
     except (FileError, OSError):
         return
-    for key, kind in {"experiment": there.benches, "life": there.lives}.items():
-        if isinstance(content.get(key), str):
-            kind[name] = content[key]
-            return
-    varied, bench = content.get("vary"), content.get("bench")
-    if isinstance(bench, str) and any(key in content for key in _OF_CAMPAIGNS):
-        there.campaigns[name] = bench
-    elif isinstance(bench, str) and isinstance(varied, dict):
-        there.studies[name] = bench
+    kind = kind_of(content)
+    subject = content.get(HEADS.get(kind, ""))
+    if isinstance(subject, str):
+        places = {BENCH: there.benches, STUDY: there.studies, CAMPAIGN: there.campaigns,
+                  LIFE: there.lives}  # fmt: skip
+        places[kind][name] = subject
     else:
         there.maps.append(name)

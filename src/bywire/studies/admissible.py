@@ -11,6 +11,7 @@ from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
 from bywire.core.units import shown
 from bywire.studies.distribution import NEVER, Distribution
+from bywire.studies.single_values import DISCRETE
 
 _NEXT = {
     "tolerance": "take a narrower tolerance, or kind 'uniform' with ends within it",
@@ -66,6 +67,50 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
                 f"admissible, it must be {wanted}: {advice}"
             )
     return replace(made, low=low, high=high)
+
+
+def require_single_values(where: str, kind: str, leaf: Leaf, nominal: float) -> None:
+    """Refuse a distribution of a whole number that has any value between its ends.
+
+    Parameters
+    ----------
+    where, kind
+        What errors call it, and the kind of its distribution.
+    leaf, nominal
+        What is known about it, and what the bench has.
+
+    Raises
+    ------
+    ParameterError
+        With single values that it may have.
+    """
+    if not leaf.is_whole or kind == DISCRETE:
+        return
+    near = [x for x in (nominal - 1.0, nominal, nominal + 1.0) if leaf.admits(x)]
+    raise ParameterError(
+        f"{where} is a whole number, {leaf.range_text}, and kind {kind!r} has values in between: "
+        f"vary it by kind = '{DISCRETE}', values = [{', '.join(f'{x:g}' for x in near)}] for "
+        "instance"
+    )
+
+
+def whole(where: str, values: Sequence[float], leaf: Leaf) -> list[float]:
+    """Return single values; of a whole number without the last digit that a share leaves.
+
+    Raises
+    ------
+    ParameterError
+        For those of a whole number that are not whole.
+    """
+    if not leaf.is_whole:
+        return list(values)
+    for value in values:
+        if not math.isfinite(value) or abs(value - round(value)) > _ROUNDING * abs(value):
+            raise ParameterError(
+                f"{where}.values: {value:.10g} is not admissible: it must be a whole number, "
+                f"{leaf.range_text}"
+            )
+    return [float(round(value)) for value in values]
 
 
 def require_following(where: str, made: Distribution, leaf: Leaf, unit: Unit, ratio: float) -> None:

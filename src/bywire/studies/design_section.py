@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from bywire.bench.values import written
 from bywire.core.arguments import whole_number
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.units import parse
@@ -52,7 +53,7 @@ def read_design(section: Mapping[str, Any]) -> dict[str, Any]:
             )
         design["confidence"] = share
     if "time" in section:
-        design["time"] = parse(section["time"], "s", "[design] time")
+        design["time"] = written(section["time"], "s", "[design] time")
         if not design["time"] > 0.0:
             raise ParameterError(f"[design] time = {quoted(section['time'])} must be above zero")
     return design

@@ -39,9 +39,11 @@ class Distribution:
     below, above
         ``below(x)``, ``above(x)``: probability of values below and above; None of single values,
         which end at ``low`` and ``high``.
-    singles, weights
-        Single values that it has [SI], or texts, and the probability of each; none of what has any
-        value.
+    singles
+        Single values that it has [SI], or texts, in the order in which probabilities go through
+        them; none of what has any value.
+    weights
+        Probability of each of them.
     """
 
     kind: str

@@ -13,7 +13,7 @@ from bywire.bench.values import number, plain_text
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.units import difference_unit, parse, shown
-from bywire.studies.admissible import admitted
+from bywire.studies.admissible import admitted, require_single_values, whole
 from bywire.studies.distribution import Distribution
 from bywire.studies.laws import Law, LogNormal, Normal, Triangular, Uniform, truncated_normal
 from bywire.studies.single_values import (
@@ -63,10 +63,11 @@ def read_distribution(
             "such as { kind = 'normal', sd = '5 %' }"
         )
     if "kind" not in entry:
-        raise _without_kind(f"{title} {name}", entry)
+        raise _without_kind(f"{title} {name}", entry, leaf)
     kind = entry["kind"]
     if not isinstance(kind, str) or kind not in _KINDS:
         raise unknown_name(f"kind of {title} {name}", choice_text(kind), _KINDS)
+    require_single_values(f"{title} {name}", kind, leaf, nominal)
     known, make = _KINDS[kind]
     for key in entry.keys() - {"kind", "together"}:
         if key not in known:
@@ -81,10 +82,11 @@ def read_distribution(
     return admitted(f"{title} {name}", made, leaf, advice)
 
 
-def _without_kind(where: str, entry: Mapping[str, Any]) -> ParameterError:
+def _without_kind(where: str, entry: Mapping[str, Any], leaf: Leaf) -> ParameterError:
     """Return the error of a section that does not say what kind of distribution it is."""
     given = entry.keys() - {"together"}
     near = [kind for kind, (keys, _) in _KINDS.items() if given and given <= {*keys}]
+    near = [DISCRETE] if leaf.is_whole else near
     which = " or ".join(map(repr, near or _KINDS))
     others = f" (there are {', '.join(_KINDS)})" if near else ""
     return ParameterError(f"{where} = {quoted(entry)}: kind is missing: add kind = {which}{others}")
@@ -213,7 +215,8 @@ def _discrete(entry: _Entry) -> Distribution:
     values = entry.section.get("values")
     if not isinstance(values, list) or not values:
         raise entry.refused("it needs values = [...]")
-    read = [replace(entry, section={"values": value}).level("values") for value in values]
+    each = [replace(entry, section={"values": value}).level("values") for value in values]
+    read = whole(entry.where, each, entry.leaf)
     weights = weights_of(entry.where, entry.section, len(read))
     texts = list(map(entry.amount, read))
     require_several(entry.where, read, texts)

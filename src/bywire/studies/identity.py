@@ -51,10 +51,22 @@ def differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     if not before:
         return ""
     old, new = dict(_entries(before)), dict(_entries(now))
-    names = [name for name in sorted({*old, *new}) if old.get(name) != new.get(name)]
+    differ = [name for name in sorted({*old, *new}) if old.get(name) != new.get(name)]
+    names = [name for name in differ if not _is_said(name, old, new)]
     texts = [_difference(name, old, new) for name in names[:_SHOWN]]
     rest = [f"and {len(names) - _SHOWN} more"] if len(names) > _SHOWN else []
     return "; ".join(texts + rest)
+
+
+def _is_said(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    """Return whether a difference follows from one of another entry.
+
+    Quantiles differ where the text of a distribution does, and all of what varies only now.
+    """
+    whole, _, part = name.rpartition(" ")
+    if part == "quantiles":
+        return old.get(whole) != new.get(whole)
+    return part == "together" and (whole in old) != (whole in new)
 
 
 def _difference(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> str:

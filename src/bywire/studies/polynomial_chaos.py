@@ -47,7 +47,7 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
         When OpenTURNS is not installed.
     """
     plan = findings.plan
-    _require_numbers(plan)
+    require_numbers(plan)
     if kpi not in findings.units:
         raise unknown_name("key figure", kpi, findings.units)
     y = findings.figure(kpi)
@@ -79,7 +79,14 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
     )  # fmt: skip
 
 
-def _require_numbers(plan: StudyPlan) -> None:
+def require_numbers(plan: StudyPlan) -> None:
+    """Refuse studies whose cases no polynomial goes through: see `surrogate_of`.
+
+    Raises
+    ------
+    ParameterError
+        For designs that show no more than some places, and choices among what varies.
+    """
     if plan.design in _LACKING:
         raise ParameterError(
             f"the cases of {plan.design!r} do not show what lies between them: a surrogate "

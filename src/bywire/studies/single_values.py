@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -119,9 +120,23 @@ def among(values: list[Any], weights: Array, text: str) -> Distribution:
     alike = np.allclose(weights, weights[0])
     shares = "" if alike else f", with {', '.join(f'{100.0 * w:.3g} %' for w in weights)}"
     return Distribution(
-        DISCRETE, f"one of {text}{shares}", partial(_picked, each, edges),
-        singles=tuple(values), weights=tuple(weights.tolist()),
+        DISCRETE, f"one of {text}{shares}", partial(_picked, each, edges), singles=tuple(values),
+        weights=tuple(weights.tolist()),
     )  # fmt: skip
+
+
+def rising(made: Distribution) -> Distribution:
+    """Return the distribution of single numbers whose quantiles rise, as those of any number.
+
+    A file lists them in any order, in which probabilities go through them: what they are correlated
+    with would fall with them, or neither.
+    """
+    order = np.argsort(np.array(made.singles))
+    values = [made.singles[k] for k in order]
+    ordered = among(values, np.array(made.weights)[order], "")
+    return replace(
+        made, quantile=ordered.quantile, singles=ordered.singles, weights=ordered.weights
+    )
 
 
 def _picked(values: NDArray[Any], edges: Array, u: Array) -> NDArray[Any]:

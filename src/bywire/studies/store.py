@@ -23,12 +23,11 @@ from bywire.studies.chunk import Columns
 from bywire.studies.chunk_file import read_chunk, require_pyarrow, write_chunk
 from bywire.studies.identity import differing
 from bywire.studies.plan import CHUNK, StudyPlan
+from bywire.studies.study_folder import RECORD, require_no_file
 
 if TYPE_CHECKING:
     import pandas as pd
 
-RECORD = "study.json"
-"""file that says which study a folder holds"""
 CHUNKS = "chunks"
 """folder of the chunks"""
 _SAID = {"digest": str, "source": str, "cases": int, "set": dict, "systems": list, "study": dict}
@@ -130,6 +129,7 @@ class StudyStore:
         FileError
             When it holds none.
         """
+        require_no_file(self.folder)
         path = self.folder / RECORD
         try:
             said = json.loads(path.read_bytes())

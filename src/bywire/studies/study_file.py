@@ -10,13 +10,16 @@ from typing import Any
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
+from bywire.bench.bench_source import names_experiment
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_of_few
+from bywire.data.file_kinds import STUDY, require_kind
 from bywire.data.toml_file import read_toml
+from bywire.studies.correlation_section import in_order, read_correlations
 from bywire.studies.demand_section import read_demands
 from bywire.studies.design_rules import require_agreement
 from bywire.studies.design_section import read_design
 from bywire.studies.plan import StudyPlan
-from bywire.studies.vary_section import read_all_varied, read_correlations
+from bywire.studies.vary_section import read_all_varied
 
 _KEYS = ("name", "bench", "vary", "measured", "correlation", "design", "set", "requirements")
 
@@ -44,6 +47,7 @@ def read_study(
     file = Path(path)
     content = read_toml(file, "study file")
     try:
+        require_kind(content, STUDY, file)
         return _plan(content, file, overrides)
     except InputError as error:
         raise type(error)(f"{file}: {error}") from None
@@ -66,9 +70,9 @@ def _plan(
     varied, measured = read_all_varied(bench, content, file.parent)
     if not varied:
         raise ParameterError("[vary] is empty: say what varies, such as \"motor.R_m\" = '+-10 %'")
-    said = read_correlations(content.get("correlation", []), varied, measured)
+    said = {**measured, **read_correlations(content.get("correlation", []), varied, measured)}
     plan = StudyPlan(
-        name, bench, varied, demands=demands, correlations={**measured, **said},
+        name, bench, in_order(varied, said), demands=demands, correlations=said,
         **read_design(content.get("design", {})),
     )  # fmt: skip
     require_agreement(plan)
@@ -100,7 +104,7 @@ def read_bench(
             "or an experiment of 'bywire list'"
         )
     changes = bench_file.flattened(content.get("set", {}))
-    there = source if bench_file.names_experiment(source) else folder / source
+    there = source if names_experiment(source) else folder / source
     for key, value in changes.items():
         if not isinstance(value, str):
             raise ParameterError(f"[set] {key} = {quoted(value)}: write the value as a text, "

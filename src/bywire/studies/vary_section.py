@@ -1,4 +1,4 @@
-"""The sections ``[vary]`` and ``[[correlation]]``: what varies of a bench, and what with what."""
+"""The section ``[vary]``: what varies of a bench."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from bywire.bench.varied_choices import OPTION, varied_choices
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import leaf_fields
 from bywire.studies.admissible import require_following
-from bywire.studies.correlation import correlation_factor
 from bywire.studies.distribution_section import ENTRY_KEYS, read_distribution
 from bywire.studies.measured import varied_as_measured
 from bywire.studies.plan import Varied
@@ -188,59 +187,11 @@ def _together(
             raise unknown_name(kind, choice_text(each), leaves)
         if isinstance(values[each], tuple):
             raise ParameterError(f"[vary] {name}.together {each} is a table: single numbers vary")
+        if leaves[each].is_whole:
+            raise ParameterError(
+                f"[vary] {name}.together {each} is a whole number, which keeps no ratio: vary it "
+                "by itself, or leave it as in the bench"
+            )
     if given and not values.get(name):
         raise ParameterError(f"[vary] {name} is zero in the bench: nothing can keep its ratio")
     return tuple(given)
-
-
-def read_correlations(
-    entries: Any, varied: Sequence[Varied], known: Mapping[tuple[str, str], float]
-) -> dict[tuple[str, str], float]:
-    """Return the correlations of ``[[correlation]]`` by pairs of names in alphabetical order.
-
-    Parameters
-    ----------
-    entries
-        What the file holds.
-    varied
-        What varies.
-    known
-        Correlations that are known already.
-
-    Raises
-    ------
-    InputError
-        For entries that do not fit, and correlations that no quantities can have.
-    """
-    if not isinstance(entries, list) or not all(isinstance(each, Mapping) for each in entries):
-        raise ParameterError("write [[correlation]] with two brackets, once for each pair")
-    names = {each.name: each for each in varied}
-    pairs: dict[tuple[str, str], float] = {}
-    for entry in entries:
-        for key in entry:
-            if key not in ("of", "value"):
-                raise unknown_name("key of [[correlation]]", key, ("of", "value"))
-        pair, value = entry.get("of"), entry.get("value")
-        for key in ("of", "value"):
-            if key not in entry:
-                raise ParameterError(
-                    f"[[correlation]] {key} is missing: write for instance of = ['motor.R_m', "
-                    "'motor.K_e'] and value = 0.5"
-                )
-        if not isinstance(pair, list) or len(pair) != 2 or pair[0] == pair[1]:
-            raise ParameterError(f"[[correlation]] of = {quoted(pair)}: two names are wanted")
-        for name in pair:
-            if not isinstance(name, str) or name not in names:
-                raise unknown_name("quantity of [[correlation]]", choice_text(name), names)
-        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not is_number or not -1.0 < value < 1.0:
-            raise ParameterError(
-                f"[[correlation]] of {pair[0]} and {pair[1]}: value = {quoted(value)} must be a "
-                "number between -1 and 1"
-            )
-        first, second = sorted(pair)
-        if (first, second) in {**known, **pairs}:
-            raise ParameterError(f"[[correlation]] of {first} and {second} stands there twice")
-        pairs[first, second] = float(value)
-    correlation_factor(list(names), {**known, **pairs})
-    return pairs

@@ -1,0 +1,87 @@
+"""What is named where a bench is wanted: a file, or an experiment; and which one was meant."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from difflib import SequenceMatcher
+from pathlib import Path
+
+from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
+from bywire.core.catalog import PARAMETER_SETS, main_set
+from bywire.core.errors import ParameterError
+from bywire.data.file_kinds import BENCH, kind_of_file
+
+_NAME = re.compile(r"[a-z][a-z0-9-]*")
+_FOLDER = "benches"  # where bench files usually are
+_NEAR, _NEAR_EXPERIMENT = 0.5, 0.7  # resemblance of what was meant
+
+
+def names_experiment(source: str | Path) -> bool:
+    """Return whether a text is the bare name of an experiment, of a brake or of any."""
+    name = str(source)
+    if not _NAME.fullmatch(name):
+        return False
+    return EXPERIMENTS.get(name) is not None or name in _any_brake()
+
+
+def content_of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, str]:
+    """Return the shortest bench file of an experiment; nothing where there is a file instead.
+
+    Raises
+    ------
+    ParameterError
+        For an experiment of any brake, where ``changes`` do not say for which.
+    """
+    name = str(file)
+    if not _NAME.fullmatch(name) or file.is_file():
+        return {}
+    definition = EXPERIMENTS.get(name)
+    if definition is None and name not in _any_brake():
+        return {}
+    if "parameters" in changes:
+        return {"experiment": name}
+    if definition is None:
+        sets = ", ".join(PARAMETER_SETS.all())
+        raise ParameterError(
+            f"experiment {name!r} is for any brake: say for which, with --set parameters=NAME "
+            f"({sets})"
+        )
+    chosen = main_set(definition.assembly, beside=type(definition.defaults))
+    return {"experiment": name, "parameters": chosen}
+
+
+def meant_by(file: Path) -> str:
+    """Return what to do about a bench file that is not there.
+
+    The nearest is named, of the bench files beside it and of experiments; a file of its very name
+    in a folder of benches goes before.
+    """
+    try:
+        for folder in (file.parent / _FOLDER, file.parent / ".." / _FOLDER):
+            if (folder / file.name).is_file():
+                return f"did you mean {folder / file.name}?"
+        near = max(_near(file), default=None)
+    except (OSError, ValueError):  # ValueError: a null character in the path
+        near = None
+    if near is not None:
+        return f"did you mean {near[1]}?"
+    return "check the path, or name an experiment of 'bywire list'"
+
+
+def _near(file: Path) -> Iterator[tuple[float, str]]:
+    """Yield bench files and experiments that resemble a file, each with how much it does."""
+    for path in file.parent.glob("*.toml"):
+        likeness = SequenceMatcher(None, path.name, file.name).ratio()
+        if likeness >= _NEAR and kind_of_file(path) in ("", BENCH):
+            yield likeness, str(path)
+    if _NAME.fullmatch(file.name):
+        for name in {**EXPERIMENTS.all(), **_any_brake()}:
+            likeness = SequenceMatcher(None, name, file.name).ratio()
+            if likeness >= _NEAR_EXPERIMENT:
+                yield likeness, name
+
+
+def _any_brake() -> Mapping[str, GenericExperiment]:
+    return GENERIC_EXPERIMENTS.all()
