@@ -91,6 +91,9 @@ def test_a_normal_tolerance_ends_where_it_says():
         ({"kind": "norml", "sd": "5 %"}, ["'norml'", "'normal'"]),
         ({"kind": "triangular", "low": "0.5 ohm", "high": "0.7 ohm"}, ["must rise"]),
         ({"kind": "discrete", "values": ["0.3 ohm"], "weights": [1, 2]}, ["1 numbers > 0"]),
+        ({"kind": "discrete", "values": ["0.3 ohm", "1 ohm"], "weights": [1, "3"]},
+         ["weights = [1, '3']", "2 numbers > 0"]),
+        ({"kind": "normal", "sd": "1 %", "low": "1.5 ohm"}, ["nothing of it is left"]),
         ({"kind": "discrete", "values": []}, ["values = [...]"]),
         ({"kind": "tolerance", "tolerance": "5 %", "shape": "cauchy"}, ["'cauchy'", "normal"]),
         ("5 %", ["write a tolerance"]),
@@ -139,3 +142,16 @@ def test_widths_of_a_temperature_are_differences():
         assert "350 degC +- 10 K" in made.text
     with pytest.raises(InputError, match="degC cannot be a temperature difference in K"):
         read("+-10 degC", 623.15, leaf)
+
+
+@pytest.mark.parametrize(
+    "entry", ["+-5 %", {"kind": "normal", "sd": "5 %"},
+              {"kind": "uniform", "low": "-5 %", "high": "60 degC"}],
+)  # fmt: skip
+def test_a_temperature_has_no_shares(entry):
+    """5 % of 20 degC would be 15 K."""
+    leaf = Leaf("motor_heat.T_a", Unit("K"), 200.0, 400.0, False, False)
+    with pytest.raises(InputError, match="share of a temperature"):
+        read_distribution("motor_heat.T_a", entry, leaf, 293.15)
+    law = read_distribution("motor_heat.T_a", "+-10 K", leaf, 293.15)
+    assert (law.low, law.high) == pytest.approx((283.15, 303.15))

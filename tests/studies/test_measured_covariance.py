@@ -70,7 +70,7 @@ def test_some_of_them_and_cut_off(study, written):
         read_study(study('[measured]\nfile = "id"\n'))
     plan = read_study(study('[measured]\nfile = "id/estimate.json"\nof = ["motor.R_m"]\n'
                             "truncate = true\n"))  # fmt: skip
-    assert "truncated: 0 ohm to any" in plan.varied[0].distribution.text
+    assert "truncated from 0 ohm" in plan.varied[0].distribution.text
     assert 0.0 < plan.varied[0].distribution.levels(2)[0] < 0.001
     assert plan.correlations == {}
 

@@ -8,13 +8,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bywire.bench.relative_changes import share_of
+from bywire.bench.relative_changes import require_share, share_of
 from bywire.bench.values import number, plain_text
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.units import difference_unit, parse, shown
 from bywire.studies.admissible import admitted, require_single_values, whole
-from bywire.studies.distribution import Distribution
+from bywire.studies.distribution import NEVER, Distribution
 from bywire.studies.laws import Law, LogNormal, Normal, Triangular, Uniform, truncated_normal
 from bywire.studies.single_values import (
     DISCRETE,
@@ -107,12 +107,16 @@ class _Entry:
             return default
         text = self._given(key)
         share = share_of(text)
-        return self._number(key, text) if share is None else (1.0 + share) * self.nominal
+        if share is None:
+            return self._number(key, text)
+        self._require_share(key, text)
+        return (1.0 + share) * self.nominal
 
     def width(self, key: str, of: float) -> float:
         """Return a width [SI] > 0; a share is of another value."""
         text = self._given(key)
         if isinstance(text, str) and text.strip().endswith("%"):
+            self._require_share(key, text)
             width = abs(of) * parse(text, "1", f"{self.where}.{key}")
         else:
             width = self._number(key, text, difference_unit(self.leaf.unit.symbol))
@@ -126,6 +130,9 @@ class _Entry:
     def amount(self, value: float) -> str:
         """Return a value with its unit."""
         return shown(value, self.leaf.unit.symbol)
+
+    def _require_share(self, key: str, text: str) -> None:
+        require_share(f"{self.where}.{key}", text, self.leaf.unit.symbol)
 
     def _given(self, key: str) -> Any:
         if key not in self.section:
@@ -186,9 +193,17 @@ def _normal(entry: _Entry) -> Distribution:
         return _frozen(entry, Normal(mean, sd), text)
     if not low < high:
         raise entry.refused(f"low = {entry.amount(low)} must be below high = {entry.amount(high)}")
+    whole = Normal(mean, sd)
+    kept = min(whole.cdf(high), whole.sf(low))
+    if kept < NEVER:
+        raise entry.refused(
+            f"what lies within low and high has a probability of {kept:.2g} of {text}: nothing of "
+            "it is left; give other ends, or another mean"
+        )
     law = truncated_normal((low - mean) / sd, (high - mean) / sd, mean, sd)
-    ends = " to ".join("any" if math.isinf(x) else entry.amount(x) for x in (low, high))
-    return _frozen(entry, law, f"{text}, truncated: {ends}", low, high)
+    sides = [f"{word} {entry.amount(x)}" for word, x in (("from", low), ("to", high))
+             if math.isfinite(x)]  # fmt: skip
+    return _frozen(entry, law, f"{text}, truncated {' '.join(sides)}", low, high)
 
 
 def _lognormal(entry: _Entry) -> Distribution:

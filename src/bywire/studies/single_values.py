@@ -152,10 +152,8 @@ def weights_of(where: str, section: Mapping[str, Any], count: int) -> Array:
         For what is no list of so many numbers > 0.
     """
     given = section.get("weights", [1.0] * count)
-    try:
-        weights = np.array(given, dtype=float)
-    except (TypeError, ValueError):
-        weights = np.array([])
+    is_listed = isinstance(given, list) and all(type(each) in (int, float) for each in given)
+    weights = np.array(given if is_listed else [], dtype=float)
     if weights.shape != (count,) or not (weights > 0).all() or not np.isfinite(weights).all():
         raise ParameterError(
             f"{where}.weights = {quoted(given)}: {count} numbers > 0 are wanted, one a value"
