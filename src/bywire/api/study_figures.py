@@ -74,7 +74,7 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
             partial(_influences, findings),
             f"What drives the key figures: {'partial ' * bool(findings.plan.correlations)}rank "
             "correlations with their intervals. Pale: not distinct from none."
-            f"{' A choice has none.' if _has_choices(findings) else ''}"
+            f"{_on_choices(findings)}"
             f"{strongest(map(findings.influences, figures))}", "influences",
         ))  # fmt: skip
     if any(findings.effects(name) for name in figures):
@@ -137,8 +137,10 @@ def _parallel_block(findings: Findings) -> Block:
     return FigureBlock(partial(_parallel, findings, cases), text, "parallel")
 
 
-def _has_choices(findings: Findings) -> bool:
-    return any(not v.unit for v in findings.plan.varied)
+def _on_choices(findings: Findings) -> str:
+    if all(v.unit for v in findings.plan.varied):
+        return ""
+    return " A choice has no order: its correlation ratio stands among their sizes, unsigned."
 
 
 def _limit(findings: Findings, name: str) -> float | None:

@@ -11,6 +11,7 @@ from bywire.api.study_tables import figure_text, shown_figures, strongest
 from bywire.report.document import FigureBlock, TableBlock
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import clean
+from bywire.studies.choice_influence import ChoiceInfluence
 from bywire.studies.findings import Findings
 from bywire.studies.sensitivity import ElementaryEffects, Estimate, VarianceShares
 
@@ -44,7 +45,7 @@ def sensitivity_figures(findings: Findings) -> list[FigureBlock]:
 
 
 def drivers_data(findings: Findings, name: str) -> dict[str, Any]:
-    """Return what drives a key figure for JSON: rank correlations, or indices of those shown.
+    """Return what drives a key figure for JSON: rank correlations and ratios, or indices.
 
     Effects are in the unit of the figure.
     """
@@ -53,7 +54,9 @@ def drivers_data(findings: Findings, name: str) -> dict[str, Any]:
     if findings.plan.sensitivity is None:
         return {
             "influences": {
-                i.quantity: {"correlation": i.correlation, "low": i.low, "high": i.high}
+                i.quantity: {"correlation_ratio": i.correlation_ratio, "distinct": i.is_distinct}
+                if isinstance(i, ChoiceInfluence)
+                else {"correlation": i.correlation, "low": i.low, "high": i.high}
                 for i in findings.influences(name)
             }
         }

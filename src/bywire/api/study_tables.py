@@ -12,6 +12,7 @@ from bywire.report.document import Listing, TableBlock
 from bywire.report.study.drawn_cases import BARS
 from bywire.report.tables import OUTCOMES, Cell, Column, Table, text_table, value_text
 from bywire.report.wording import amount, clean
+from bywire.studies.choice_influence import ChoiceInfluence
 from bywire.studies.effects import Effect
 from bywire.studies.findings import Findings
 from bywire.studies.judgment import Judgment
@@ -183,19 +184,28 @@ def shown_figures(findings: Findings) -> list[str]:
     return [name for name in required if name in known] or known
 
 
-def _more(influences: Sequence[Influence]) -> str:
+def _more(influences: Sequence[object]) -> str:
     """Return how many quantities a table leaves out, and where they are."""
     rest = len(influences) - _SHOWN
     return f", the {_SHOWN} strongest, and {rest} more in report.json" if rest > 0 else ""
 
 
-def _influence_table(influences: Sequence[Influence], is_partial: bool) -> Table:
-    rows = [
-        (
-            i.quantity, f"{i.correlation:+.2f}", f"{i.low:+.2f} to {i.high:+.2f}",
-            "yes" if i.is_distinct else "not distinct from none",
-        )
-        for i in influences[:_SHOWN]
-    ]  # fmt: skip
-    heading = f"{'partial ' * is_partial}rank correlation"
-    return text_table(["quantity", heading, "interval", "drives it"], rows)
+def _influence_table(
+    influences: Sequence[Influence | ChoiceInfluence], is_partial: bool
+) -> Table:
+    """Return rank correlations; where choices are among them, their ratios in a column beside."""
+    heads = [f"{'partial ' * is_partial}rank correlation", "interval"]
+    has_choices = any(isinstance(i, ChoiceInfluence) for i in influences)
+    if has_choices:
+        heads.append("correlation ratio")
+    rows = []
+    for i in influences[:_SHOWN]:
+        name = i.quantity
+        if isinstance(i, ChoiceInfluence):
+            name += " (choice)"
+            cells = ["-", "-", f"{i.correlation_ratio:.2f}"]
+        else:
+            cells = [f"{i.correlation:+.2f}", f"{i.low:+.2f} to {i.high:+.2f}"]
+            cells += ["-"] * has_choices
+        rows.append((name, *cells, "yes" if i.is_distinct else "not distinct from none"))
+    return text_table(["quantity", *heads, "drives it"], rows)
