@@ -138,6 +138,34 @@ def test_entries_of_a_scatter_are_what_is_drawn() -> None:
     assert "misses the limit" not in entries(scatter(undefined, DRIVERS, 300.0, known))
 
 
+def test_cases_without_the_figure_stand_at_the_edge_of_a_scatter() -> None:
+    lacking = ERROR.values > 400.0
+    undefined = CaseAxis(ERROR.name, "Pa", np.where(lacking, np.nan, ERROR.values))
+    cases = drawn_cases(ERROR.values <= 300.0, CASES, known=~lacking)
+    figure = drawn(scatter(undefined, DRIVERS, 300.0, cases))
+    said = ["meets the limit", "misses the limit", "has no figure: misses it", "limit"]
+    assert entries(figure) == said
+    box = figure.legends[0].get_window_extent()
+    assert box.x1 <= figure.bbox.x1
+    for axes, driver in zip(figure.axes, DRIVERS, strict=True):
+        edge = axes.lines[2]
+        np.testing.assert_array_equal(edge.get_xdata(), driver.shown[lacking])
+        top = edge.get_transform().transform([(0.0, edge.get_ydata()[0])])[0, 1]
+        assert axes.bbox.y1 < top < box.y0
+
+
+def test_lines_of_cases_without_a_figure_go_to_none() -> None:
+    lacking = ERROR.values > 400.0
+    undefined = CaseAxis(ERROR.name, "Pa", np.where(lacking, np.nan, ERROR.values))
+    figure = drawn(parallel_coordinates([*DRIVERS, undefined], every(~lacking), {}))
+    axes = figure.axes[0]
+    (none,) = (text for text in axes.texts if text.get_text() == "none")
+    assert none.get_position()[0] == len(DRIVERS)
+    ends = [line[-1, 1] for line in segments(axes.collections[1])]
+    assert len(ends) == np.count_nonzero(lacking)
+    assert 1.0 < min(ends) == max(ends) <= none.get_position()[1] < axes.get_ylim()[1]
+
+
 def test_many_points_are_small_and_translucent() -> None:
     def marker(cases: int) -> tuple[float, float]:
         own = CaseAxis("ripple", "Pa", np.linspace(1.0, 2.0, cases))

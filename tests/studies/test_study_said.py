@@ -77,7 +77,10 @@ def test_captions_say_who_is_drawn_and_who_misses(found):
     assert "crosses" not in none["scatter-rise_time"]
     assert "miss" not in none["parallel"]
     lacking = captions(found("rise_time", np.where(values < 0.06, values, np.nan), "<= 60 ms"))
-    assert lacking["scatter-rise_time"].endswith("500 cases without it are left out.")
+    assert "all that have it meet the limit" in lacking["scatter-rise_time"]
+    at_edge = "Triangles at the upper edge: 500 cases without it, which miss the limit."
+    assert lacking["scatter-rise_time"].endswith(at_edge)
+    assert lacking["parallel"].endswith("does not have a figure, its line goes to 'none'.")
 
 
 def test_no_more_points_are_left_out_than_are_said(found):

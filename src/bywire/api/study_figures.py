@@ -110,15 +110,17 @@ def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
     name, met = judgment.demand.kpi, judgment.met
     known = np.isfinite(findings.figure(name))
     cases = drawn_cases(met, POINTS, known=known)
+    lacking = cases.lacking.size
+    every = "all that have it" if lacking else "all"
     crosses = (
-        "all meet the limit" if not cases.all_missed
-        else "crosses miss the limit" if cases.all_met else "all miss the limit"
+        f"{every} meet the limit" if not cases.all_missed
+        else "crosses miss the limit" if cases.all_met else f"{every} miss the limit"
     )  # fmt: skip
-    lacking = met.size - int(np.count_nonzero(known))
     said = [
         f"{name.replace('_', ' ')} over what drives it most; {crosses}.",
         cases.caption("meet the limit", "miss it"),
-        f"{lacking} cases without it are left out." if lacking else "",
+        f"Triangles at the upper edge: {lacking} cases without it, which miss the limit."
+        if lacking else "",
         "Cases gather where failures are: shares of them are no probabilities."
         if findings.rare else "",
     ]  # fmt: skip
@@ -134,6 +136,8 @@ def _parallel_block(findings: Findings) -> Block:
     missed = "in front, those that miss a requirement"
     said = missed if cases.all_missed else "all meet all requirements"
     text = f"Cases as lines; {said}. {thinned}" if thinned else f"Every case as a line; {said}."
+    if not all(np.isfinite(findings.figure(j.demand.kpi)).all() for j in findings.judgments):
+        text += " Where a case does not have a figure, its line goes to 'none'."
     return FigureBlock(partial(_parallel, findings, cases), text, "parallel")
 
 
