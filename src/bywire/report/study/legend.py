@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 
 from bywire.report import style
 
-
 _COLUMNS = 4  # that have room
 
 
