@@ -9,12 +9,14 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from bywire.core.typing import Array
+from bywire.report import style
 from bywire.report.study.case_axis import CaseAxis, choice_axis
 from bywire.report.study.convergence import convergence
 from bywire.report.study.drawn_cases import LINES, DrawnCases, drawn_cases
@@ -260,6 +262,23 @@ def test_a_tornado_is_not_squeezed_by_a_limit_far_off() -> None:
     near = tornado(effects, units, {"steady_state_error": 600.0})
     assert "limit" in entries(near)
     assert near.axes[0].get_title(loc="right") == ""
+
+
+def test_choices_are_named_at_their_ends_in_a_tornado() -> None:
+    values = ["dry-asphalt", "wet-asphalt", "snow"]
+    surface = Effect("options.surface", "", values, np.array([48.0, 60.0, 203.0]), 60.0)
+    speed = Effect("options.v_0", "m/s", [19.0, 31.0], np.array([26.0, 64.0]), 60.0)
+    units = {"stopping_distance": "m"}
+    figure = drawn(tornado({"stopping_distance": [surface, speed]}, units, {}))
+    assert_readable(figure)
+    assert entries(figure) == ["quantity below the bench's", "above", "choice"]
+    axes = figure.axes[0]
+    assert texts(axes) == ["dry-asphalt", "snow"]
+    for text in axes.texts:
+        box = text.get_window_extent()
+        assert axes.bbox.x0 <= box.x0 < box.x1 <= axes.bbox.x1
+    assert {patch.get_facecolor()[:3] for patch in axes.patches[:2]} == {to_rgb(style.GRAY)}
+    assert entries(tornado({"stopping_distance": [surface]}, units, {})) == ["choice"]
 
 
 def test_curves_of_figures_with_other_units_fill_panels_of_their_own() -> None:

@@ -59,6 +59,21 @@ def test_a_figure_has_one_unit_in_its_row_and_on_its_axis(found, low, high, unit
     assert scale_of(values, "s").unit == unit
 
 
+def test_what_drives_missed_requirements_comes_first(study):
+    varied = "".join(f'"{each}" = "+-5 %"\n' for each in QUANTITIES)
+    limits = 'dead_time = "<= 1 s"\nrise_time = "<= 1 s with 99.9 %"\novershoot = "<= 1 %"\n'
+    plan = read_study(study(f"[vary]\n{varied}[requirements]\n{limits}", bench=BENCH))
+    rng = np.random.default_rng(1)
+    names = plan.bench.definition.kpis_with(plan.bench.chosen_options)
+    columns = {each: rng.uniform(0.5, 0.9, 128) for each in (*names, *QUANTITIES)}
+    columns |= {CASE: np.arange(128), "overshoot": rng.uniform(0.5, 1.5, 128)}
+    findings = Findings(plan, pd.DataFrame(columns), ())
+    outcomes = {each.demand.kpi: each.outcome for each in findings.judgments}
+    assert outcomes == {"dead_time": "met", "rise_time": "undecided", "overshoot": "missed"}
+    titles = [each.title.split(",")[0] for each in influence_tables(findings)]
+    assert titles == [f"what drives {name}" for name in ("overshoot", "rise_time", "dead_time")]
+
+
 def test_a_table_of_drivers_says_how_many_it_leaves_out(found):
     findings = found("rise_time", np.linspace(0.05, 0.07, CASES), "<= 60 ms with 90 %")
     (table,) = influence_tables(findings)

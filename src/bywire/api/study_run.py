@@ -21,6 +21,7 @@ from bywire.api.study_tables import (
     effect_tables,
     influence_tables,
     spread_table,
+    unmoved,
     varied_table,
 )
 from bywire.api.study_tested import tested_brief, tested_data, tested_line, tested_section
@@ -173,7 +174,8 @@ class StudyRun(Answer):
             else influence_tables(findings) + effect_tables(findings)
         )  # fmt: skip
         more = len(drivers) - _BRIEF
-        unindexed = [Listing(said)] if (said := missing_indices(findings)) else []
+        said = [*missing_indices(findings), *unmoved(findings)]
+        unindexed = [Listing(said)] if said else []
         judged: list[Block] = [demands] if plan.demands else []
         figures = [spreads] if findings.spreads else []
         texts = self._shown.texts()
@@ -199,6 +201,7 @@ class StudyRun(Answer):
             brief=spaced([
                 *tested_brief(self.nominal),
                 *([demands] if judged else []), *figures, *drivers[:_BRIEF],
+                *(unindexed if findings.plan.sensitivity is None else []),
                 *([f"and {more} more such tables in the report"] if more > 0 else []),
                 *([Listing(missing, "Cases without a result")] if missing else []),
             ]),

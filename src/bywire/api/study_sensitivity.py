@@ -12,6 +12,7 @@ from bywire.report.document import FigureBlock, TableBlock
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import clean
 from bywire.studies.choice_influence import ChoiceInfluence
+from bywire.studies.effects import Effect
 from bywire.studies.findings import Findings
 from bywire.studies.sensitivity import ElementaryEffects, Estimate, VarianceShares
 
@@ -45,12 +46,13 @@ def sensitivity_figures(findings: Findings) -> list[FigureBlock]:
 
 
 def drivers_data(findings: Findings, name: str) -> dict[str, Any]:
-    """Return what drives a key figure for JSON: rank correlations and ratios, or indices.
+    """Return what drives a key figure for JSON: influences, effects, or indices.
 
-    Effects are in the unit of the figure.
+    Figures and effects are in the unit of the figure, values of quantities in SI.
     """
     if findings.plan.sensitivity is None and not findings.plan.is_sampled:
-        return {}
+        found = findings.effects(name)
+        return {"effects": {e.quantity: _effect_data(e) for e in found}} if found else {}
     if findings.plan.sensitivity is None:
         return {
             "influences": {
@@ -62,10 +64,17 @@ def drivers_data(findings: Findings, name: str) -> dict[str, Any]:
         }
     if name not in shown_figures(findings):
         return {}
-    found = findings.sensitivity(name)
-    drivers = [asdict(each) for each in found.drivers]
+    indices = findings.sensitivity(name)
+    drivers = [asdict(each) for each in indices.drivers]
     data: dict[str, Any] = {"sensitivity": {each.pop("quantity"): each for each in drivers}}
-    return data | ({"sensitivity_missing": found.missing} if found.missing else {})
+    return data | ({"sensitivity_missing": indices.missing} if indices.missing else {})
+
+
+def _effect_data(effect: Effect) -> dict[str, Any]:
+    return {
+        "unit": effect.unit or None, "values": list(effect.values),
+        "figures": effect.figures.tolist(), "swing": effect.swing,
+    }  # fmt: skip
 
 
 def missing_indices(findings: Findings) -> list[str]:

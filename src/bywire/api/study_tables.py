@@ -13,13 +13,14 @@ from bywire.report.study.drawn_cases import BARS
 from bywire.report.tables import OUTCOMES, Cell, Column, Table, text_table, value_text
 from bywire.report.wording import amount, clean
 from bywire.studies.choice_influence import ChoiceInfluence
-from bywire.studies.effects import Effect
+from bywire.studies.effects import ONE, Effect
 from bywire.studies.findings import Findings
 from bywire.studies.judgment import Judgment
 from bywire.studies.plan import StudyPlan
 from bywire.studies.sought_design import WORST
 from bywire.studies.statistics import Influence, Share
 
+_URGENCY = ("missed", "undecided", "met")  # outcomes, in the order in which they matter
 _SHOWN = 5  # quantities that drive a key figure
 
 
@@ -155,12 +156,17 @@ def influence_tables(findings: Findings) -> list[TableBlock]:
 
 def effect_tables(findings: Findings) -> list[TableBlock]:
     """Return what each quantity alone does to key figures of requirements, or to all."""
-    each = {name: findings.effects(name) for name in shown_figures(findings)}
     return [
         TableBlock(_effect_table(findings, name, found),
                    f"What each quantity alone does to {name}.", title=f"what moves {name}")
-        for name, found in each.items() if found
+        for name, found in moving_effects(findings).items()
     ]  # fmt: skip
+
+
+def moving_effects(findings: Findings) -> dict[str, Sequence[Effect]]:
+    """Return the effects on each of the key figures that matter, those that nothing moves apart."""
+    each = {name: findings.effects(name) for name in shown_figures(findings)}
+    return {name: found for name, found in each.items() if any(e.swing for e in found)}
 
 
 def _effect_table(findings: Findings, name: str, effects: Sequence[Effect]) -> Table:
@@ -178,10 +184,29 @@ def _effect_table(findings: Findings, name: str, effects: Sequence[Effect]) -> T
 
 
 def shown_figures(findings: Findings) -> list[str]:
-    """Return the key figures that matter: those that something is required of, or all."""
-    required = [demand.kpi for demand in findings.plan.demands]
+    """Return the key figures that matter: those that something is required of, or all.
+
+    Those of requirements that are missed come first, then those that are undecided.
+    """
     known = [each.name for each in findings.spreads]
+    judgments = findings.judgments if known else ()
+    ordered = sorted(judgments, key=lambda each: _URGENCY.index(each.outcome))
+    judged = [each.demand.kpi for each in ordered]
+    required = [*judged, *(each.kpi for each in findings.plan.demands if each.kpi not in judged)]
     return [name for name in required if name in known] or known
+
+
+def unmoved(findings: Findings) -> list[str]:
+    """Return in a sentence which of the key figures that matter are the same in every case.
+
+    Of designs for indices, which say so themselves, and of rare failures, nothing.
+    """
+    if not (findings.plan.is_sampled or findings.plan.design == ONE):
+        return []
+    shown = shown_figures(findings)
+    same = [each.name for each in findings.spreads
+            if each.name in shown and each.least == each.largest]  # fmt: skip
+    return [f"nothing moves {', '.join(same)}: the same in every case"] if same else []
 
 
 def _more(influences: Sequence[object]) -> str:
