@@ -34,7 +34,8 @@ def findings(study):
     bent = (cases["motor.K_e"] / flat["motor.K_e"] - 1.0) ** 2  # least in the middle
     figure = 20.0 + 40.0 * (cases["motor.R_m"] / flat["motor.R_m"] - 1.0) + 50.0 * bent
     names = plan.bench.definition.kpis_with(plan.bench.chosen_options)
-    cases = cases.assign(**dict.fromkeys(names, math.nan), **{CASE: range(len(cases)), FAILURE: "", WARNINGS: ""})
+    texts = {CASE: range(len(cases)), FAILURE: "", WARNINGS: ""}
+    cases = cases.assign(**dict.fromkeys(names, math.nan), **texts)
     return Findings(plan, cases.assign(peak_current=figure + (cases["adc.law"] == "ideal")), ())
 
 
