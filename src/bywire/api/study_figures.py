@@ -54,11 +54,14 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
         return []
     if findings.rare:
         return [*rare_figures(findings), *scatters(findings), *_overlays(findings, recordings)]
-    band = "; the shaded band holds 90 % of them" if findings.plan.is_sampled else ""
+    band = (
+        "; the shaded band holds 90 % of them." if findings.plan.is_sampled
+        else f"; heights count the cases of {findings.plan.design}, and are no frequencies."
+    )  # fmt: skip
     blocks: list[Block] = [
         FigureBlock(
             partial(_histograms, findings),
-            f"Spread of the key figures over the cases{band}. Dashed, the bench itself; dotted, "
+            f"Spread of the key figures over the cases{band} Dashed, the bench itself; dotted, "
             "the limit.", "histograms", is_long=True,
         )
     ]  # fmt: skip
@@ -160,4 +163,16 @@ def _overlays(findings: Findings, recordings: Recordings) -> list[Block]:
 def _overlaid(each: Mapping[str, xr.Dataset]) -> Figure:
     from bywire.report.overlaid_panels import overlaid_panels
 
-    return overlaid_panels(each)
+    return overlaid_panels(_alike_once(each))
+
+
+def _alike_once(each: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """Return recordings by label, those that are the same under one: a case may be worst twice."""
+    once: dict[str, xr.Dataset] = {}
+    for label, recording in each.items():
+        same = next((known for known, other in once.items() if other.equals(recording)), None)
+        if same is None:
+            once[label] = recording
+        else:  # in its place: colors are given in order
+            once = {f"{k}, {label}" if k == same else k: other for k, other in once.items()}
+    return once
