@@ -188,7 +188,7 @@ def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: boo
         if not is_lasting:
             lasting = sum(each.share * (each.end - each.start) for each in found)
             share = lasting / sum(each.end - each.start for each in found)
-            label += f" again and again, {100 * share:.2g} % of the shaded time"
+            label += f" again and again, {100 * share:.2g} % of the shade"
         axes.broken_barh(
             [(scale * each.start, scale * (each.end - each.start)) for each in found], (0.0, 1.0),
             transform=axes.get_xaxis_transform(), zorder=0.4, linewidth=0,
