@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.colors import to_hex
 
 from bywire.core.errors import ParameterError
+from bywire.report import style
+from bywire.report.overlaid_panels import overlaid_panels
 from bywire.report.overlaid_traces import overlaid_traces
 
 NAMES = {"p_mc": "pressure", "omega": "speed"}
@@ -35,3 +38,50 @@ def test_what_never_moves_is_left_out(recording: xr.Dataset) -> None:
     assert len(overlaid_traces({"a": still, "b": still[["p_mc"]]}, NAMES).axes) == 1
     with pytest.raises(ParameterError, match="none of the variables omega"):
         overlaid_traces({"a": still}, {"omega": "speed"})
+
+
+def test_a_set_point_below_its_line_has_no_entry(recording: xr.Dataset) -> None:
+    def entries(off: float) -> list[str]:
+        runs = {}
+        for label, scale in (("a", 1.0), ("b", 1.2)):  # each with a set point of its own
+            p = scale * recording["p_mc"].values
+            runs[label] = recording.assign(
+                p_mc=recording["p_mc"].copy(data=p),
+                p_ref=recording["p_ref"].copy(data=p + off * np.ptp(p)),
+            )
+        legend = overlaid_panels(runs).axes[0].get_legend()
+        assert legend is not None
+        return [text.get_text() for text in legend.get_texts()]
+
+    name = recording["p_ref"].attrs["long_name"]
+    assert name in entries(0.1)
+    assert name not in entries(0.01)
+
+
+def test_faults_are_marked_once_where_they_are_there_at_the_same_times(
+    recording: xr.Dataset,
+) -> None:
+    time = recording["time"].values
+
+    def bars(*starts: float) -> list[tuple[float, float, str]]:
+        runs = {
+            str(start): recording.assign(faults=(
+                "time", ((time >= start) & (time < start + 0.1)).astype(float), {"units": "1"}
+            ))
+            for start in starts
+        }  # fmt: skip
+        first, *others = overlaid_panels(runs).axes
+        assert {len(axes.collections) for axes in others} == {len(first.collections)}
+        legend = first.get_legend()
+        assert legend is not None
+        assert [text.get_text() for text in legend.get_texts()].count("fault") == 1
+        return [
+            (float(box.x0), float(box.y0), to_hex(bar.get_facecolor()[0]).upper())
+            for bar in first.collections for box in [bar.get_paths()[0].get_extents()]
+        ]  # fmt: skip
+
+    assert bars(0.2, 0.2) == [(pytest.approx(0.2), 0.0, style.PURPLE)]
+    (early, low, blue), (late, high, red) = bars(0.2, 0.5)
+    assert (early, late) == (pytest.approx(0.2), pytest.approx(0.5))
+    assert low < high
+    assert (blue, red) == (style.BLUE, style.VERMILLION)

@@ -9,12 +9,14 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from bywire.core.typing import Array
+from bywire.report import style
 from bywire.report.study.case_axis import CaseAxis, choice_axis
 from bywire.report.study.convergence import convergence
 from bywire.report.study.drawn_cases import LINES, DrawnCases, drawn_cases
@@ -138,6 +140,34 @@ def test_entries_of_a_scatter_are_what_is_drawn() -> None:
     assert "misses the limit" not in entries(scatter(undefined, DRIVERS, 300.0, known))
 
 
+def test_cases_without_the_figure_stand_at_the_edge_of_a_scatter() -> None:
+    lacking = ERROR.values > 400.0
+    undefined = CaseAxis(ERROR.name, "Pa", np.where(lacking, np.nan, ERROR.values))
+    cases = drawn_cases(ERROR.values <= 300.0, CASES, known=~lacking)
+    figure = drawn(scatter(undefined, DRIVERS, 300.0, cases))
+    said = ["meets the limit", "misses the limit", "has no figure: misses it", "limit"]
+    assert entries(figure) == said
+    box = figure.legends[0].get_window_extent()
+    assert box.x1 <= figure.bbox.x1
+    for axes, driver in zip(figure.axes, DRIVERS, strict=True):
+        edge = axes.lines[2]
+        np.testing.assert_array_equal(edge.get_xdata(), driver.shown[lacking])
+        top = edge.get_transform().transform([(0.0, edge.get_ydata()[0])])[0, 1]
+        assert axes.bbox.y1 < top < box.y0
+
+
+def test_lines_of_cases_without_a_figure_go_to_none() -> None:
+    lacking = ERROR.values > 400.0
+    undefined = CaseAxis(ERROR.name, "Pa", np.where(lacking, np.nan, ERROR.values))
+    figure = drawn(parallel_coordinates([*DRIVERS, undefined], every(~lacking), {}))
+    axes = figure.axes[0]
+    (none,) = (text for text in axes.texts if text.get_text() == "none")
+    assert none.get_position()[0] == len(DRIVERS)
+    ends = [line[-1, 1] for line in segments(axes.collections[1])]
+    assert len(ends) == np.count_nonzero(lacking)
+    assert 1.0 < min(ends) == max(ends) <= none.get_position()[1] < axes.get_ylim()[1]
+
+
 def test_many_points_are_small_and_translucent() -> None:
     def marker(cases: int) -> tuple[float, float]:
         own = CaseAxis("ripple", "Pa", np.linspace(1.0, 2.0, cases))
@@ -232,6 +262,23 @@ def test_a_tornado_is_not_squeezed_by_a_limit_far_off() -> None:
     near = tornado(effects, units, {"steady_state_error": 600.0})
     assert "limit" in entries(near)
     assert near.axes[0].get_title(loc="right") == ""
+
+
+def test_choices_are_named_at_their_ends_in_a_tornado() -> None:
+    values = ["dry-asphalt", "wet-asphalt", "snow"]
+    surface = Effect("options.surface", "", values, np.array([48.0, 60.0, 203.0]), 60.0)
+    speed = Effect("options.v_0", "m/s", [19.0, 31.0], np.array([26.0, 64.0]), 60.0)
+    units = {"stopping_distance": "m"}
+    figure = drawn(tornado({"stopping_distance": [surface, speed]}, units, {}))
+    assert_readable(figure)
+    assert entries(figure) == ["quantity below the bench's", "above", "choice"]
+    axes = figure.axes[0]
+    assert texts(axes) == ["dry-asphalt", "snow"]
+    for text in axes.texts:
+        box = text.get_window_extent()
+        assert axes.bbox.x0 <= box.x0 < box.x1 <= axes.bbox.x1
+    assert {patch.get_facecolor()[:3] for patch in axes.patches[:2]} == {to_rgb(style.GRAY)}
+    assert entries(tornado({"stopping_distance": [surface]}, units, {})) == ["choice"]
 
 
 def test_curves_of_figures_with_other_units_fill_panels_of_their_own() -> None:

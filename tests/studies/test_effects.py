@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from bywire.api.study_data import findings_data
+from bywire.api.study_figures import study_figures
+from bywire.api.study_tables import effect_tables, unmoved
+from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.findings import Findings
 from bywire.studies.study_file import read_study
 
@@ -27,6 +33,9 @@ def findings(study):
     flat = plan.bench.par.flat()
     bent = (cases["motor.K_e"] / flat["motor.K_e"] - 1.0) ** 2  # least in the middle
     figure = 20.0 + 40.0 * (cases["motor.R_m"] / flat["motor.R_m"] - 1.0) + 50.0 * bent
+    names = plan.bench.definition.kpis_with(plan.bench.chosen_options)
+    texts = {CASE: range(len(cases)), FAILURE: "", WARNINGS: ""}
+    cases = cases.assign(**dict.fromkeys(names, math.nan), **texts)
     return Findings(plan, cases.assign(peak_current=figure + (cases["adc.law"] == "ideal")), ())
 
 
@@ -46,3 +55,23 @@ def test_swings_are_those_of_the_figure(findings):
 def test_what_is_not_computed_yet_has_none(findings):
     some = Findings(findings.plan, findings.cases[:5], ())
     assert [e.quantity for e in some.effects("peak_current")] == ["motor.R_m"]
+
+
+def test_effects_are_in_the_json(findings):
+    said = findings_data(findings)["kpis"]["peak_current"]["effects"]
+    assert list(said) == ["motor.R_m", "adc.law", "motor.K_e"]
+    assert said["adc.law"] == {
+        "unit": None, "values": ["ideal", "quantized"], "figures": [21.0, 20.0],
+        "swing": pytest.approx(1.0),
+    }  # fmt: skip
+    assert said["motor.R_m"]["swing"] == pytest.approx(4.0)
+    assert len(said["motor.R_m"]["values"]) == len(said["motor.R_m"]["figures"]) == 3
+
+
+def test_a_figure_that_nothing_moves_has_a_sentence_in_place_of_a_table(findings):
+    assert unmoved(findings) == []
+    assert len(effect_tables(findings)) == 1
+    still = Findings(findings.plan, findings.cases.assign(peak_current=20.0), ())
+    assert unmoved(still) == ["nothing moves peak_current: the same in every case"]
+    assert effect_tables(still) == []
+    assert "tornado" not in [getattr(each, "name", "") for each in study_figures(still, dict)]

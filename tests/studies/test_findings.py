@@ -9,11 +9,13 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from bywire.api.study_sensitivity import drivers_data
+from bywire.api.study_tables import influence_tables
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.studies.choice_influence import choice_influence
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.findings import Findings
-from bywire.studies.statistics import correlation_ratio
 from bywire.studies.study_file import read_study
 
 
@@ -105,11 +107,34 @@ def test_choices_are_ranked_among_what_drives_a_figure(found, study, share):
     plan = read_study(study(CHOICE))
     cases = findings.cases.assign(**{"adc.law": np.array(["ideal", "quantized"])[law]})
     mixed = Findings(plan, cases, findings.nominal)
-    ratio = correlation_ratio(cases["adc.law"], mixed.figure("peak_current"))
+    (choice,) = (i for i in mixed.influences("peak_current") if i.quantity == "adc.law")
+    ratio = choice.correlation_ratio
     told = abs(stats.spearmanr(law, mixed.figure("peak_current")).statistic)
     assert ratio == pytest.approx(told, abs=0.05 if share == 0.0 else 0.01)
     wanted = ["adc.law", "motor.R_m"] if share > 1.0 else ["motor.R_m", "adc.law"]
     assert mixed.drivers("peak_current") == wanted[: 2 - (ratio == 0.0)]
+    assert choice.is_distinct == (share > 0.0)
+    (block,) = influence_tables(mixed)
+    assert [each.heading for each in block.table.columns][3] == "correlation ratio"
+    rows = [[cell.text for cell in row] for row in block.table.rows]
+    assert [row[0] for row in rows] == [f"{w} (choice)" if w == "adc.law" else w for w in wanted]
+    (row,) = (each for each in rows if each[0] == "adc.law (choice)")
+    assert row[1:4] == ["-", "-", f"{ratio:.2f}"]
+    said = drivers_data(mixed, "peak_current")["influences"]
+    assert list(said) == wanted
+    assert said["adc.law"] == {"correlation_ratio": ratio, "distinct": choice.is_distinct}
+
+
+def test_a_choice_without_influence_seldom_differs_from_none():
+    rng = np.random.default_rng(5)
+    laws = rng.integers(0, 3, (1000, 40))
+    figures = rng.lognormal(size=laws.shape)
+    found = [choice_influence("law", law, y, 0.9)
+             for law, y in zip(laws.astype(str), figures, strict=True)]  # fmt: skip
+    false = sum(each.is_distinct for each in found)
+    assert 70 < false < 130  # of 1000 a tenth, within three standard deviations
+    same = stats.kruskal(*(figures[0][laws[0] == k] for k in range(3))).pvalue
+    assert found[0].is_distinct == (same < 0.1)
 
 
 def test_what_a_study_does_not_have_is_named(found):

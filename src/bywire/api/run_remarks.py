@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from bywire.api.run_changes import parameter_changes
+from bywire.bench.bench import Bench
 from bywire.bench.kpis.registry import FAMILIES
 from bywire.bench.result import Result
 from bywire.core.model import ASSEMBLIES
@@ -21,15 +22,16 @@ def remarks(result: Result) -> list[str]:
     A run is remarkable that is stuck more than half of its time, at a limit more than a tenth of
     it, or that ends off its set point by more than a twentieth of the step; what its model says is.
     """
-    return [*_changes(result), *unexpected(result)]
+    return [*change_texts(result.bench), *unexpected(result)]
 
 
 def unexpected(result: Result) -> list[str]:
     """Return the same without what was changed."""
-    return [*_faults(result), *_shares(result), *_set_point(result), *_of_models(result)]
+    return [*fault_texts(result), *_shares(result), *_set_point(result), *_of_models(result)]
 
 
-def _faults(result: Result) -> list[str]:
+def fault_texts(result: Result) -> list[str]:
+    """Return each fault of a bench in a sentence: how much, when, what it is."""
     texts = []
     for fault in result.bench.injections:
         mode, course = fault.mode, fault.course
@@ -63,14 +65,13 @@ def _of_models(result: Result) -> list[str]:
     return list(texts)
 
 
-def _changes(result: Result) -> list[str]:
-    texts = [
-        f"{each.name} = {each.now} (was {each.before})" for each in parameter_changes(result.bench)
-    ]
+def change_texts(bench: Bench) -> list[str]:
+    """Return which parameters are not those of the cited set, in one sentence if there are any."""
+    texts = [f"{each.name} = {each.now} (was {each.before})" for each in parameter_changes(bench)]
     if not texts:
         return []
     more = f" and {len(texts) - _SHOWN} more" if len(texts) > _SHOWN else ""
-    return [f"changed from {result.bench.parameters}: {', '.join(texts[:_SHOWN])}{more}"]
+    return [f"changed from {bench.parameters}: {', '.join(texts[:_SHOWN])}{more}"]
 
 
 def _shares(result: Result) -> list[str]:

@@ -30,21 +30,27 @@ def outcome(result: Result, rows: Sequence[KpiRow], notes: Sequence[Block]) -> S
 
     ``rows``: key figures beside their requirements; ``notes``: warnings and remarks.
     """
-    bench = result.bench
     blocks: list[Block] = []
     if judged := [row for row in rows if row.limit]:
         blocks.append(TableBlock(kpi_table(judged), "What was required."))
+    return Section("Outcome", [*blocks, what_was_changed(result.bench), *notes])
+
+
+def what_was_changed(bench: Bench) -> TableBlock | Paragraph:
+    """Return what a bench changes of its parameter set and its experiment, or that it does not."""
     changes = parameter_changes(bench) + option_changes(bench)
     if changes:
-        blocks.append(TableBlock(change_table(changes), "What was changed."))
-    else:
-        blocks.append(
-            Paragraph(
-                f"Nothing was changed: all parameters are those of {bench.parameters}, all "
-                f"options those of {bench.experiment}."
-            )
-        )
-    return Section("Outcome", [*blocks, *notes])
+        return TableBlock(change_table(changes), "What was changed.")
+    return Paragraph(
+        f"Nothing was changed: all parameters are those of {bench.parameters}, all options those "
+        f"of {bench.experiment}."
+    )
+
+
+def options_in_use(bench: Bench) -> Details:
+    """Return all options of a bench's experiment, folded."""
+    table = parameter_table(parameter_rows(bench.chosen_options))
+    return Details("Options of the experiment", [TableBlock(table)])
 
 
 def source_says(result: Result) -> list[Block]:
@@ -92,7 +98,6 @@ def how_it_was_made(
     bench, cited = result.bench, PARAMETER_SETS.find(result.bench.parameters)
     attrs = next(iter(result.recordings.values())).attrs if result.recordings else {}
     kept = "; ".join(f"{key} {attrs[key]}" for key in RECORDED if key in attrs)
-    options = parameter_table(parameter_rows(bench.chosen_options))
     parameters = parameter_table(parameter_rows(bench.par, cited.values))
     return Section(
         "How it was made",
@@ -100,7 +105,7 @@ def how_it_was_made(
             Paragraph(f"Source of the parameters: {cited.source}."),
             Paragraph(f"{kept}."),
             *_signal_errors(errors),
-            Details("Options of the experiment", [TableBlock(options)]),
+            options_in_use(bench),
             Details("All parameters", [TableBlock(parameters)]),
         ],
     )

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from bywire.api.study_case_figures import bound_of, parallel, scatters
 from bywire.api.study_rare import rare_figures
 from bywire.api.study_sensitivity import sensitivity_figures
-from bywire.api.study_tables import shown_figures, strongest
-from bywire.bench.requirements import limit_of
+from bywire.api.study_tables import moving_effects, shown_figures, strongest
 from bywire.report.document import Block, FigureBlock
-from bywire.report.study.drawn_cases import LINES, POINTS, DrawnCases, drawn_cases
 from bywire.studies.findings import Findings
-from bywire.studies.judgment import Judgment
 from bywire.studies.plan import CHUNK
 from bywire.studies.statistics import running_share
 
@@ -23,10 +19,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from bywire.report.study.case_axis import CaseAxis
+    from bywire.studies.effects import Effect
 
-_DRIVERS = 3  # quantities that a key figure is drawn over
-_AXES = 9  # of parallel coordinates
 _PANELS = 4  # requirements whose convergence is drawn
 _SHARES = 100  # points of a convergence, spaced by equal ratios
 
@@ -59,12 +53,15 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
     if not findings.spreads:
         return []
     if findings.rare:
-        return [*rare_figures(findings), *_scatters(findings), *_overlays(findings, recordings)]
-    band = "; the shaded band holds 90 % of them" if findings.plan.is_sampled else ""
+        return [*rare_figures(findings), *scatters(findings), *_overlays(findings, recordings)]
+    band = (
+        "; the shaded band holds 90 % of them." if findings.plan.is_sampled
+        else f"; heights count the cases of {findings.plan.design}, and are no frequencies."
+    )  # fmt: skip
     blocks: list[Block] = [
         FigureBlock(
             partial(_histograms, findings),
-            f"Spread of the key figures over the cases{band}. Dashed, the bench itself; dotted, "
+            f"Spread of the key figures over the cases{band} Dashed, the bench itself; dotted, "
             "the limit.", "histograms", is_long=True,
         )
     ]  # fmt: skip
@@ -74,20 +71,20 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
             partial(_influences, findings),
             f"What drives the key figures: {'partial ' * bool(findings.plan.correlations)}rank "
             "correlations with their intervals. Pale: not distinct from none."
-            f"{' A choice has none.' if _has_choices(findings) else ''}"
+            f"{_on_choices(findings)}"
             f"{strongest(map(findings.influences, figures))}", "influences",
         ))  # fmt: skip
-    if any(findings.effects(name) for name in figures):
+    if effects := moving_effects(findings):
         blocks.append(FigureBlock(
-            partial(_tornado, findings),
+            partial(_tornado, findings, effects),
             "How far each quantity alone moves the key figures from what the bench itself gives; "
-            "marks are its levels, dotted the limit."
-            f"{strongest(map(findings.effects, figures))}", "tornado",
+            f"marks are its levels, dotted the limit.{_on_gray(findings)}"
+            f"{strongest(effects.values())}", "tornado",
         ))  # fmt: skip
     if findings.plan.sensitivity is not None:
         blocks += sensitivity_figures(findings)
     # Trajectories stand on a few levels: their points would be stripes.
-    blocks += _scatters(findings) if findings.plan.design != "morris" else []
+    blocks += scatters(findings) if findings.plan.design != "morris" else []
     if findings.judgments and findings.plan.is_sampled:
         blocks.append(FigureBlock(
             partial(_convergence, findings),
@@ -95,55 +92,22 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
             "convergence",
         ))  # fmt: skip
     if findings.judgments:
-        blocks += [_parallel_block(findings), *_overlays(findings, recordings)]
+        blocks += [parallel(findings), *_overlays(findings, recordings)]
     return blocks
 
 
-def _scatters(findings: Findings) -> list[Block]:
-    return [
-        _scatter_block(findings, judgment)
-        for judgment in findings.judgments if findings.drivers(judgment.demand.kpi)
-    ]  # fmt: skip
-
-
-def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
-    name, met = judgment.demand.kpi, judgment.met
-    known = np.isfinite(findings.figure(name))
-    cases = drawn_cases(met, POINTS, known=known)
-    crosses = (
-        "all meet the limit" if not cases.all_missed
-        else "crosses miss the limit" if cases.all_met else "all miss the limit"
-    )  # fmt: skip
-    lacking = met.size - int(np.count_nonzero(known))
-    said = [
-        f"{name.replace('_', ' ')} over what drives it most; {crosses}.",
-        cases.caption("meet the limit", "miss it"),
-        f"{lacking} cases without it are left out." if lacking else "",
-        "Cases gather where failures are: shares of them are no probabilities."
-        if findings.rare else "",
-    ]  # fmt: skip
-    return FigureBlock(
-        partial(_scatter, findings, name, cases), " ".join(filter(None, said)), f"scatter-{name}"
-    )
-
-
-def _parallel_block(findings: Findings) -> Block:
-    met = np.all([j.met for j in findings.judgments], axis=0)
-    cases = drawn_cases(met, LINES, LINES)
-    thinned = cases.caption("meet all requirements", "miss one")
-    missed = "in front, those that miss a requirement"
-    said = missed if cases.all_missed else "all meet all requirements"
-    text = f"Cases as lines; {said}. {thinned}" if thinned else f"Every case as a line; {said}."
-    return FigureBlock(partial(_parallel, findings, cases), text, "parallel")
+def _on_gray(findings: Findings) -> str:
+    return " Gray: a choice, by name where it goes farthest." if _has_choices(findings) else ""
 
 
 def _has_choices(findings: Findings) -> bool:
     return any(not v.unit for v in findings.plan.varied)
 
 
-def _limit(findings: Findings, name: str) -> float | None:
-    limits = {demand.kpi: demand.limit for demand in findings.plan.demands}
-    return limit_of(name, limits[name], findings.units[name])[1] if name in limits else None
+def _on_choices(findings: Findings) -> str:
+    if not _has_choices(findings):
+        return ""
+    return " A choice has no order: its correlation ratio stands among their sizes, unsigned."
 
 
 def _histograms(findings: Findings) -> Figure:
@@ -151,7 +115,7 @@ def _histograms(findings: Findings) -> Figure:
 
     return histograms({
         each.name: Spread(
-            findings.figure(each.name), each.unit, each.nominal, _limit(findings, each.name)
+            findings.figure(each.name), each.unit, each.nominal, bound_of(findings, each.name)
         )
         for each in findings.spreads if each.largest > each.least
     } or {
@@ -167,34 +131,11 @@ def _influences(findings: Findings) -> Figure:
     return influence_bars({name: found for name, found in each.items() if found})
 
 
-def _tornado(findings: Findings) -> Figure:
+def _tornado(findings: Findings, effects: Mapping[str, Sequence[Effect]]) -> Figure:
     from bywire.report.study.tornado import tornado
 
-    each = {name: findings.effects(name) for name in shown_figures(findings)}
-    limits = {name: limit for name in each if (limit := _limit(findings, name)) is not None}
-    return tornado({name: found for name, found in each.items() if found}, findings.units, limits)
-
-
-def _axis(findings: Findings, name: str) -> CaseAxis:
-    """Return the axis of a quantity that varies, or of a key figure."""
-    from bywire.report.study.case_axis import CaseAxis, choice_axis
-
-    varied = {v.name: v for v in findings.plan.varied}.get(name)
-    if varied is None:
-        return CaseAxis(name, findings.units[name], findings.figure(name))
-    if varied.unit:
-        return CaseAxis(name, varied.unit, np.asarray(findings.cases[name], dtype=float))
-    choices = [str(choice) for choice in varied.distribution.levels(1)]
-    return choice_axis(name, [str(each) for each in findings.cases[name]], choices)
-
-
-def _scatter(findings: Findings, name: str, cases: DrawnCases) -> Figure:
-    from bywire.report.study.scatter import scatter
-
-    drivers = [_axis(findings, each) for each in findings.drivers(name)[:_DRIVERS]]
-    limit = _limit(findings, name)
-    assert limit is not None
-    return scatter(_axis(findings, name), drivers, limit, cases)
+    limits = {name: limit for name in effects if (limit := bound_of(findings, name)) is not None}
+    return tornado(effects, findings.units, limits)
 
 
 def _convergence(findings: Findings) -> Figure:
@@ -205,18 +146,6 @@ def _convergence(findings: Findings) -> Figure:
         {j.demand.text: running_share(j.met, findings.plan.confidence, _SHARES) for j in shown},
         {j.demand.text: j.demand.probability for j in shown}, first=CHUNK,
     )  # fmt: skip
-
-
-def _parallel(findings: Findings, cases: DrawnCases) -> Figure:
-    from bywire.report.study.parallel_coordinates import parallel_coordinates
-
-    figures = [each.demand.kpi for each in findings.judgments]
-    ranked = [each for name in figures for each in findings.drivers(name)[:_DRIVERS]]
-    varied = [v.name for v in findings.plan.varied]
-    names = list(dict.fromkeys([*ranked, *varied]))[: max(_AXES - len(figures), 2)]
-    axes = [_axis(findings, name) for name in (*names, *figures)]
-    limits = {name: limit for name in figures if (limit := _limit(findings, name)) is not None}
-    return parallel_coordinates(axes, cases, limits)
 
 
 def _overlays(findings: Findings, recordings: Recordings) -> list[Block]:
@@ -234,4 +163,16 @@ def _overlays(findings: Findings, recordings: Recordings) -> list[Block]:
 def _overlaid(each: Mapping[str, xr.Dataset]) -> Figure:
     from bywire.report.overlaid_panels import overlaid_panels
 
-    return overlaid_panels(each)
+    return overlaid_panels(_alike_once(each))
+
+
+def _alike_once(each: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """Return recordings by label, those that are the same under one: a case may be worst twice."""
+    once: dict[str, xr.Dataset] = {}
+    for label, recording in each.items():
+        same = next((known for known, other in once.items() if other.equals(recording)), None)
+        if same is None:
+            once[label] = recording
+        else:  # in its place: colors are given in order
+            once = {f"{k}, {label}" if k == same else k: other for k, other in once.items()}
+    return once

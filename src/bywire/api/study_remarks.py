@@ -102,8 +102,9 @@ def _on_choices(plan: StudyPlan) -> list[str]:
     if not choices or not plan.is_sampled:
         return []
     return [
-        f"{', '.join(choices)}: a choice has no rank correlation: scatters rank it by its "
-        "correlation ratio; 'sobol-indices' tells what it does"
+        f"{', '.join(choices)}: a choice has no rank correlation: its correlation ratio ranks it "
+        "among the quantities, without a sign or an interval; 'sobol-indices' tells its share of "
+        "the variance"
     ]
 
 

@@ -21,8 +21,10 @@ from bywire.api.study_tables import (
     effect_tables,
     influence_tables,
     spread_table,
+    unmoved,
     varied_table,
 )
+from bywire.api.study_tested import tested_brief, tested_data, tested_line, tested_section
 from bywire.bench.bench import Bench
 from bywire.bench.result import Result
 from bywire.core.errors import ParameterError, unknown_name
@@ -40,6 +42,7 @@ from bywire.report.subject import Subject
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan
 from bywire.studies.store import StudyStore
+from bywire.studies.study_file import BenchSource
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,6 +70,8 @@ class StudyRun(Answer):
         ``failed``, too, where no case has a key figure, and ``unfinished`` where cases are missing.
     damaged
         Chunks whose files could not be read, and that were computed again.
+    source
+        Where its bench comes from; None where that is not known.
     """
 
     plan: StudyPlan
@@ -75,6 +80,7 @@ class StudyRun(Answer):
     nominal: Result
     status: str
     damaged: int = 0
+    source: BenchSource | None = None
 
     @cached_property
     def _shown(self) -> ShownCases:
@@ -156,8 +162,7 @@ class StudyRun(Answer):
         plan, findings = self.plan, self.findings
         if not len(self.cases):
             return self._empty()
-        summary = plan.bench.summary([each.name for each in plan.varied])
-        subject = Subject(plan.name, summary, plan.bench.parameters, plan.bench.par)
+        subject = Subject(plan.name, tested_line(plan), plan.bench.parameters, plan.bench.par)
         is_rare = bool(findings.rare)
         table = failure_table(findings) if is_rare else demand_table(findings)
         demands = TableBlock(table, width=120)
@@ -169,7 +174,8 @@ class StudyRun(Answer):
             else influence_tables(findings) + effect_tables(findings)
         )  # fmt: skip
         more = len(drivers) - _BRIEF
-        unindexed = [Listing(said)] if (said := missing_indices(findings)) else []
+        said = [*missing_indices(findings), *unmoved(findings)]
+        unindexed = [Listing(said)] if said else []
         judged: list[Block] = [demands] if plan.demands else []
         figures = [spreads] if findings.spreads else []
         texts = self._shown.texts()
@@ -180,6 +186,7 @@ class StudyRun(Answer):
             f"{len(self.cases)} cases ({plan.design}, seed {plan.seed}) of {subject.line}",
             sections=lambda: [
                 *([Section("Requirements", judged)] if judged else []),
+                tested_section(self.nominal, self.source),
                 *([Section("What else to know", [Listing(remarks)])] if remarks else []),
                 *([Section("Key figures", figures)] if figures else []),
                 *([Section("What drives them", [*drivers, *unindexed])] if drivers or unindexed
@@ -192,7 +199,9 @@ class StudyRun(Answer):
                 subject.provenance(f"Chunks of the study: {self.folder}."),
             ],
             brief=spaced([
+                *tested_brief(self.nominal),
                 *([demands] if judged else []), *figures, *drivers[:_BRIEF],
+                *(unindexed if findings.plan.sensitivity is None else []),
                 *([f"and {more} more such tables in the report"] if more > 0 else []),
                 *([Listing(missing, "Cases without a result")] if missing else []),
             ]),
@@ -228,5 +237,6 @@ class StudyRun(Answer):
     def _data(self) -> dict[str, Any]:
         return {
             "study": self.plan.name, "status": self.status, "folder": str(self.folder),
+            "bench": tested_data(self.plan.bench, self.source),
             **findings_data(self.findings), "warnings": self.warnings, "notes": self.notes,
         }  # fmt: skip

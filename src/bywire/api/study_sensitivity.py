@@ -11,6 +11,8 @@ from bywire.api.study_tables import figure_text, shown_figures, strongest
 from bywire.report.document import FigureBlock, TableBlock
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import clean
+from bywire.studies.choice_influence import ChoiceInfluence
+from bywire.studies.effects import Effect
 from bywire.studies.findings import Findings
 from bywire.studies.sensitivity import ElementaryEffects, Estimate, VarianceShares
 
@@ -44,25 +46,35 @@ def sensitivity_figures(findings: Findings) -> list[FigureBlock]:
 
 
 def drivers_data(findings: Findings, name: str) -> dict[str, Any]:
-    """Return what drives a key figure for JSON: rank correlations, or indices of those shown.
+    """Return what drives a key figure for JSON: influences, effects, or indices.
 
-    Effects are in the unit of the figure.
+    Figures and effects are in the unit of the figure, values of quantities in SI.
     """
     if findings.plan.sensitivity is None and not findings.plan.is_sampled:
-        return {}
+        found = findings.effects(name)
+        return {"effects": {e.quantity: _effect_data(e) for e in found}} if found else {}
     if findings.plan.sensitivity is None:
         return {
             "influences": {
-                i.quantity: {"correlation": i.correlation, "low": i.low, "high": i.high}
+                i.quantity: {"correlation_ratio": i.correlation_ratio, "distinct": i.is_distinct}
+                if isinstance(i, ChoiceInfluence)
+                else {"correlation": i.correlation, "low": i.low, "high": i.high}
                 for i in findings.influences(name)
             }
         }
     if name not in shown_figures(findings):
         return {}
-    found = findings.sensitivity(name)
-    drivers = [asdict(each) for each in found.drivers]
+    indices = findings.sensitivity(name)
+    drivers = [asdict(each) for each in indices.drivers]
     data: dict[str, Any] = {"sensitivity": {each.pop("quantity"): each for each in drivers}}
-    return data | ({"sensitivity_missing": found.missing} if found.missing else {})
+    return data | ({"sensitivity_missing": indices.missing} if indices.missing else {})
+
+
+def _effect_data(effect: Effect) -> dict[str, Any]:
+    return {
+        "unit": effect.unit or None, "values": list(effect.values),
+        "figures": effect.figures.tolist(), "swing": effect.swing,
+    }  # fmt: skip
 
 
 def missing_indices(findings: Findings) -> list[str]:

@@ -10,11 +10,10 @@ from typing import Any
 
 from bywire.api.run_study import kept_study
 from bywire.api.study_run import StudyRun
-from bywire.api.study_tables import shown_figures, varied_table
+from bywire.api.study_tables import figure_text, shown_figures, varied_table
 from bywire.bench.relative_changes import share_of
 from bywire.bench.values import number
 from bywire.core.errors import ParameterError, unknown_name
-from bywire.core.units import difference_unit
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import Document, Section, TableBlock, spaced
 from bywire.report.tables import Cell, Column, Table
@@ -94,10 +93,11 @@ class StudySurrogates(Answer):
         at = ["at these values"] if self.at else []
         rows = []
         for s in self.surrogates.values():
-            told = [amount(float(s(self.at)), s.unit)] if self.at else []
+            told = [figure_text(self.study.findings, s.kpi, float(s(self.at)))] if self.at else []
             texts = [
                 *told, f"{100.0 * s.explained:.2f} %",
-                *(amount(error, difference_unit(s.unit)) for error in (s.rms, s.largest)),
+                *(figure_text(self.study.findings, s.kpi, error, is_difference=True)
+                  for error in (s.rms, s.largest)),
                 str(s.degree), str(s.terms), str(s.cases),
             ]  # fmt: skip
             rows.append((Cell(clean(s.kpi)), *map(Cell, texts)))

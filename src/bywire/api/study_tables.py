@@ -12,13 +12,15 @@ from bywire.report.document import Listing, TableBlock
 from bywire.report.study.drawn_cases import BARS
 from bywire.report.tables import OUTCOMES, Cell, Column, Table, text_table, value_text
 from bywire.report.wording import amount, clean
-from bywire.studies.effects import Effect
+from bywire.studies.choice_influence import ChoiceInfluence
+from bywire.studies.effects import ONE, Effect
 from bywire.studies.findings import Findings
 from bywire.studies.judgment import Judgment
 from bywire.studies.plan import StudyPlan
 from bywire.studies.sought_design import WORST
 from bywire.studies.statistics import Influence, Share
 
+_URGENCY = ("missed", "undecided", "met")  # outcomes, in the order in which they matter
 _SHOWN = 5  # quantities that drive a key figure
 
 
@@ -154,12 +156,17 @@ def influence_tables(findings: Findings) -> list[TableBlock]:
 
 def effect_tables(findings: Findings) -> list[TableBlock]:
     """Return what each quantity alone does to key figures of requirements, or to all."""
-    each = {name: findings.effects(name) for name in shown_figures(findings)}
     return [
         TableBlock(_effect_table(findings, name, found),
                    f"What each quantity alone does to {name}.", title=f"what moves {name}")
-        for name, found in each.items() if found
+        for name, found in moving_effects(findings).items()
     ]  # fmt: skip
+
+
+def moving_effects(findings: Findings) -> dict[str, Sequence[Effect]]:
+    """Return the effects on each of the key figures that matter, those that nothing moves apart."""
+    each = {name: findings.effects(name) for name in shown_figures(findings)}
+    return {name: found for name, found in each.items() if any(e.swing for e in found)}
 
 
 def _effect_table(findings: Findings, name: str, effects: Sequence[Effect]) -> Table:
@@ -177,25 +184,53 @@ def _effect_table(findings: Findings, name: str, effects: Sequence[Effect]) -> T
 
 
 def shown_figures(findings: Findings) -> list[str]:
-    """Return the key figures that matter: those that something is required of, or all."""
-    required = [demand.kpi for demand in findings.plan.demands]
+    """Return the key figures that matter: those that something is required of, or all.
+
+    Those of requirements that are missed come first, then those that are undecided.
+    """
     known = [each.name for each in findings.spreads]
+    judgments = findings.judgments if known else ()
+    ordered = sorted(judgments, key=lambda each: _URGENCY.index(each.outcome))
+    judged = [each.demand.kpi for each in ordered]
+    required = [*judged, *(each.kpi for each in findings.plan.demands if each.kpi not in judged)]
     return [name for name in required if name in known] or known
 
 
-def _more(influences: Sequence[Influence]) -> str:
+def unmoved(findings: Findings) -> list[str]:
+    """Return in a sentence which of the key figures that matter are the same in every case.
+
+    Of designs for indices, which say so themselves, and of rare failures, nothing.
+    """
+    if not (findings.plan.is_sampled or findings.plan.design == ONE):
+        return []
+    shown = shown_figures(findings)
+    same = [each.name for each in findings.spreads
+            if each.name in shown and each.least == each.largest]  # fmt: skip
+    return [f"nothing moves {', '.join(same)}: the same in every case"] if same else []
+
+
+def _more(influences: Sequence[object]) -> str:
     """Return how many quantities a table leaves out, and where they are."""
     rest = len(influences) - _SHOWN
     return f", the {_SHOWN} strongest, and {rest} more in report.json" if rest > 0 else ""
 
 
-def _influence_table(influences: Sequence[Influence], is_partial: bool) -> Table:
-    rows = [
-        (
-            i.quantity, f"{i.correlation:+.2f}", f"{i.low:+.2f} to {i.high:+.2f}",
-            "yes" if i.is_distinct else "not distinct from none",
-        )
-        for i in influences[:_SHOWN]
-    ]  # fmt: skip
-    heading = f"{'partial ' * is_partial}rank correlation"
-    return text_table(["quantity", heading, "interval", "drives it"], rows)
+def _influence_table(
+    influences: Sequence[Influence | ChoiceInfluence], is_partial: bool
+) -> Table:
+    """Return rank correlations; where choices are among them, their ratios in a column beside."""
+    heads = [f"{'partial ' * is_partial}rank correlation", "interval"]
+    has_choices = any(isinstance(i, ChoiceInfluence) for i in influences)
+    if has_choices:
+        heads.append("correlation ratio")
+    rows = []
+    for i in influences[:_SHOWN]:
+        name = i.quantity
+        if isinstance(i, ChoiceInfluence):
+            name += " (choice)"
+            cells = ["-", "-", f"{i.correlation_ratio:.2f}"]
+        else:
+            cells = [f"{i.correlation:+.2f}", f"{i.low:+.2f} to {i.high:+.2f}"]
+            cells += ["-"] * has_choices
+        rows.append((name, *cells, "yes" if i.is_distinct else "not distinct from none"))
+    return text_table(["quantity", *heads, "drives it"], rows)

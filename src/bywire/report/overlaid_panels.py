@@ -8,21 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bywire.core.errors import ParameterError
-from bywire.core.units import convert
 from bywire.report import style
-from bywire.report.channel import Channel, channel
-from bywire.report.decimation import decimate
+from bywire.report.channel import channel
 from bywire.report.line_role import Role
+from bywire.report.mode_marks import mark_faults_of
+from bywire.report.overlaid_lines import DOTS, Look, draw_limits_of, draw_line, draw_target, entry
 from bywire.report.panels import Panel, Trace, declared_panels, panels_by_unit
-from bywire.report.ripple import inside
 from bywire.report.step_marks import StepLimits, draw_limits
-from bywire.report.time_traces import NEAR, drawable, limit_of, set_ticks
-from bywire.report.value_scale import Color, value_color, value_scale
+from bywire.report.time_traces import drawable, set_ticks
+from bywire.report.value_scale import value_color, value_scale
 from bywire.report.wording import duration
 
 if TYPE_CHECKING:
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
 FEW = 3
 """recordings up to which the second trace of a panel is drawn as well"""
 _DASHES: tuple[style.Dash, ...] = ("-", (0, (4, 2)), (0, (6, 1.5, 1.5, 1.5)))
-_DOTS: style.Dash = (0, (1.2, 1.2))
 
 
 @dataclass(frozen=True)
@@ -45,13 +43,6 @@ class Scale:
     name: str
     unit: str
     values: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class _Look:
-    label: str
-    color: str | Color
-    dash: style.Dash
 
 
 Chosen = list[tuple[Panel, list[Trace]]]
@@ -85,7 +76,8 @@ def overlaid_panels(
     ParameterError
         When the recordings share no signal that could be drawn.
     """
-    data = _shared(list(recordings.values()))
+    whole = list(recordings.values())
+    data = _shared(whole)
     present = _chosen(data)
     if not present:
         raise ParameterError(
@@ -104,8 +96,10 @@ def overlaid_panels(
         heads = (
             []
             if scale is not None or axes is not rows[0]
-            else [_entry(each.label, each.color, each.dash) for each in looks]
+            else [entry(each.label, each.color, each.dash) for each in looks]
         )
+        faults = mark_faults_of(axes, whole, [each.color for each in looks], factor)
+        entries += faults if axes is rows[0] else []
         style.legend_above(axes, [*heads, *entries])
         axes.margins(x=0.0)
     rows[-1].set_xlabel(f"time [{unit}]")
@@ -157,12 +151,12 @@ def _present(recordings: Sequence[xr.Dataset], panels: Sequence[Panel]) -> Chose
     return chosen
 
 
-def _looks(labels: Sequence[str], scale: Scale | None, skipped: int) -> list[_Look]:
+def _looks(labels: Sequence[str], scale: Scale | None, skipped: int) -> list[Look]:
     if scale is not None:
-        return [_Look(n, value_color(scale.values, k), "-") for k, n in enumerate(labels)]
+        return [Look(n, value_color(scale.values, k), "-") for k, n in enumerate(labels)]
     palette = style.SEQUENCE
     return [
-        _Look(n, palette[k % len(palette)], _DASHES[k // len(palette) % len(_DASHES)])
+        Look(n, palette[k % len(palette)], _DASHES[k // len(palette) % len(_DASHES)])
         for k, n in enumerate(labels, skipped)
     ]
 
@@ -172,7 +166,7 @@ def _draw_panel(
     panel: Panel,
     traces: Sequence[Trace],
     recordings: Sequence[xr.Dataset],
-    looks: Sequence[_Look],
+    looks: Sequence[Look],
     factor: float,
 ) -> list[Line2D]:
     """Draw a panel and label its ordinate; return the entries of its legend."""
@@ -182,92 +176,23 @@ def _draw_panel(
     entries: list[Line2D] = []
     for k, trace in enumerate(lines[: 2 if len(recordings) <= FEW else 1]):
         averages = [
-            _draw_line(axes, channel(recording, trace.variable), look, factor, second=k > 0)
+            draw_line(axes, channel(recording, trace.variable), look, factor, second=k > 0)
             for recording, look in zip(recordings, looks, strict=True)
         ]
         width = max(averages)
-        if k > 0 or width:
-            dash = _DOTS if k > 0 else "-"
+        if len(lines) > 1 or width:  # an ordinate names what its lines have in common
+            dash = DOTS if k > 0 else "-"
             label = channel(recordings[0], trace.variable).label
             label += f", {duration(width)} average" if width else ""
-            entries.append(_entry(label, style.GRAY, dash))
+            entries.append(entry(label, style.GRAY, dash))
     for target in [t for t in targets if t not in lines]:
-        entries.append(_draw_target(axes, target.variable, recordings, looks, factor))
-    entries += _draw_limits(axes, panel, recordings, looks, first)
+        entries += draw_target(
+            axes, target.variable, [t.variable for t in lines], recordings, looks, factor
+        )
+    entries += draw_limits_of(axes, panel, recordings, looks, first)
     axes.set_ylabel(style.axis_label(panel.quantity, first.symbol, "\n"))
     set_ticks(axes, panel, first)
     return entries
-
-
-def _draw_line(axes: Axes, shown: Channel, look: _Look, factor: float, *, second: bool) -> float:
-    """Draw a line, of a ripple that fills an area its average; return its averaging time [s]."""
-    average = inside(shown)
-    shown, width = (shown, 0.0) if average is None else average
-    axes.plot(
-        *decimate(factor * shown.time, shown.values), color=look.color,
-        linestyle=_DOTS if second else look.dash, linewidth=0.9 if second else 1.2,
-        zorder=2.8 if second else 3.0, label="_",
-    )  # fmt: skip
-    return width
-
-
-def _draw_target(
-    axes: Axes,
-    name: str,
-    recordings: Sequence[xr.Dataset],
-    looks: Sequence[_Look],
-    factor: float,
-) -> Line2D:
-    """Draw a set point: once, in black, where it is the same in all recordings."""
-    stroke = style.STROKES[Role.SET_POINT]
-    shown = [channel(recording, name) for recording in recordings]
-    same = all(
-        np.array_equal(each.time, shown[0].time) and np.array_equal(each.values, shown[0].values)
-        for each in shown[1:]
-    )
-    colors = [stroke.color] if same else [look.color for look in looks]
-    for each, color in zip(shown, colors, strict=False):
-        average = inside(each)
-        each = each if average is None else average[0]
-        axes.plot(
-            *decimate(factor * each.time, each.values), color=color, linestyle=stroke.linestyle,
-            linewidth=0.9, zorder=3.2 if same else 2.9, label="_",
-        )  # fmt: skip
-    return _entry(shown[0].label, stroke.color if same else style.GRAY, stroke.linestyle)
-
-
-def _draw_limits(
-    axes: Axes, panel: Panel, recordings: Sequence[xr.Dataset], looks: Sequence[_Look],
-    first: Channel,
-) -> list[Line2D]:  # fmt: skip
-    """Draw the limits of a panel's first trace where it comes near; each once."""
-    stroke = style.STROKES[Role.LIMIT]
-    levels = [limit_of(recording, panel) for recording in recordings]
-    is_one = len(set(levels)) == 1
-    drawn = set()
-    for recording, look, level in zip(recordings, looks, levels, strict=True):
-        if level is None:
-            continue
-        values = channel(recording, first.name).values
-        level = convert(level, first.symbol, first.unit)
-        for side in (1.0, -1.0):
-            at = side * level
-            if float(np.nanmax(side * values)) < NEAR * level or at in drawn:
-                continue
-            drawn.add(at)
-            axes.axhline(
-                at, color=stroke.color if is_one else look.color, linestyle=stroke.linestyle,
-                linewidth=stroke.linewidth, zorder=stroke.zorder, label="_",
-            )  # fmt: skip
-    color = stroke.color if is_one else style.GRAY
-    return [_entry("limit", color, stroke.linestyle)] if drawn else []
-
-
-def _entry(label: str, color: str | Color, dash: Any) -> Line2D:
-    from matplotlib.lines import Line2D
-
-    text = style.plain(label, 110)
-    return Line2D([], [], color=color, linestyle=dash, linewidth=1.4, label=text)
 
 
 def _longest(recordings: Sequence[xr.Dataset]) -> xr.Dataset:

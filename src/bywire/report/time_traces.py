@@ -12,8 +12,9 @@ from bywire.core.errors import ParameterError
 from bywire.core.units import convert
 from bywire.report import style
 from bywire.report.channel import Channel, channel
-from bywire.report.decimation import lasting_phases, phases
+from bywire.report.decimation import lasting_phases
 from bywire.report.line_role import Role
+from bywire.report.mode_marks import mark_faults, mark_saturation
 from bywire.report.panels import Panel, Trace, declared_panels, panels_by_unit
 from bywire.report.stated_levels import draw_stated
 from bywire.report.step_marks import StepLimits, draw_limits
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 NEAR = 0.5
 """share of a limit from which its lines are drawn"""
 _LASTING = 0.9  # share of a phase above which its short breaks do not count
-FAULTS = "faults"
-"""variable that counts the faults that are there: a bar along the lower edge shows them"""
 
 
 def time_traces(
@@ -91,8 +90,8 @@ def time_traces(
         if axes is rows[0] and limits is not None:
             draw_limits(axes, limits, first)
         _shade_stuck(axes, recording, stuck, named=axes is rows[0])
-        _mark_saturation(axes, panel, recording)
-        _mark_faults(axes, recording, named=axes is rows[0])
+        mark_saturation(axes, panel, recording)
+        mark_faults(axes, recording, named=axes is rows[0])
         _mark_limit(axes, panel, recording, first)
         here = [each for each in left if each.signal in {trace.variable for trace in traces}]
         draw_stated(axes, here, first)
@@ -189,32 +188,13 @@ def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: boo
         if not is_lasting:
             lasting = sum(each.share * (each.end - each.start) for each in found)
             share = lasting / sum(each.end - each.start for each in found)
-            label += f" again and again, {100 * share:.2g} % of the time"
+            label += f" again and again, {100 * share:.2g} % of the shade"
         axes.broken_barh(
             [(scale * each.start, scale * (each.end - each.start)) for each in found], (0.0, 1.0),
             transform=axes.get_xaxis_transform(), zorder=0.4, linewidth=0,
             facecolor=style.SHADE if is_lasting else style.SHADE_AGAIN,
             alpha=0.7, label=label if named else None,
         )  # fmt: skip
-
-
-def _mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
-    spans = _spans(recording, panel.saturation) if panel.saturation is not None else []
-    if spans:
-        axes.broken_barh(
-            spans, (0.96, 0.04), transform=axes.get_xaxis_transform(),
-            facecolor=style.VERMILLION, edgecolor=style.VERMILLION, linewidth=0.8, zorder=2.0,
-            label=panel.saturated,
-        )
-
-
-def _mark_faults(axes: Axes, recording: xr.Dataset, *, named: bool) -> None:
-    spans = _spans(recording, FAULTS)
-    if spans:
-        axes.broken_barh(
-            spans, (0.0, 0.04), transform=axes.get_xaxis_transform(), facecolor=style.PURPLE,
-            edgecolor=style.PURPLE, linewidth=0.8, zorder=2.0, label="fault" if named else None,
-        )
 
 
 def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel) -> None:
@@ -250,15 +230,3 @@ def set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:
     axes.set_yticks(range(len(panel.levels)), panel.levels)
     axes.set_ylim(-0.3, len(panel.levels) - 0.7)
     axes.set_ylabel(panel.quantity)
-
-
-def _spans(recording: xr.Dataset, variable: str) -> list[tuple[float, float]]:
-    """Return starts and lengths of the spans in which a mode variable is 1, on the time axis."""
-    if variable not in recording.data_vars:
-        return []
-    mode = channel(recording, variable)
-    scale, _ = style.time_scale(mode.time)
-    return [
-        (scale * start, scale * (end - start))
-        for start, end in phases(mode.time, mode.values > 0.5)
-    ]

@@ -17,6 +17,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import limit_of
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
+from bywire.studies.choice_influence import ChoiceInfluence, choice_influence
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.effects import ONE, Effect, effects
 from bywire.studies.judgment import Judgment, close_to, judgment_of
@@ -24,11 +25,7 @@ from bywire.studies.plan import Demand, StudyPlan
 from bywire.studies.rare_failures import RareFailure
 from bywire.studies.sensitivity import Sensitivity, sensitivity
 from bywire.studies.spread import Spread, spread_of
-from bywire.studies.statistics import (
-    Influence,
-    correlation_ratio,
-    influences,
-)
+from bywire.studies.statistics import Influence, influences
 from bywire.studies.worst_case import WorstCase
 
 if TYPE_CHECKING:
@@ -105,15 +102,26 @@ class Findings:
             if np.isfinite(self.figure(name)).any()
         )  # fmt: skip
 
-    def influences(self, name: str) -> Sequence[Influence]:
-        """Return how a key figure goes with what varies, the strongest first; choices apart."""
+    def influences(self, name: str) -> Sequence[Influence | ChoiceInfluence]:
+        """Return how a key figure goes with what varies, the strongest first.
+
+        Choices, which have no order, stand by their correlation ratio among sizes of rank
+        correlations.
+        """
         known, plan = self._influences, self.plan
         if name not in known:
             varied = [v.name for v in plan.varied if v.unit]
             columns = [np.asarray(self.cases[each], dtype=float) for each in varied]
-            known[name] = influences(
-                varied, columns, self.figure(name), plan.confidence, bool(plan.correlations)
-            )
+            figure, confidence = self.figure(name), plan.confidence
+            found: list[Influence | ChoiceInfluence] = [
+                *influences(varied, columns, figure, confidence, bool(plan.correlations))
+            ]
+            for v in plan.varied:
+                if not v.unit and (
+                    each := choice_influence(v.name, self.cases[v.name], figure, confidence)
+                ):
+                    found.append(each)
+            known[name] = sorted(found, key=lambda each: -each.strength)
         return known[name]
 
     def sensitivity(self, name: str) -> Sensitivity:
@@ -151,19 +159,14 @@ class Findings:
     def drivers(self, name: str) -> Sequence[str]:
         """Return the quantities that a key figure goes with, the strongest first.
 
-        By importance, by indices, or by the size of rank correlations, beside which choices have
-        their correlation ratio: they have no order.
+        By importance, by indices, or by the size of rank correlations and correlation ratios.
         """
         if self.rare:
             return [i.quantity for each in self.rare if each.demand.kpi == name
                     for i in each.importance]  # fmt: skip
         if self.plan.sensitivity is not None:
             return [each.quantity for each in self.sensitivity(name).drivers]
-        figure = self.figure(name)
-        sizes = {each.quantity: abs(each.correlation) for each in self.influences(name)}
-        sizes |= {v.name: correlation_ratio(self.cases[v.name], figure)
-                  for v in self.plan.varied if not v.unit}  # fmt: skip
-        return sorted(filter(sizes.__getitem__, sizes), key=lambda quantity: -sizes[quantity])
+        return [each.quantity for each in self.influences(name) if each.strength]
 
     @cached_property
     def failures(self) -> Mapping[int, str]:
@@ -214,7 +217,7 @@ class Findings:
         return {}
 
     @cached_property
-    def _influences(self) -> dict[str, Sequence[Influence]]:
+    def _influences(self) -> dict[str, Sequence[Influence | ChoiceInfluence]]:
         """Influences by key figure, likewise."""
         return {}
 

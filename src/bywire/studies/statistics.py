@@ -147,6 +147,11 @@ class Influence:
     high: float
 
     @property
+    def strength(self) -> float:
+        """How strong it is, 0 to 1, whatever its sign."""
+        return abs(self.correlation)
+
+    @property
     def is_distinct(self) -> bool:
         """Whether it differs from none."""
         return self.low > 0.0 or self.high < 0.0
@@ -198,31 +203,6 @@ def influences(
         low, high = math.tanh(z - width), math.tanh(z + width)
         found.append(Influence(name, r, min(low, r), max(high, r)))  # one of 1 lies at its end
     return sorted(found, key=lambda each: -abs(each.correlation))
-
-
-def correlation_ratio(choices: Sequence[str], figure: Array) -> float:
-    """Return how a key figure goes with a choice, 0 to 1: beside sizes of rank correlations.
-
-    The square of it is the share of the ranks' variance that lies between the choices, less what
-    chance makes of it (T. L. Kelley, An unbiased correlation ratio measure, Proc. Natl. Acad. Sci.
-    21, 1935). With two choices it is the size of the rank correlation with either, but for that.
-
-    Parameters
-    ----------
-    choices
-        The choice of each case.
-    figure
-        The key figure in each case, shape (cases,); cases without one are left out.
-    """
-    known = np.isfinite(figure)
-    y = ranked(figure[known])
-    _, group = np.unique(np.asarray(choices, dtype=str)[known], return_inverse=True)
-    counts = np.bincount(group)
-    if counts.size < 2 or y.size - counts.size < 1 or np.ptp(y) == 0.0:
-        return 0.0
-    within = y - (np.bincount(group, y) / counts)[group]
-    rest = float(np.sum(within**2) / np.sum((y - y.mean()) ** 2))
-    return math.sqrt(max(0.0, 1.0 - rest * (y.size - 1) / (y.size - counts.size)))
 
 
 def _rests(x: Array, y: Array, others: Sequence[Array]) -> tuple[Array, Array]:

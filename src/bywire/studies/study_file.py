@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -51,6 +51,42 @@ def read_study(
         return _plan(content, file, overrides)
     except InputError as error:
         raise type(error)(f"{file}: {error}") from None
+
+
+@dataclass(frozen=True)
+class BenchSource:
+    """Where the bench of a study comes from.
+
+    Parameters
+    ----------
+    bench
+        The bench file, as the study file names it, or the experiment.
+    changes
+        What ``[set]`` and ``--set`` change of it, as texts by name.
+    """
+
+    bench: str
+    changes: Mapping[str, str]
+
+
+def read_bench_source(
+    path: str | Path, overrides: Mapping[str, str] = MappingProxyType({})
+) -> BenchSource:
+    """Read which bench a study file names, and what is changed of it.
+
+    Parameters
+    ----------
+    path, overrides
+        As in `read_study`, which takes them.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read or is no TOML.
+    """
+    content = read_toml(Path(path), "study file")
+    changes = {**bench_file.flattened(content.get("set", {})), **overrides}
+    return BenchSource(str(content["bench"]), changes)
 
 
 def _plan(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +26,15 @@ class DrawnCases:
         Rows of the cases that meet what is required, and of the others.
     all_met, all_missed
         How many there are of each.
+    lacking
+        Rows of the cases that miss it because they do not have the figure; all are drawn.
     """
 
     met: NDArray[np.intp]
     missed: NDArray[np.intp]
     all_met: int
     all_missed: int
+    lacking: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
 
     def caption(self, met: str, missed: str) -> str:
         """Return how many cases are drawn; empty where all are.
@@ -59,11 +62,14 @@ def drawn_cases(met: NDArray[np.bool_], most_met: int, most_missed: int | None =
     most_met, most_missed
         How many are drawn at most; by default all that miss it.
     known
-        Whether each case can be drawn, shape (cases,); by default all.
+        Whether each case has the figure that is drawn, shape (cases,); by default all. Those that
+        do not stand at an edge.
     """
     shown = np.ones(met.size, dtype=bool) if known is None else known
     good, bad = np.flatnonzero(met & shown), np.flatnonzero(~met & shown)
-    return DrawnCases(_even(good, most_met), _even(bad, most_missed), good.size, bad.size)
+    return DrawnCases(
+        _even(good, most_met), _even(bad, most_missed), good.size, bad.size, np.flatnonzero(~shown)
+    )
 
 
 def _even(rows: NDArray[np.intp], most: int | None) -> NDArray[np.intp]:

@@ -10,12 +10,14 @@ from matplotlib.figure import Figure
 
 from bywire.report import style
 
+_COLUMNS = 4  # that have room
+
 
 def legend_outside(
     figure: Figure, handles: Sequence[Artist], place: Literal["left", "right"] = "left"
 ) -> None:
     """Put one legend above all panels of a figure, at its left or right end."""
     figure.legend(
-        handles=list(handles), ncols=3, frameon=False, fontsize=style.TEXT_SIZE,
+        handles=list(handles), ncols=_COLUMNS, frameon=False, fontsize=style.TEXT_SIZE,
         loc="outside upper left" if place == "left" else "outside upper right",
     )  # fmt: skip

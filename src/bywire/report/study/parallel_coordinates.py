@@ -18,6 +18,7 @@ from bywire.report.study.drawn_cases import DrawnCases
 from bywire.report.study.legend import legend_outside
 
 _MANY = 100  # lines from which on they are translucent
+_NONE = 1.3  # where cases are that do not have a figure, in lengths of an axis
 _BOX = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
 
 
@@ -29,7 +30,8 @@ def parallel_coordinates(
     Parameters
     ----------
     axes_of
-        What varies, then key figures; each axis goes from its least to its largest value.
+        What varies, then key figures; each axis goes from its least to its largest value, and
+        above it stands what does not have one.
     cases
         Which are drawn, by whether they meet all requirements.
     limits
@@ -42,6 +44,8 @@ def parallel_coordinates(
     scaled = np.array([
         (a.shown - low) / (high - low or 1.0) for a, (low, high) in zip(axes_of, ends, strict=True)
     ])  # fmt: skip
+    is_lacking = ~np.isfinite(scaled)
+    scaled[is_lacking] = _NONE
     places = np.arange(len(axes_of))
     entries: list[Artist] = []
     for rows, color, opacity, text in (
@@ -56,6 +60,9 @@ def parallel_coordinates(
     for place, (each, (low, high)) in enumerate(zip(axes_of, ends, strict=True)):
         axes.plot([place, place], [0.0, 1.0], color=style.GRAY, linewidth=0.8)
         _write_values(axes, place, each, (low, high))
+        if is_lacking[place].any():
+            axes.text(place, _NONE + 0.02, "none", ha="center", va="bottom", fontsize=7.0,
+                      bbox=_BOX)  # fmt: skip
         if each.name not in limits:
             continue
         limit = each.scale(limits[each.name])
@@ -75,7 +82,7 @@ def parallel_coordinates(
     axes.set_xticks(places, labels, rotation=35, ha="right")
     axes.tick_params(axis="x", length=0.0)
     axes.set_yticks([])
-    axes.set_ylim(-0.2, 1.2)
+    axes.set_ylim(-0.2, _NONE + 0.1 if is_lacking.any() else 1.2)
     axes.grid(False)
     axes.spines[["left", "bottom"]].set_visible(False)
     legend_outside(figure, entries)

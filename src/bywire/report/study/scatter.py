@@ -15,6 +15,7 @@ from bywire.report.study.drawn_cases import DrawnCases
 from bywire.report.study.legend import legend_outside
 from bywire.report.study.readable_axis import beyond, limit_text, size_of, write_out
 
+_EDGE = 1.03  # where cases without the figure stand, in heights of a panel
 _MANY = 1000  # points from which on they are small and translucent
 
 
@@ -30,7 +31,8 @@ def scatter(
     limit
         What is required [the figure's unit]; only named where it lies far off.
     cases
-        Which are drawn; those that miss it are crosses.
+        Which are drawn; those that miss it are crosses, and those without the figure, which miss it
+        too, triangles at the upper edge.
     """
     figure = Figure(figsize=(style.WIDTH, 2.8), layout="constrained", facecolor="white")
     panels = figure.subplots(1, len(drivers), sharey=True, squeeze=False)[0]
@@ -48,6 +50,10 @@ def scatter(
                   markersize=2.5 if many_bad else 4.5, linestyle="none",
                   markeredgewidth=0.6 if many_bad else 1.0,
                   alpha=0.4 if many_bad else 1.0, rasterized=many_bad)  # fmt: skip
+        if cases.lacking.size:
+            axes.plot(driver.apart[cases.lacking], np.full(cases.lacking.size, _EDGE), "v",
+                      color=look.color, markersize=3.5, markeredgewidth=0.0, clip_on=False,
+                      alpha=0.6, transform=axes.get_xaxis_transform())  # fmt: skip
         if not far:
             axes.axhline(scale(limit), color=look.color, linestyle=look.linestyle,
                          linewidth=look.linewidth)  # fmt: skip
@@ -73,6 +79,8 @@ def scatter(
                            label="meets the limit")),
         (bad.size, Line2D([], [], color=look.color, marker="x", markersize=4.5, linestyle="none",
                           label="misses the limit")),
+        (cases.lacking.size, Line2D([], [], color=look.color, marker="v", markersize=3.5,
+                                    linestyle="none", label="has no figure: misses it")),
         (not far, Line2D([], [], color=look.color, linestyle=":", label="limit")),
     ]  # fmt: skip
     legend_outside(figure, [handle for is_drawn, handle in entries if is_drawn])

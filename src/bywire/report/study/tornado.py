@@ -15,6 +15,7 @@ from bywire.report import style
 from bywire.report.study.drawn_cases import BARS
 from bywire.report.study.legend import legend_outside
 from bywire.report.study.readable_axis import (
+    CHARACTER,
     Scale,
     beyond,
     few_labels,
@@ -26,6 +27,10 @@ from bywire.report.study.readable_axis import (
 from bywire.studies.effects import Effect
 
 _BAR = 0.28  # height of a quantity [inch]
+_PANEL = style.WIDTH - 2.5  # about how long an abscissa is [inch]
+_PALE = 0.6  # opacity of the bar of a choice
+_NAME_SIZE = 7.0  # of the name of a choice [points]
+_LONGEST = 24  # characters of it that have room
 
 
 def tornado(
@@ -33,6 +38,9 @@ def tornado(
     limits: Mapping[str, float],
 ) -> Figure:  # fmt: skip
     """Draw the swings of every key figure around what the bench itself gives.
+
+    Choices are neither below nor above: their bars are gray, with the names of the farthest ones at
+    the ends.
 
     Parameters
     ----------
@@ -62,12 +70,16 @@ def tornado(
             else:
                 has_limit = True
                 axes.axvline(scale(limit), color=style.BLACK, linewidth=1.0, linestyle=":")
-        few_labels(axes.xaxis, style.WIDTH - 2.5)
+        _give_room(axes, each)
+        few_labels(axes.xaxis, _PANEL)
         axes.set_xlabel(scale.label(name.replace("_", " ")))
-    handles: list[Artist] = [
-        Patch(color=style.BLUE, label="quantity below the bench's"),
-        Patch(color=style.ORANGE, label="above"),
-    ]
+    units_shown = [effect.unit for each in shown.values() for effect in each]
+    handles: list[Artist] = []
+    if any(units_shown):
+        handles += [Patch(color=style.BLUE, label="quantity below the bench's"),
+                    Patch(color=style.ORANGE, label="above")]  # fmt: skip
+    if not all(units_shown):
+        handles.append(Patch(color=style.GRAY, alpha=_PALE, label="choice"))
     if has_limit:
         handles.append(Line2D([], [], color=style.BLACK, linewidth=1.0, linestyle=":",
                               label="limit"))  # fmt: skip
@@ -79,13 +91,44 @@ def _draw(axes: Axes, effects: Sequence[Effect], scale: Scale) -> None:
     """Draw of each quantity what its lower and its upper end make, from the bench's own figure."""
     middle = scale(effects[0].nominal)
     for place, effect in zip(range(len(effects))[::-1], effects, strict=True):
-        for end, color in ((0, style.BLUE), (-1, style.ORANGE)):
-            at = scale(float(effect.figures[end]))
-            if np.isfinite(at):
-                axes.barh(place, at - middle, left=middle, height=0.7, color=color)
+        if effect.unit:
+            for end, color in ((0, style.BLUE), (-1, style.ORANGE)):
+                at = scale(float(effect.figures[end]))
+                if np.isfinite(at):
+                    axes.barh(place, at - middle, left=middle, height=0.7, color=color)
+        else:
+            _draw_choice(axes, place, effect, scale)
         known = scale(effect.figures[np.isfinite(effect.figures)])
         axes.plot(known, np.full(known.size, place), "|", color=style.BLACK, markersize=6.0)
     axes.set_yticks(
         range(len(effects))[::-1], [style.plain(each.quantity, 40) for each in effects]
     )
     axes.axvline(middle, color=style.GRAY, linewidth=0.8)
+
+
+def _draw_choice(axes: Axes, place: int, effect: Effect, scale: Scale) -> None:
+    """Draw how far the farthest choices go to either side, with their names."""
+    middle = scale(effect.nominal)
+    for end, side in ((np.nanargmin(effect.figures), "right"),
+                      (np.nanargmax(effect.figures), "left")):  # fmt: skip
+        at = scale(float(effect.figures[end]))
+        axes.barh(place, at - middle, left=middle, height=0.7, color=style.GRAY, alpha=_PALE)
+        if effect.swing:
+            axes.annotate(
+                _name(effect, int(end)), (at, place), (-4.0 if side == "right" else 4.0, 0.0),
+                textcoords="offset points", ha=side, va="center", fontsize=_NAME_SIZE,
+            )  # fmt: skip
+
+
+def _name(effect: Effect, level: int) -> str:
+    return style.plain(effect.values[level], _LONGEST)
+
+
+def _give_room(axes: Axes, effects: Sequence[Effect]) -> None:
+    """Leave room for the names of choices at both ends of an abscissa."""
+    names = [_name(each, k) for each in effects if not each.unit for k in range(len(each.values))]
+    if not names:
+        return
+    longest = (max(map(len, names)) + 1) * CHARACTER * _NAME_SIZE / style.TEXT_SIZE
+    share = min(longest / _PANEL, 0.3)
+    axes.margins(x=share / (1.0 - 2.0 * share))
