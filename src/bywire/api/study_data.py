@@ -19,7 +19,7 @@ def findings_data(findings: Findings) -> dict[str, Any]:
         "design": plan.design,
         "seed": plan.seed,
         "cases": count,
-        "of": plan.total,
+        "of": plan.total * (len(plan.judged_demands) if plan.sought else 1),
         "confidence": plan.confidence,
         "failed": len(findings.failures),
         "requirements": [

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
+
 from bywire.api.study_rare import rare_notes, search_notes, state_texts
 from bywire.api.study_sensitivity import missing_indices
 from bywire.api.study_tables import shown_figures
@@ -37,12 +39,11 @@ def warned(findings: Findings, of_the_bench: list[str]) -> list[str]:
 
 def _undefined(findings: Findings) -> list[str]:
     """Return which figures of requirements are not defined in cases that ran."""
-    required = {each.demand.kpi for each in findings.judgments} if len(findings.cases) else set()
     cases: dict[int, list[str]] = {}
-    for each in findings.spreads:
-        lacking = each.undefined - len(findings.failures)
-        if lacking and each.name in required:
-            cases.setdefault(lacking, []).append(each.name)
+    for each in findings.judgments:
+        undefined = int(np.count_nonzero(~np.isfinite(findings.figure(each.demand.kpi))))
+        if lacking := undefined - len(findings.failures):
+            cases.setdefault(lacking, []).append(each.demand.kpi)
     return [
         f"{', '.join(names)}: not defined in {number} of {len(findings.cases)} cases, which count "
         "as missing what is required"

@@ -164,7 +164,9 @@ def study_surrogates(
         values[name] = number(change, quantities[name].unit or "1", name)
     surrogates: dict[str, Surrogate] = {}
     refused: dict[str, str] = {}
-    for kpi in ([kpis] if isinstance(kpis, str) else kpis) or shown_figures(findings):
+    wanted = [kpis] if isinstance(kpis, str) else kpis
+    required = [each.kpi for each in report.plan.demands]
+    for kpi in wanted or shown_figures(findings) or required:
         try:
             surrogates[kpi] = surrogate_of(findings, kpi)
         except ParameterError as error:

@@ -184,7 +184,7 @@ def _effect_table(findings: Findings, name: str, effects: Sequence[Effect]) -> T
 
 
 def shown_figures(findings: Findings) -> list[str]:
-    """Return the key figures that matter: those that something is required of, or all.
+    """Return the key figures that matter: those that something is required of, else all.
 
     Those of requirements that are missed come first, then those that are undecided.
     """
@@ -193,7 +193,7 @@ def shown_figures(findings: Findings) -> list[str]:
     ordered = sorted(judgments, key=lambda each: _URGENCY.index(each.outcome))
     judged = [each.demand.kpi for each in ordered]
     required = [*judged, *(each.kpi for each in findings.plan.demands if each.kpi not in judged)]
-    return [name for name in required if name in known] or known
+    return [name for name in required if name in known] if required else known
 
 
 def unmoved(findings: Findings) -> list[str]:
