@@ -140,7 +140,11 @@ def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
         so_far = f"it is no more probable than {failure.estimate.high:.2g}"
         seen = f"{failure.failed} failing cases are too few for an estimate; "
         so_far = seen * bool(failure.failed) + so_far
-        return (f"the budget of {plan.cases} cases is spent before the last level ({so_far})"
+        where = (
+            "before the last level" if plan.design == SUBSET
+            else "by the search for the design point"
+        )  # fmt: skip
+        return (f"the budget of {plan.cases} cases is spent {where} ({so_far})"
                 + (": extend the study" if outcome == "undecided" else ""))  # fmt: skip
     if failure.state == "level":
         return "too many cases have the same figure to tell worse ones: take 'monte-carlo'"
