@@ -26,7 +26,7 @@ peak_current = "<= 25 A with 99 %"
 def failing(scores) -> FailureProbability:
     estimate = counted(10, 1000, 0.95)
     return FailureProbability(
-        "done", estimate, lambda _: UNKNOWN, (), 1000, 10,
+        "done", estimate, lambda _: UNKNOWN, (), 1000,
         center=np.asarray(scores).mean(axis=0), failing=np.asarray(scores),
     )  # fmt: skip
 

@@ -27,7 +27,7 @@ from bywire.studies.rare_failures import rare_failures
 from bywire.studies.running import complete
 from bywire.studies.sought_design import WORST
 from bywire.studies.store import Origin, StudyStore
-from bywire.studies.study_file import read_bench_source, read_study
+from bywire.studies.study_file import read_study
 from bywire.studies.worst_cases import worst_cases
 
 
@@ -112,7 +112,7 @@ def _completed(
         raise KeyboardInterrupt(
             f"{len(store.finished())}{of} chunks are kept: {store.resume_command}"
         ) from None
-    return replace(_run_of(plan, origin, store, completed.nominal), damaged=completed.damaged)
+    return replace(_run_of(plan, store, completed.nominal), damaged=completed.damaged)
 
 
 @use_case
@@ -187,9 +187,9 @@ def study_report(folder: str | Path) -> StudyRun:
 def kept_study(folder: str | Path) -> StudyRun:
     """Return what `study_report` does, without warning of anything: for what is made of it."""
     store = StudyStore(Path(folder))
-    plan, origin = _kept(store)
+    plan, _ = _kept(store)
     store.require(plan)
-    return _run_of(plan, origin, store, running.run(plan.bench, estimate_error=True))
+    return _run_of(plan, store, running.run(plan.bench, estimate_error=True))
 
 
 def _kept(store: StudyStore) -> tuple[StudyPlan, Origin]:
@@ -219,9 +219,7 @@ def _by(engine: str, plan: StudyPlan) -> StudyPlan:
     return plan if engine == "auto" else replace(plan, bench=replace(plan.bench, engine=engine))
 
 
-def _run_of(
-    plan: StudyPlan, origin: Origin, store: StudyStore, nominal: Result
-) -> StudyRun:
+def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
     if plan.design == WORST:
         searches, cases = worst_cases(plan, store)
         findings = Findings(plan, cases, nominal.kpis, searches=searches)
@@ -235,5 +233,4 @@ def _run_of(
         is_whole = len(findings.cases) == plan.total
     judged = status_of(findings.judgments) if findings.spreads else "failed"
     status = judged if is_whole else "unfinished"
-    source = read_bench_source(origin.file, origin.overrides)
-    return StudyRun(plan, store.folder, findings, nominal, status, source=source)
+    return StudyRun(plan, store.folder, findings, nominal, status)

@@ -42,7 +42,6 @@ from bywire.report.subject import Subject
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan
 from bywire.studies.store import StudyStore
-from bywire.studies.study_file import BenchSource
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,8 +69,6 @@ class StudyRun(Answer):
         ``failed``, too, where no case has a key figure, and ``unfinished`` where cases are missing.
     damaged
         Chunks whose files could not be read, and that were computed again.
-    source
-        Where its bench comes from; None where that is not known.
     """
 
     plan: StudyPlan
@@ -80,7 +77,6 @@ class StudyRun(Answer):
     nominal: Result
     status: str
     damaged: int = 0
-    source: BenchSource | None = None
 
     @cached_property
     def _shown(self) -> ShownCases:
@@ -175,7 +171,7 @@ class StudyRun(Answer):
         )  # fmt: skip
         more = len(drivers) - _BRIEF
         said = [*missing_indices(findings), *unmoved(findings)]
-        unindexed = [Listing(said)] if said else []
+        unexplained = [Listing(said)] if said else []
         judged: list[Block] = [demands] if plan.demands else []
         figures = [spreads] if findings.spreads else []
         texts = self._shown.texts()
@@ -186,10 +182,10 @@ class StudyRun(Answer):
             f"{len(self.cases)} cases ({plan.design}, seed {plan.seed}) of {subject.line}",
             sections=lambda: [
                 *([Section("Requirements", judged)] if judged else []),
-                tested_section(self.nominal, self.source),
+                tested_section(self.nominal, plan.tested),
                 *([Section("What else to know", [Listing(remarks)])] if remarks else []),
                 *([Section("Key figures", figures)] if figures else []),
-                *([Section("What drives them", [*drivers, *unindexed])] if drivers or unindexed
+                *([Section("What drives them", [*drivers, *unexplained])] if drivers or unexplained
                   else []),
                 *([Section("Figures", drawn)]
                   if (drawn := study_figures(findings, self._shown.recordings)) else []),
@@ -201,7 +197,7 @@ class StudyRun(Answer):
             brief=spaced([
                 *tested_brief(self.nominal),
                 *([demands] if judged else []), *figures, *drivers[:_BRIEF],
-                *(unindexed if findings.plan.sensitivity is None else []),
+                *(unexplained if findings.plan.sensitivity is None else []),
                 *([f"and {more} more such tables in the report"] if more > 0 else []),
                 *([Listing(missing, "Cases without a result")] if missing else []),
             ]),
@@ -237,6 +233,6 @@ class StudyRun(Answer):
     def _data(self) -> dict[str, Any]:
         return {
             "study": self.plan.name, "status": self.status, "folder": str(self.folder),
-            "bench": tested_data(self.plan.bench, self.source),
+            "bench": tested_data(self.plan.bench, self.plan.tested),
             **findings_data(self.findings), "warnings": self.warnings, "notes": self.notes,
         }  # fmt: skip

@@ -13,7 +13,7 @@ from bywire.bench.result import Result
 from bywire.report.document import Block, Listing, Paragraph, Section
 from bywire.report.wording import clean
 from bywire.studies.plan import StudyPlan
-from bywire.studies.study_file import BenchSource
+from bywire.studies.studied_bench import StudiedBench
 
 
 def tested_line(plan: StudyPlan) -> str:
@@ -31,7 +31,7 @@ def tested_brief(nominal: Result) -> list[Listing]:
     return [Listing(said)] if said else []
 
 
-def tested_section(nominal: Result, source: BenchSource | None) -> Section:
+def tested_section(nominal: Result, source: StudiedBench | None) -> Section:
     """Return where the bench comes from, its faults, what it changes, and its options.
 
     Parameters
@@ -48,7 +48,7 @@ def tested_section(nominal: Result, source: BenchSource | None) -> Section:
     return Section("What was tested", blocks)
 
 
-def tested_data(bench: Bench, source: BenchSource | None) -> dict[str, Any]:
+def tested_data(bench: Bench, source: StudiedBench | None) -> dict[str, Any]:
     """Return the bench for JSON.
 
     Values are SI numbers, those of changes and of what the study sets texts with units; the end of
@@ -76,7 +76,7 @@ def tested_data(bench: Bench, source: BenchSource | None) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _source_text(source: BenchSource) -> str:
+def _source_text(source: StudiedBench) -> str:
     """Return which bench the study file names, and what the study sets of it."""
     changes = ", ".join(f"{name} = {value}" for name, value in source.changes.items())
     return clean(f"Bench: {source.bench}" + (f", of which the study sets {changes}" if changes

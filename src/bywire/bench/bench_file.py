@@ -210,7 +210,7 @@ def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str
             known = changed.setdefault(section, {})
             below = known.get(signal, {})
             known[signal] = {**(below if isinstance(below, Mapping) else {}), field: value}
-        elif section == "options" and key:
+        elif section in ("options", "set") and key:
             changed[section] = {**flattened(changed.get(section, {})), key: value}
         elif section in SECTIONS and key:
             changed.setdefault(section, {})[key] = value

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bywire.core.errors import ParameterError
 from bywire.studies.plan import StudyPlan
 from bywire.studies.points import SAMPLED
-from bywire.studies.sensitivity_design import SENSITIVITY
+from bywire.studies.sensitivity_design import LEVELS, MORRIS, SENSITIVITY
 from bywire.studies.sought_design import IMPORTANCE, RARE, SUBSET, SoughtDesign
 
 _DEPENDENT = "has cases that share values and are not independent"
@@ -34,6 +34,14 @@ def require_agreement(plan: StudyPlan) -> None:
         raise ParameterError(
             f"[[correlation]]: {plan.design!r} {why}: leave it out, or take {others}"
         )
+    if plan.design == MORRIS:
+        for each in plan.varied:
+            if (count := len(each.distribution.singles)) > LEVELS:
+                raise ParameterError(
+                    f"[vary] {each.name} has {count} values, and {plan.design!r} steps on {LEVELS} "
+                    f"levels: some would never be taken; name {LEVELS} of them, or take "
+                    "'sobol-indices'"
+                )
     for demand in plan.demands:
         if demand.probability is not None:
             why = _DEPENDENT if plan.design == "sobol-indices" else "draws nothing"

@@ -193,17 +193,17 @@ def _normal(entry: _Entry) -> Distribution:
         return _frozen(entry, Normal(mean, sd), text)
     if not low < high:
         raise entry.refused(f"low = {entry.amount(low)} must be below high = {entry.amount(high)}")
-    whole = Normal(mean, sd)
-    kept = min(whole.cdf(high), whole.sf(low))
+    law = Normal(mean, sd)  # the difference of the smaller ones, for their digits
+    kept = law.sf(low) - law.sf(high) if low > mean else law.cdf(high) - law.cdf(low)
     if kept < NEVER:
         raise entry.refused(
             f"what lies within low and high has a probability of {kept:.2g} of {text}: nothing of "
             "it is left; give other ends, or another mean"
         )
-    law = truncated_normal((low - mean) / sd, (high - mean) / sd, mean, sd)
+    cut = truncated_normal((low - mean) / sd, (high - mean) / sd, mean, sd)
     sides = [f"{word} {entry.amount(x)}" for word, x in (("from", low), ("to", high))
              if math.isfinite(x)]  # fmt: skip
-    return _frozen(entry, law, f"{text}, truncated {' '.join(sides)}", low, high)
+    return _frozen(entry, cut, f"{text}, truncated {' '.join(sides)}", low, high)
 
 
 def _lognormal(entry: _Entry) -> Distribution:

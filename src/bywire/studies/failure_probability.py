@@ -91,8 +91,8 @@ class FailureProbability:
         ``below(x)``: estimate of the probability that the margin is <= x, in the figure's unit.
     levels
         How the estimate came about.
-    runs, failed
-        Cases used, and how many of them failed.
+    runs
+        Cases used.
     span
         Least and largest margin of which ``below`` has something to say; none where it has not.
     place, scores
@@ -106,6 +106,8 @@ class FailureProbability:
         method than subset simulation.
     first_order
         FORM's reliability index beta; NaN of another method.
+    failed
+        How many of the cases failed, where somebody has counted them.
     why
         What else there is to say of the state.
     """
@@ -115,13 +117,13 @@ class FailureProbability:
     below: Callable[[float], Interval]
     levels: tuple[Level, ...]
     runs: int
-    failed: int
     span: tuple[float, float] | None = None
     place: int | None = None
     scores: Array | None = None
     center: Array | None = None
     failing: Array | None = None
     first_order: float = math.nan
+    failed: int = 0
     why: str = ""
 
     def within(self, error: float) -> Interval:

@@ -139,7 +139,7 @@ def importance_sampling(
     nearest = trail.nearest
     return FailureProbability(
         state, estimate, below if state == "done" else _unknown,
-        (Level(0.0, estimate.value),), search.runs + trail.runs, search.failed + trail.failed,
+        (Level(0.0, estimate.value),), search.runs + trail.runs,
         drawn.span if state == "done" else None,
         place=nearest[0] + search.runs if nearest else None,
         scores=nearest[1] if nearest else None,

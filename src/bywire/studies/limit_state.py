@@ -81,11 +81,6 @@ class Trail:
         return sum(map(len, self._values))
 
     @property
-    def failed(self) -> int:
-        """How many of them failed."""
-        return sum(int((values <= 0.0).sum()) for values in self._values)
-
-    @property
     def nearest(self) -> tuple[int, Array] | None:
         """The most probable failing case, its place and scores; None where none failed."""
         if not self._values:

@@ -23,6 +23,7 @@ from bywire.studies.identity import as_json, digest_of, source_digest
 from bywire.studies.points import SAMPLED, Sampled, Spanned, spanned
 from bywire.studies.sensitivity_design import MORRIS, SENSITIVITY, SensitivityDesign
 from bywire.studies.sought_design import RARE, SOUGHT, WORST, SoughtDesign, library_version
+from bywire.studies.studied_bench import StudiedBench
 
 CHUNK = 64
 """cases of a chunk, the piece of work that is computed, kept and counted as a whole"""
@@ -108,6 +109,8 @@ class StudyPlan:
         Cases asked for in each level of subset simulation.
     correlations
         Pairs of names -> correlation of their normal scores.
+    tested
+        Which bench that is, as the file says; None of a plan that no file says.
     """
 
     name: str
@@ -122,6 +125,7 @@ class StudyPlan:
     time: float = math.inf
     cases_per_level: int = 2560
     correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    tested: StudiedBench | None = None
 
     @property
     def is_sampled(self) -> bool:
@@ -272,7 +276,7 @@ class StudyPlan:
             points = self.sensitivity.probabilities.tobytes()
             said["points"] = hashlib.sha256(points).hexdigest()
             if self.design == MORRIS and any(v.distribution.is_discrete for v in self.varied):
-                said["single values"] = "as many levels each"
+                said["single values"] = "in turn"
         if self.sought is not None:
             # Where it goes depends on the requirements, and on how the library draws.
             said["points"] = library_version(self.design)

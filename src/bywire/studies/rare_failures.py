@@ -123,7 +123,7 @@ def _failure(plan: StudyPlan, cases: RequirementCases) -> RareFailure:
             cases.report,
         )  # fmt: skip
     # Points that were asked for again, as by derivatives at the same place, are the same cases.
-    failure = replace(failure, runs=len({*cases.numbers}))
+    failure = replace(failure, runs=len({*cases.numbers}), failed=len(cases.failed))
     case = None if failure.place is None else cases.numbers[failure.place]
     importance = importance_of(plan, failure)
     point = {}
@@ -143,8 +143,8 @@ def importance_of(plan: StudyPlan, failure: FailureProbability) -> tuple[Importa
     is_rare = failure.estimate.value < 0.5  # else failures lie everywhere
     if failure.center is None or not is_rare:
         return ()
-    squares = plan.scored.correlated(failure.center) ** 2
-    scores = plan.scored.correlated(failure.center).tolist()
+    moved = plan.scored.correlated(failure.center)
+    squares, scores = moved**2, moved.tolist()
     shares: list[dict[Any, float]] = [{} for _ in scores]
     if failure.failing is not None:
         for k, each in enumerate(plan.varied):

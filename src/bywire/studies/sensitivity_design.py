@@ -124,8 +124,8 @@ class SensitivityDesign:
         """Return the values of each quantity, shape (cases,) each.
 
         Morris' outer levels are the ends of a distribution, and 3 standard deviations where it has
-        none, as those of a grid. Single values, whatever their weights, have as many levels each,
-        so that a step is always one to another value.
+        none, as those of a grid. Single values, whatever their weights, share the levels in their
+        order, of three the last has two: a step is always one to another value.
         """
         u = self.probabilities
         if self.kind == "sobol-indices":

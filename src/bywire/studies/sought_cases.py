@@ -137,11 +137,14 @@ class RequirementCases:
         Those of the study.
     requirement
         Number of the requirement among those judged.
+    numbers, failed
+        Of the cases in the order in which they were asked for, and of those that failed.
     """
 
     cases: SoughtCases
     requirement: int
     numbers: list[int] = field(default_factory=list)
+    failed: set[int] = field(default_factory=set)
     _searched: int = 0
     _drawn: int = 0
     _said: str = ""
@@ -181,4 +184,6 @@ class RequirementCases:
         self.numbers += [int(n) for columns in found for n in columns[CASE]]
         values = np.concatenate([columns[self.demand.kpi] for columns in found])
         unit = plan.column_units[self.demand.kpi]
-        return margins_of(values, *limit_of(self.demand.kpi, self.demand.limit, unit)), count
+        margins = margins_of(values, *limit_of(self.demand.kpi, self.demand.limit, unit))
+        self.failed.update(np.array(self.numbers[used:])[margins <= 0.0].tolist())
+        return margins, count

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -19,6 +19,7 @@ from bywire.studies.demand_section import read_demands
 from bywire.studies.design_rules import require_agreement
 from bywire.studies.design_section import read_design
 from bywire.studies.plan import StudyPlan
+from bywire.studies.studied_bench import StudiedBench
 from bywire.studies.vary_section import read_all_varied
 
 _KEYS = ("name", "bench", "vary", "measured", "correlation", "design", "set", "requirements")
@@ -53,42 +54,6 @@ def read_study(
         raise type(error)(f"{file}: {error}") from None
 
 
-@dataclass(frozen=True)
-class BenchSource:
-    """Where the bench of a study comes from.
-
-    Parameters
-    ----------
-    bench
-        The bench file, as the study file names it, or the experiment.
-    changes
-        What ``[set]`` and ``--set`` change of it, as texts by name.
-    """
-
-    bench: str
-    changes: Mapping[str, str]
-
-
-def read_bench_source(
-    path: str | Path, overrides: Mapping[str, str] = MappingProxyType({})
-) -> BenchSource:
-    """Read which bench a study file names, and what is changed of it.
-
-    Parameters
-    ----------
-    path, overrides
-        As in `read_study`, which takes them.
-
-    Raises
-    ------
-    FileError
-        When the file cannot be read or is no TOML.
-    """
-    content = read_toml(Path(path), "study file")
-    changes = {**bench_file.flattened(content.get("set", {})), **overrides}
-    return BenchSource(str(content["bench"]), changes)
-
-
 def _plan(
     content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]
 ) -> StudyPlan:
@@ -107,9 +72,10 @@ def _plan(
     if not varied:
         raise ParameterError("[vary] is empty: say what varies, such as \"motor.R_m\" = '+-10 %'")
     said = {**measured, **read_correlations(content.get("correlation", []), varied, measured)}
+    changes = {**bench_file.flattened(content.get("set", {})), **overrides}
     plan = StudyPlan(
         name, bench, in_order(varied, said), demands=demands, correlations=said,
-        **read_design(content.get("design", {})),
+        tested=StudiedBench(content["bench"], changes), **read_design(content.get("design", {})),
     )  # fmt: skip
     require_agreement(plan)
     return plan

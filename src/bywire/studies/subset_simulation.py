@@ -185,7 +185,7 @@ def _found(
     if state == "done":
         failing = subsets[-1].scores[subsets[-1].margins <= 0.0]
     return FailureProbability(
-        state, estimate, below, levels, trail.runs, trail.failed,
+        state, estimate, below, levels, trail.runs,
         _span(subsets, ends[-1]) if subsets else None,
         place=nearest[0] if nearest else None, scores=nearest[1] if nearest else None,
         center=failing.mean(axis=0) if failing is not None and len(failing) else None,

@@ -105,7 +105,8 @@ class Surrogate:
 
     def _require_seen(self, name: str, values: Array) -> None:
         low, high = self.low[name], self.high[name]
-        beyond = values[~((low <= values) & (values <= high))]
+        at_end = np.isclose(values, low, _SAME, 0.0) | np.isclose(values, high, _SAME, 0.0)
+        beyond = values[~((low <= values) & (values <= high) | at_end)]
         if beyond.size:
             unit = self.units[name]
             raise ParameterError(
