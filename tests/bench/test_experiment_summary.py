@@ -29,7 +29,7 @@ def test_a_bench_says_its_own_options():
         "panic stop from 100 km/h with 40 bar in front and 40 bar behind, on dry asphalt"
     )
     several = bench.summary(["options.v_0", "vehicle.m"])
-    assert several.startswith("panic stop from varied v_0 with 30 bar")
+    assert several.startswith("panic stop from 60 km/h (varied) with 30 bar")
     friction = Bench("friction-sweep", "roberts2003", options={"mu_B": [0.3, 0.4]})
     assert friction.summary().startswith("200 N m steps at pad friction 0.3 to 0.4:")
 
@@ -42,7 +42,7 @@ def test_reports_of_runs_and_studies_say_it_below_their_titles(tmp_path):
     text = f'bench = "hard-braking"\n[set]\n{lines}\n[vary]\n"options.p_from" = "+-5 %"\n'
     (tmp_path / "study.toml").write_text(text)
     study = bywire.run_study(tmp_path / "study.toml", tmp_path / "out", cases=64, workers=1)
-    assert "of pressure step from varied p_from to 30 bar" in study.document().summary
+    assert "of pressure step from 6 bar (varied) to 30 bar" in study.document().summary
 
 
 @pytest.mark.parametrize("name", sorted(EXPERIMENTS.all()))

@@ -100,7 +100,8 @@ def test_change_wins_over_every_spelling_in_the_file(bywire, bench):
     for text in ('"motor.R_m" = 0', "motor.R_m = 0", "[set.motor]\nR_m = 0"):
         section = "" if text.startswith("[") else "[set]\n"
         path = bench(f"{BRAKING}{QUICK}\n{section}{text}\n")
-        assert bywire("run", path, "--set", "motor.R_m=0.4ohm").status == 0
+        for name in ("motor.R_m", "set.motor.R_m"):
+            assert bywire("run", path, "--set", f"{name}=0.4ohm").status == 0
 
 
 def test_stimulus_from_the_command_line(bywire, bench):

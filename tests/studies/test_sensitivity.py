@@ -257,6 +257,15 @@ def test_what_such_designs_do_not_admit_is_refused(planned, kind, text, texts):
         assert each in str(refused.value)
 
 
+def test_more_single_values_than_levels_are_refused(study):
+    """Of five, trajectories on four levels would leave one out."""
+    values = [f"{volts} V" for volts in range(10, 15)]
+    text = f'[vary]\n"supply.V_bat" = {{ kind = "discrete", values = {values} }}\n'
+    with pytest.raises(ParameterError, match=r"V_bat has 5 values, and 'morris' steps on 4"):
+        read_study(study(f'{text}[design]\nkind = "morris"\n'))
+    read_study(study(f'{text}[design]\nkind = "sobol-indices"\ncases = 640\n'))
+
+
 def test_another_number_of_groups_is_another_study(planned):
     plan = planned("sobol-indices", 320)
     same, more, other = (

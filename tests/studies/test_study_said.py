@@ -100,7 +100,7 @@ def test_captions_say_who_is_drawn_and_who_misses(found):
     assert "miss" not in none["parallel"]
     lacking = captions(found("rise_time", np.where(values < 0.06, values, np.nan), "<= 60 ms"))
     assert "all that have it meet the limit" in lacking["scatter-rise_time"]
-    at_edge = "Triangles at the upper edge: 500 cases without it, which miss the limit."
+    at_edge = "Triangles at the upper edge: cases without it (500), which miss the limit."
     assert lacking["scatter-rise_time"].endswith(at_edge)
     assert lacking["parallel"].endswith("does not have a figure, its line goes to 'none'.")
 
@@ -108,7 +108,7 @@ def test_captions_say_who_is_drawn_and_who_misses(found):
 def test_no_more_points_are_left_out_than_are_said(found):
     values = np.linspace(0.05, 0.07, 9000)
     said = captions(found("rise_time", values, "<= 69.5 ms with 90 %"))["scatter-rise_time"]
-    assert "Drawn are 4000 of 8775 cases that meet the limit and all 225 that miss it." in said
+    assert "Drawn are 4000 of 8775 cases that meet the limit and all that miss it (225)." in said
 
 
 def test_a_surrogate_has_the_unit_of_its_figure(found):

@@ -87,7 +87,7 @@ def test_what_it_does_not_know_is_refused(findings):
     with pytest.raises(UnknownNameError, match=r"motor\.K_e"):
         surrogate({"motor.K_x": 0.9})
     few = findings(figure)
-    with pytest.raises(ParameterError, match=r"12 cases .* needs 30"):
+    with pytest.raises(ParameterError, match=r"in 12 of the cases: .* needs 30"):
         surrogate_of(Findings(few.plan, few.cases[:12], ()), "peak_current")
     with pytest.raises(ParameterError, match="same in all cases"):
         surrogate_of(findings(lambda cases: 1.0), "peak_current")
@@ -119,6 +119,13 @@ def test_nothing_is_told_between_single_values(findings):
         surrogate({"supply.V_bat": 12.2})
     assert NOMINAL["supply.V_bat"] == 12.0  # none of the cases': it is taken for the nearest
     assert surrogate.nominal["supply.V_bat"] == 12.6
+
+
+def test_the_ends_that_cases_have_shown_are_known_however_they_are_rounded(findings):
+    surrogate = surrogate_of(findings(lambda cases: scaled(cases)[0]), "peak_current")
+    end = surrogate.high["motor.R_m"]
+    above = float(np.nextafter(end, 1.0))
+    assert surrogate({"motor.R_m": above}) == pytest.approx(surrogate({"motor.R_m": end}))
 
 
 def test_what_is_no_mapping_of_numbers_is_refused(findings):

@@ -57,9 +57,9 @@ def run_study(
     overrides
         Changes of the bench, as texts with units; kept with the study.
     cases
-        Cases in place of the file's, up to 10 million; more of them extend what is there, and of
-        those that were asked for so far what is not computed is taken back by fewer. Where the
-        folder has more than the file asks for, all are judged.
+        Cases in place of the file's, up to 10 million. More than were asked for so far extend what
+        is there, fewer take back those that are not computed. Where the folder has more than the
+        file asks for, all are judged.
     workers
         Processes; by default one a core where the work is worth their start.
     cluster

@@ -43,7 +43,7 @@ def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
     said = [
         f"{name.replace('_', ' ')} over what drives it most; {crosses}.",
         cases.caption("meet the limit", "miss it"),
-        f"Triangles at the upper edge: {lacking} cases without it, which miss the limit."
+        f"Triangles at the upper edge: cases without it ({lacking}), which miss the limit."
         if lacking else "",
         "Cases gather where failures are: shares of them are no probabilities."
         if findings.rare else "",
@@ -58,8 +58,11 @@ def parallel(findings: Findings) -> Block:
     met = np.all([j.met for j in findings.judgments], axis=0)
     cases = drawn_cases(met, LINES, LINES)
     thinned = cases.caption("meet all requirements", "miss one")
-    missed = "in front, those that miss a requirement"
-    said = missed if cases.all_missed else "all meet all requirements"
+    said = (
+        "all meet all requirements" if not cases.all_missed
+        else "in front, those that miss a requirement" if cases.all_met
+        else "all miss a requirement"
+    )  # fmt: skip
     text = f"Cases as lines; {said}. {thinned}" if thinned else f"Every case as a line; {said}."
     if not all(np.isfinite(findings.figure(j.demand.kpi)).all() for j in findings.judgments):
         text += " Where a case does not have a figure, its line goes to 'none'."

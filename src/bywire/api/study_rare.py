@@ -138,7 +138,7 @@ def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
     failure = each.failure
     if failure.state == "budget spent":
         so_far = f"it is no more probable than {failure.estimate.high:.2g}"
-        seen = f"{failure.failed} failing cases are too few for an estimate; "
+        seen = f"failing cases seen, too few for an estimate: {failure.failed}; "
         so_far = seen * bool(failure.failed) + so_far
         where = (
             "before the last level" if plan.design == SUBSET

@@ -18,7 +18,7 @@ from bywire.report.answer import Answer, use_case
 from bywire.report.document import Document, Section, TableBlock, spaced
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import amount, clean
-from bywire.studies.polynomial_chaos import require_numbers, surrogate_of
+from bywire.studies.polynomial_chaos import require_fittable, surrogate_of
 from bywire.studies.surrogate import Surrogate
 
 _POOR = 0.5  # share of the variance below which a surrogate is no use
@@ -152,7 +152,7 @@ def study_surrogates(
         do not show what lies between their points, and structural choices among what varies.
     """
     report = kept_study(folder)
-    require_numbers(report.plan)  # before values are read: those of a choice are no numbers
+    require_fittable(report.plan)  # before values are read: those of a choice are no numbers
     findings = report.findings
     quantities = {v.name: v for v in report.plan.varied}
     values: dict[str, float] = {}

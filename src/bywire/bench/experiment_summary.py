@@ -46,7 +46,7 @@ def summary_of(template: str, options: ParameterSet, varied: Collection[str] = (
     options
         The options.
     varied
-        Names of those that take several values, none of which is told.
+        Names of those that take several values: what is told is marked.
 
     Raises
     ------
@@ -59,8 +59,8 @@ def summary_of(template: str, options: ParameterSet, varied: Collection[str] = (
             pieces.append(text)
             if name is not None:
                 told = _told(known[name], _symbol(options, name), unit or "")
-                pieces.append(f"varied {name}" if name in varied else told)
-    except (KeyError, ValueError) as error:
+                pieces.append(f"{told} (varied)" if name in varied else told)
+    except (KeyError, TypeError, ValueError) as error:
         raise ModelError(
             f"summary {quoted(template)}: names of options are wanted in braces ({error})"
         ) from None
@@ -75,6 +75,8 @@ def _symbol(options: ParameterSet, name: str) -> str:
 
 def _told(value: Any, symbol: str, unit: str) -> str:
     """Return a value as a sentence has it: with its unit, words for a choice."""
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, str):
         return value.replace("-", " ")
     several = value if isinstance(value, tuple) else (value,)

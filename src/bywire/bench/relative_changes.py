@@ -60,7 +60,7 @@ def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
     spread |= {name: value for name, value in changes.items() if not _PATTERN.search(name)}
     for name, value in spread.items():
         if name in leaves and share_of(value) is not None:
-            require_share(name, str(value), leaves[name].unit.symbol)
+            refuse_share_of_temperature(name, str(value), leaves[name].unit.symbol)
     return {
         name: value if (share := share_of(value)) is None or name not in values
         else _scaled(name, value, share, values[name], name in leaves)
@@ -80,7 +80,7 @@ def share_of(value: object) -> float | None:
     return None if match is None else float(match[1].replace(" ", "")) / 100.0
 
 
-def require_share(name: str, text: str, symbol: str) -> None:
+def refuse_share_of_temperature(name: str, text: str, symbol: str) -> None:
     """Refuse a share of what has no natural zero: 5 % of 20 degC are 1 K to one, 15 K to another.
 
     Parameters

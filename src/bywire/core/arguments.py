@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import operator
 import os
+import reprlib
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from numbers import Real
@@ -13,6 +14,9 @@ from typing import Any
 import numpy as np
 
 from bywire.core.errors import ParameterError, quoted
+
+_LINES = reprlib.Repr()
+_LINES.maxstring = _LINES.maxother = 60  # characters of a value in a message
 
 
 def require_kinds(
@@ -48,7 +52,7 @@ def require_kinds(
         kinds = wanted.get(name, ())
         if kinds and not any(_KINDS[kind][1](value) for kind in kinds):
             said = " or ".join(_KINDS[kind][0] for kind in kinds if kind != "None")
-            given = repr(value) if isinstance(value, bool) else quoted(value)  # not as TOML has it
+            given = _LINES.repr(value)  # as Python has it, and not as a file
             raise ParameterError(f"{name} = {given}: {said} is wanted")
 
 

@@ -31,7 +31,9 @@ SOURCE: Final = "Published source, e.g. dardanelli2010."
 CAMPAIGN: Final = "Campaign file (TOML), or a campaign's name, e.g. motorcycle."
 LIFE: Final = "Life file (TOML), or the name of a life."
 LIFE_CHECK: Final = "Stops to run one by one as well, to check the projection."
-STUDY_CASES: Final = "Cases in place of the file's; more extend the study."
+STUDY_CASES: Final = (
+    "Cases in place of the file's; more extend the study, fewer take back what is not computed."
+)
 STUDY_FILE: Final = "Study file (TOML)."
 
 # Loops and sizes.

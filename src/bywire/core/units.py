@@ -47,7 +47,7 @@ _COMMON: dict[str, tuple[float, str]] = {
     "%": (1e-2, "1"),
     "": (1.0, "1"),
 }
-# Further ones that texts are written in: of those above, numbers read keep their last digits.
+# Further ones that texts are written in; they are read by pint, whose last digits stay.
 _WRITTEN: dict[str, tuple[float, str]] = {"km/h": (1.0 / 3.6, "m/s"), "kN": (1e3, "N")}
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*", re.DOTALL)
 # Names, products, quotients and small powers; nothing that would make pint compute. A separator

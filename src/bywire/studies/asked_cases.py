@@ -37,7 +37,7 @@ def with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPl
             require_extensible(plan, cases)
         return plan
     if plan.is_sampled or plan.sought is not None:
-        asked, computed = store.cases_of(plan)
+        asked, computed = store.asked_and_computed(plan)
         if cases is not None and cases < computed:
             raise ParameterError(
                 f"cases = {cases}: {store.folder} has {computed} already, and none are taken off: "

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bywire.bench.relative_changes import require_share, share_of
+from bywire.bench.relative_changes import refuse_share_of_temperature, share_of
 from bywire.bench.values import number, plain_text
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
@@ -109,14 +109,14 @@ class _Entry:
         share = share_of(text)
         if share is None:
             return self._number(key, text)
-        self._require_share(key, text)
+        self._refuse_share(key, text)
         return (1.0 + share) * self.nominal
 
     def width(self, key: str, of: float) -> float:
         """Return a width [SI] > 0; a share is of another value."""
         text = self._given(key)
         if isinstance(text, str) and text.strip().endswith("%"):
-            self._require_share(key, text)
+            self._refuse_share(key, text)
             width = abs(of) * parse(text, "1", f"{self.where}.{key}")
         else:
             width = self._number(key, text, difference_unit(self.leaf.unit.symbol))
@@ -131,8 +131,8 @@ class _Entry:
         """Return a value with its unit."""
         return shown(value, self.leaf.unit.symbol)
 
-    def _require_share(self, key: str, text: str) -> None:
-        require_share(f"{self.where}.{key}", text, self.leaf.unit.symbol)
+    def _refuse_share(self, key: str, text: str) -> None:
+        refuse_share_of_temperature(f"{self.where}.{key}", text, self.leaf.unit.symbol)
 
     def _given(self, key: str) -> Any:
         if key not in self.section:

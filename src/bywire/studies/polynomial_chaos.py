@@ -24,8 +24,7 @@ from bywire.studies.sought_design import SOUGHT
 from bywire.studies.surrogate import Polynomial, Surrogate
 
 LIBRARY = ("surrogates of studies", "studies")
-FEWEST = 30
-"""cases of which a surrogate may be made"""
+_FEWEST = 30  # cases of which a surrogate may be made
 _LARGEST = 4  # degree: with five quantities the fifth gains little, and takes ten times as long
 _FOLDS = 5  # a fifth of the cases is told by the others, in turn
 _LACKING = ("one-at-a-time", "corners", "morris", *SOUGHT)  # they show no more than some places
@@ -47,16 +46,16 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
         When OpenTURNS is not installed.
     """
     plan = findings.plan
-    require_numbers(plan)
+    require_fittable(plan)
     if kpi not in findings.units:
         raise unknown_name("key figure", kpi, findings.units)
     y = findings.figure(kpi)
     known = np.isfinite(y)
     columns = {v.name: np.asarray(findings.cases[v.name], dtype=float) for v in plan.varied}
     x, y = np.column_stack(list(columns.values()))[known], y[known]
-    if y.size < FEWEST:
+    if y.size < _FEWEST:
         raise ParameterError(
-            f"{y.size} cases have {kpi}: a surrogate needs {FEWEST} of them at least"
+            f"{kpi} is defined in {y.size} of the cases: a surrogate needs {_FEWEST} at least"
         )
     if np.ptp(y) == 0.0:
         raise ParameterError(f"{kpi} is the same in all cases: there is nothing to tell")
@@ -79,7 +78,7 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
     )  # fmt: skip
 
 
-def require_numbers(plan: StudyPlan) -> None:
+def require_fittable(plan: StudyPlan) -> None:
     """Refuse studies whose cases no polynomial goes through: see `surrogate_of`.
 
     Raises

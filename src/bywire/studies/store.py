@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import shlex
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -88,11 +89,11 @@ class StudyStore:
         except OSError as error:
             raise _unwritable(self.folder, error) from None
 
-    def cases_of(self, plan: StudyPlan) -> tuple[int, int]:
-        """Return for how many cases the folder was asked, and how many of them may be computed.
+    def asked_and_computed(self, plan: StudyPlan) -> tuple[int, int]:
+        """Return for how many cases the folder was asked, and how many of them are computed.
 
-        Both are zero where it does not hold this study. Of rare failures, what is computed is of
-        all requirements together, and what is asked for of each.
+        Both are zero where it does not hold this study. In designs that seek, both are of each
+        requirement: what is computed, of the one that has the most.
         """
         if not (self.folder / RECORD).exists():
             return 0, 0
@@ -100,7 +101,11 @@ class StudyStore:
         if known["digest"] != plan.digest:
             return 0, 0
         there = self.finished()
-        chunks = len(there) if plan.sought is not None else max(there, default=-1) + 1
+        if plan.sought is None:
+            chunks = max(there, default=-1) + 1
+        else:
+            turns = Counter(number % plan.sought.requirements for number in there)
+            chunks = max(turns.values(), default=0)
         return int(known["cases"]), min(int(known["cases"]), CHUNK * chunks)
 
     def require(self, plan: StudyPlan) -> dict[str, Any]:

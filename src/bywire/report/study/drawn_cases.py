@@ -45,7 +45,8 @@ class DrawnCases:
         if all(drawn == count for drawn, count, _ in kinds):
             return ""
         said = " and ".join(
-            f"{drawn} of {count} cases that {text}" if drawn < count else f"all {count} that {text}"
+            f"{drawn} of {count} cases that {text}" if drawn < count
+            else f"all that {text} ({count})"
             for drawn, count, text in kinds if count
         )  # fmt: skip
         return f"Drawn are {said}."

@@ -233,8 +233,8 @@ _DEFAULTS = Options(
 EXPERIMENT = Experiment(
     name="repeated-stops",
     assembly="two-wheeler-by-wire",
-    summary="{stops} stops from {v_0:km/h} at {deceleration} every {pause} with brakes that warm "
-    "up, then parked",
+    summary="repeated stops ({stops}) from {v_0:km/h} at {deceleration} every {pause} with brakes "
+    "that warm up, then parked",
     options=Options,
     defaults=_DEFAULTS,
     cases=cases,
