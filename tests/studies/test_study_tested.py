@@ -58,3 +58,12 @@ def test_a_study_says_which_bench_with_which_faults_and_changes_was_tested(study
     assert bench["changes"]["options.p_to"] == {"value": "30 bar", "instead_of": "37 bar"}
     (fault,) = bench["faults"]
     assert (fault["fault"], fault["onset"], fault["end"]) == ("pressure.stuck-at-last", 0.01, 0.015)
+
+
+def test_a_file_that_is_edited_while_its_cases_are_computed_changes_nothing(study, tmp_path):
+    path = study()
+    run = bywire.run_study(
+        path, tmp_path / "out", cases=64, progress=lambda *_: path.write_text("edited = true")
+    )
+    assert run.as_object()["bench"]["file"] == "bench.toml"
+    assert run.write(tmp_path / "report")
