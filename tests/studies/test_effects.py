@@ -57,12 +57,25 @@ def test_what_is_not_computed_yet_has_none(findings):
     assert [e.quantity for e in some.effects("peak_current")] == ["motor.R_m"]
 
 
+def test_what_takes_the_figure_away_comes_first(findings):
+    """A level without it misses what is required, however little the others move it."""
+    figure = findings.figure("peak_current").copy()
+    figure[-1] = math.nan  # of the choice, at its second value
+    lost = Findings(findings.plan, findings.cases.assign(peak_current=figure), ())
+    assert lost.drivers("peak_current") == ["adc.law", "motor.R_m", "motor.K_e"]
+    assert [e.lacking for e in lost.effects("peak_current")] == [1, 0, 0]
+    (tornado,) = (b for b in study_figures(lost, dict) if getattr(b, "name", "") == "tornado")
+    assert "A triangle: the figure is not defined at some" in tornado.caption
+    assert any(text.get_text() == "not defined at a level"
+               for text in tornado.figure.legends[0].get_texts())  # fmt: skip
+
+
 def test_effects_are_in_the_json(findings):
     said = findings_data(findings)["kpis"]["peak_current"]["effects"]
     assert list(said) == ["motor.R_m", "adc.law", "motor.K_e"]
     assert said["adc.law"] == {
         "unit": None, "values": ["ideal", "quantized"], "figures": [21.0, 20.0],
-        "swing": pytest.approx(1.0),
+        "swing": pytest.approx(1.0), "undefined": 0,
     }  # fmt: skip
     assert said["motor.R_m"]["swing"] == pytest.approx(4.0)
     assert len(said["motor.R_m"]["values"]) == len(said["motor.R_m"]["figures"]) == 3

@@ -64,9 +64,18 @@ def parallel(findings: Findings) -> Block:
         else "all miss a requirement"
     )  # fmt: skip
     text = f"Cases as lines; {said}. {thinned}" if thinned else f"Every case as a line; {said}."
-    if not all(np.isfinite(findings.figure(j.demand.kpi)).all() for j in findings.judgments):
+    drawn = _required(findings)
+    if not all(np.isfinite(findings.figure(name)).all() for name in drawn):
         text += " Where a case does not have a figure, its line goes to 'none'."
+    if absent := [j.demand.kpi for j in findings.judgments if j.demand.kpi not in drawn]:
+        text += f" No case has {', '.join(absent)}."
     return FigureBlock(partial(_parallel, findings, cases), text, "parallel")
+
+
+def _required(findings: Findings) -> list[str]:
+    """Return the required key figures that some case has."""
+    known = {each.name for each in findings.spreads}
+    return [j.demand.kpi for j in findings.judgments if j.demand.kpi in known]
 
 
 def _axis(findings: Findings, name: str) -> CaseAxis:
@@ -94,7 +103,7 @@ def _scatter(findings: Findings, name: str, cases: DrawnCases) -> Figure:
 def _parallel(findings: Findings, cases: DrawnCases) -> Figure:
     from bywire.report.study.parallel_coordinates import parallel_coordinates
 
-    figures = [each.demand.kpi for each in findings.judgments]
+    figures = _required(findings)
     ranked = [each for name in figures for each in findings.drivers(name)[:_DRIVERS]]
     varied = [v.name for v in findings.plan.varied]
     names = list(dict.fromkeys([*ranked, *varied]))[: max(_AXES - len(figures), 2)]

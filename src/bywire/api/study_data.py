@@ -22,6 +22,10 @@ def findings_data(findings: Findings) -> dict[str, Any]:
         "of": plan.total * (len(plan.judged_demands) if plan.sought else 1),
         "confidence": plan.confidence,
         "failed": len(findings.failures),
+        "reasons": [
+            {"why": why, "cases": len(rows), "first": findings.number(rows[0])}
+            for why, rows in findings.reasons.items()
+        ],
         "requirements": [
             _judgment_data(findings, each) for each in (findings.judgments if count else ())
         ],

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bywire.studies.effects import Effect
+    from bywire.studies.judgment import Judgment
 
 _PANELS = 4  # requirements whose convergence is drawn
 _SHARES = 100  # points of a convergence, spaced by equal ratios
@@ -78,7 +79,7 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
         blocks.append(FigureBlock(
             partial(_tornado, findings, effects),
             "How far each quantity alone moves the key figures from what the bench itself gives; "
-            f"marks are its levels, dotted the limit.{_on_gray(findings)}"
+            f"marks are its levels, dotted the limit.{_on_gray(findings)}{_on_edge(effects)}"
             f"{strongest(effects.values())}", "tornado",
         ))  # fmt: skip
     if findings.plan.sensitivity is not None:
@@ -88,8 +89,8 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
     if findings.judgments and findings.plan.is_sampled:
         blocks.append(FigureBlock(
             partial(_convergence, findings),
-            "Probability that a requirement is met, as the cases came in; dotted, what is wanted.",
-            "convergence",
+            "Probability that a requirement is met, as the cases came in; dotted, what is wanted."
+            f"{_on_others(findings)}", "convergence",
         ))  # fmt: skip
     if findings.judgments:
         blocks += [parallel(findings), *_overlays(findings, recordings)]
@@ -98,6 +99,12 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
 
 def _on_gray(findings: Findings) -> str:
     return " Gray: a choice, by name where it goes farthest." if _has_choices(findings) else ""
+
+
+def _on_edge(effects: Mapping[str, Sequence[Effect]]) -> str:
+    if not any(effect.lacking for each in effects.values() for effect in each):
+        return ""
+    return " A triangle: the figure is not defined at some of its levels."
 
 
 def _has_choices(findings: Findings) -> bool:
@@ -141,11 +148,23 @@ def _tornado(findings: Findings, effects: Mapping[str, Sequence[Effect]]) -> Fig
 def _convergence(findings: Findings) -> Figure:
     from bywire.report.study.convergence import convergence
 
-    shown = findings.judgments[:_PANELS]
+    shown = _converging(findings)[:_PANELS]
     return convergence(
         {j.demand.text: running_share(j.met, findings.plan.confidence, _SHARES) for j in shown},
         {j.demand.text: j.demand.probability for j in shown}, first=CHUNK,
     )  # fmt: skip
+
+
+def _converging(findings: Findings) -> list[Judgment]:
+    """Return requirements, those that want a probability and are not met before others."""
+    return sorted(
+        findings.judgments, key=lambda j: (j.demand.probability is None, j.outcome == "met")
+    )
+
+
+def _on_others(findings: Findings) -> str:
+    others = [judgment.demand.text for judgment in _converging(findings)[_PANELS:]]
+    return f" Not drawn: {'; '.join(others)}." if others else ""
 
 
 def _overlays(findings: Findings, recordings: Recordings) -> list[Block]:

@@ -20,7 +20,7 @@ from bywire.api.study_tables import (
     demand_table,
     effect_tables,
     influence_tables,
-    spread_table,
+    spread_blocks,
     unmoved,
     varied_table,
 )
@@ -162,7 +162,6 @@ class StudyRun(Answer):
         is_rare = bool(findings.rare)
         table = failure_table(findings) if is_rare else demand_table(findings)
         demands = TableBlock(table, width=120)
-        spreads = TableBlock(spread_table(findings), width=140)
         is_indexed = plan.sensitivity is not None
         drivers = (
             importance_tables(findings) if is_rare
@@ -173,7 +172,7 @@ class StudyRun(Answer):
         said = [*missing_indices(findings), *unmoved(findings)]
         unexplained = [Listing(said)] if said else []
         judged: list[Block] = [demands] if plan.demands else []
-        figures = [spreads] if findings.spreads else []
+        figures = spread_blocks(findings)
         texts = self._shown.texts()
         remarks = [*(f"Warning: {text}." for text in self.warnings), *self.notes]
         missing = failure_texts(findings, self._shown.named)

@@ -74,6 +74,7 @@ def _effect_data(effect: Effect) -> dict[str, Any]:
     return {
         "unit": effect.unit or None, "values": list(effect.values),
         "figures": effect.figures.tolist(), "swing": effect.swing,
+        "undefined": effect.lacking,
     }  # fmt: skip
 
 

@@ -58,7 +58,7 @@ def _worst(findings: Findings, judgment: Judgment) -> Cell:
     figures = findings.figure(kpi)
     known = np.flatnonzero(np.isfinite(figures))
     if not known.size:
-        return Cell("-")
+        return Cell("-" if judgment.worst is None else "not defined")
     value = float(figures[known[0] if judgment.worst is None else judgment.worst])
     return Cell(figure_text(findings, kpi, value), value=value)
 
@@ -103,6 +103,15 @@ def percent(value: float, of: Share) -> str:
     width = 100.0 * (of.high - of.low)
     digits = 0 if width >= 10 else 1 if width >= 1 else 2 if width >= 0.1 else 3
     return f"{100.0 * value:.{digits}f} %"
+
+
+def spread_blocks(findings: Findings) -> list[TableBlock | Listing]:
+    """Return the table of key figures, and which ones no case has; nothing where there are none."""
+    if not findings.spreads:
+        return []
+    absent = [name for name in findings.units if name not in {s.name for s in findings.spreads}]
+    said = [Listing([f"not defined in any case: {', '.join(absent)}"])] if absent else []
+    return [TableBlock(spread_table(findings), width=140), *said]
 
 
 def spread_table(findings: Findings) -> Table:
@@ -166,7 +175,7 @@ def effect_tables(findings: Findings) -> list[TableBlock]:
 def moving_effects(findings: Findings) -> dict[str, Sequence[Effect]]:
     """Return the effects on each of the key figures that matter, those that nothing moves apart."""
     each = {name: findings.effects(name) for name in shown_figures(findings)}
-    return {name: found for name, found in each.items() if any(e.swing for e in found)}
+    return {name: found for name, found in each.items() if any(e.swing or e.lacking for e in found)}
 
 
 def _effect_table(findings: Findings, name: str, effects: Sequence[Effect]) -> Table:

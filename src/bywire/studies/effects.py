@@ -51,10 +51,16 @@ class Effect:
         """How far the key figure goes."""
         return self.largest - self.least
 
+    @property
+    def lacking(self) -> int:
+        """At how many levels it is not defined."""
+        return int(np.count_nonzero(~np.isfinite(self.figures)))
+
 
 def effects(varied: Sequence[Varied], levels: int, columns: Sequence[Sequence[float | str]],
             figure: Array) -> list[Effect]:  # fmt: skip
-    """Return what each quantity does to a key figure, the largest swing first.
+    """Return what each quantity does to a key figure: the largest swing first, and before it the
+    quantities with which the figure is not defined any more.
 
     Parameters
     ----------
@@ -70,9 +76,9 @@ def effects(varied: Sequence[Varied], levels: int, columns: Sequence[Sequence[fl
     for each, column in zip(varied, columns, strict=True):
         end = begin + len(each.distribution.levels(levels))
         figures = figure[begin:end]
-        if figures.size == end - begin and np.isfinite(figures).any():
+        if figures.size == end - begin and np.isfinite([figure[0], *figures]).any():
             found.append(
                 Effect(each.name, each.unit, list(column[begin:end]), figures, float(figure[0]))
             )
         begin = end
-    return sorted(found, key=lambda effect: -effect.swing)
+    return sorted(found, key=lambda effect: (-effect.lacking, -effect.swing))

@@ -159,13 +159,16 @@ class Findings:
     def drivers(self, name: str) -> Sequence[str]:
         """Return the quantities that a key figure goes with, the strongest first.
 
-        By importance, by indices, or by the size of rank correlations and correlation ratios.
+        By importance, by indices, by what each does alone, or by the size of rank correlations and
+        correlation ratios.
         """
         if self.rare:
             return [i.quantity for each in self.rare if each.demand.kpi == name
                     for i in each.importance]  # fmt: skip
         if self.plan.sensitivity is not None:
             return [each.quantity for each in self.sensitivity(name).drivers]
+        if self.plan.design == ONE:
+            return [each.quantity for each in self.effects(name) if each.swing or each.lacking]
         return [each.quantity for each in self.influences(name) if each.strength]
 
     @cached_property

@@ -68,8 +68,12 @@ def _draw(axes: Axes, drivers: Drivers, factor: float) -> None:
         else [e.sigma] * 3  # sigma has no interval
         for e in drivers
     ])  # fmt: skip
-    is_distinct = [e.strength.low > 0.0 for e in drivers]
-    for values, shift, color in ((upper, 0.5, style.BLUE), (lower, -0.5, style.ORANGE)):
+    strong = [e.strength.low > 0.0 for e in drivers]
+    first = [e.first.low > 0.0 if isinstance(e, VarianceShares) else e.strength.low > 0.0
+             for e in drivers]  # fmt: skip
+    for values, shift, color, is_distinct in (
+        (upper, 0.5, style.BLUE, strong), (lower, -0.5, style.ORANGE, first)
+    ):  # fmt: skip
         axes.barh(
             places + shift * _THICK, values[:, 0], height=_THICK, xerr=_reach(values),
             color=[color if distinct else style.PALE for distinct in is_distinct],

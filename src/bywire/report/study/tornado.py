@@ -31,6 +31,7 @@ _PANEL = style.WIDTH - 2.5  # about how long an abscissa is [inch]
 _PALE = 0.6  # opacity of the bar of a choice
 _NAME_SIZE = 7.0  # of the name of a choice [points]
 _LONGEST = 24  # characters of it that have room
+_EDGE, _MARK = 0.99, 5.0  # where levels without the figure are marked, and how large [points]
 
 
 def tornado(
@@ -40,7 +41,7 @@ def tornado(
     """Draw the swings of every key figure around what the bench itself gives.
 
     Choices are neither below nor above: their bars are gray, with the names of the farthest ones at
-    the ends.
+    the ends. A triangle at the edge marks quantities that have a level without the figure.
 
     Parameters
     ----------
@@ -80,6 +81,9 @@ def tornado(
                     Patch(color=style.ORANGE, label="above")]  # fmt: skip
     if not all(units_shown):
         handles.append(Patch(color=style.GRAY, alpha=_PALE, label="choice"))
+    if any(effect.lacking for each in shown.values() for effect in each):
+        handles.append(Line2D([], [], color=style.ORANGE, marker=">", linestyle="",
+                              markersize=_MARK, label="not defined at a level"))  # fmt: skip
     if has_limit:
         handles.append(Line2D([], [], color=style.BLACK, linewidth=1.0, linestyle=":",
                               label="limit"))  # fmt: skip
@@ -100,6 +104,11 @@ def _draw(axes: Axes, effects: Sequence[Effect], scale: Scale) -> None:
             _draw_choice(axes, place, effect, scale)
         known = scale(effect.figures[np.isfinite(effect.figures)])
         axes.plot(known, np.full(known.size, place), "|", color=style.BLACK, markersize=6.0)
+        ends = scale(np.array([effect.least, effect.largest]))
+        axes.plot(ends, [place, place], color=style.BLACK, linewidth=0.6)  # between levels, too
+        if effect.lacking:
+            axes.plot(_EDGE, place, ">", color=style.ORANGE, markersize=_MARK, clip_on=False,
+                      transform=axes.get_yaxis_transform())  # fmt: skip
     axes.set_yticks(
         range(len(effects))[::-1], [style.plain(each.quantity, 40) for each in effects]
     )
@@ -109,6 +118,8 @@ def _draw(axes: Axes, effects: Sequence[Effect], scale: Scale) -> None:
 def _draw_choice(axes: Axes, place: int, effect: Effect, scale: Scale) -> None:
     """Draw how far the farthest choices go to either side, with their names."""
     middle = scale(effect.nominal)
+    if not np.isfinite(effect.figures).any():
+        return
     for end, side in ((np.nanargmin(effect.figures), "right"),
                       (np.nanargmax(effect.figures), "left")):  # fmt: skip
         at = scale(float(effect.figures[end]))

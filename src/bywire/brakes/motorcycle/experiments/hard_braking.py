@@ -60,7 +60,7 @@ def judged(options: Options) -> dict[str, Any]:
 EXPERIMENT = Experiment(
     name="hard-braking",
     assembly="motorcycle-brake",
-    summary="pressure step from {p_from} to {p_to} in closed loop, dither on (Fig. 7a)",
+    summary="pressure step from {p_from} to {p_to} in closed loop, as in Fig. 7a",
     options=Options,
     defaults=Options(p_from=6e5, p_to=37e5, duration=1.2, settle=1.0, smoothing=0.02),
     cases=cases,
