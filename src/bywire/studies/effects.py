@@ -59,8 +59,9 @@ class Effect:
 
 def effects(varied: Sequence[Varied], levels: int, columns: Sequence[Sequence[float | str]],
             figure: Array) -> list[Effect]:  # fmt: skip
-    """Return what each quantity does to a key figure: the largest swing first, and before it the
-    quantities with which the figure is not defined any more.
+    """Return what each quantity does to a key figure, the largest swing first.
+
+    Quantities with which the figure is not defined any more come before that.
 
     Parameters
     ----------
