@@ -17,8 +17,8 @@ KEYS = {
 
 def test_keys_of_studies_and_of_campaigns_alone_are_known():
     """One that a reader newly takes, and that the list here does not have, would mistake files."""
-    assert file_kinds._NEVER_IN_STUDIES == KEYS[CAMPAIGN] - KEYS[STUDY]
-    assert file_kinds._NEVER_IN_CAMPAIGNS == KEYS[STUDY] - KEYS[CAMPAIGN]
+    assert KEYS[CAMPAIGN] - KEYS[STUDY] == file_kinds._NEVER_IN_STUDIES
+    assert KEYS[STUDY] - KEYS[CAMPAIGN] == file_kinds._NEVER_IN_CAMPAIGNS
 
 
 def test_readers_know_what_their_files_cannot_do_without():
