@@ -19,7 +19,7 @@ from bywire.api.study_tables import influence_tables, spread_table
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.result import Result
 from bywire.report.document import FigureBlock, TableBlock
-from bywire.report.study.readable_axis import scale_of
+from bywire.report.readable_axis import scale_of
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.findings import Findings
 from bywire.studies.polynomial_chaos import surrogate_of

@@ -17,6 +17,7 @@ from bywire.bench.bench_file import flattened
 from bywire.bench.experiment import Experiment
 from bywire.bench.experiment_choice import experiment_of
 from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.option_names import OPTION
 from bywire.bench.requirements import Verdict
 from bywire.bench.result import Result
 from bywire.bench.result_folder import read_result
@@ -104,7 +105,7 @@ class ComparedRun:
         settings = {name: Setting(said[key], "s" if key == "step" else "1")
                  for key, name in _BENCH.items() if key in said}  # fmt: skip
         options = None if self.definition is None else self.definition.options
-        settings |= dict(_settings(_object(said, "options"), options, "options."))
+        settings |= dict(_settings(_object(said, "options"), options, OPTION))
         settings |= dict(self._stimuli())
         settings |= dict(_settings(_object(said, "parameters"), self._parameter_class))
         return settings | {key: Setting(said[key]) for key in _PROGRAM if key in said}

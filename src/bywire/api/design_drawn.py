@@ -10,6 +10,7 @@ from typing import Any
 from bywire.api.loop_case import LoopCase
 from bywire.api.study_tables import percent
 from bywire.api.verification_parts import Part, figure_text
+from bywire.bench.option_names import OPTION
 from bywire.core.errors import InputError, ParameterError, quoted
 from bywire.core.typing import Progress, silent
 from bywire.core.units import parse
@@ -25,7 +26,6 @@ DRAWN = 64
 """models that gains are chosen for, by default"""
 _JUDGES = 512  # further ones, that judge the gains
 _MOST = 1000
-_OPTION = "options."
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ def _require_fitting(case: LoopCase, plan: StudyPlan, file: str | Path) -> None:
             "brake: name a study of this one"
         )
     for name in (name for v in plan.varied for name in (v.name, *v.together)):
-        if name.startswith(_OPTION):
+        if name.startswith(OPTION):
             raise ParameterError(
                 f"{file}: {name} is an option of the experiment, which the loop does not have: "
                 "leave it out"

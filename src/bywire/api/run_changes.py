@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import flattened
+from bywire.bench.option_names import OPTION
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.provenance import Cited
@@ -49,7 +50,7 @@ def option_changes(bench: Bench) -> list[Change]:
     chosen = bench.definition
     following = {} if chosen.following is None else chosen.following(bench.par)
     changes = _changes(
-        bench.chosen_options, chosen.defaults.replace(following).flat(), "options.",
+        bench.chosen_options, chosen.defaults.replace(following).flat(), OPTION,
         f"default of {chosen.name}",
     )  # fmt: skip
     driven = [

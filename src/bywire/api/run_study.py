@@ -21,6 +21,7 @@ from bywire.core.typing import silent
 from bywire.report.answer import use_case
 from bywire.studies.asked_cases import require_extensible, with_cases
 from bywire.studies.findings import Findings
+from bywire.studies.meant_study import require_study_file
 from bywire.studies.plan import StudyPlan
 from bywire.studies.points import SPANNED
 from bywire.studies.rare_failures import rare_failures
@@ -86,6 +87,7 @@ def run_study(
         When interrupted; finished chunks stay.
     """
     source = Path(study)
+    require_study_file(source)
     store = StudyStore(Path(out) if out is not None else Path(source.stem))
     plan = with_cases(_by(engine, read_study(source, overrides)), store, cases)
     return _completed(Origin(source, overrides), plan, store, workers, cluster, progress)

@@ -14,6 +14,7 @@ from bywire.bench.experiment_choice import experiment_of
 from bywire.bench.extent import check_seed, checked_interval, checked_step
 from bywire.bench.faults.fault_section import Injection, injections
 from bywire.bench.faults.injected import checked_sections, with_faults
+from bywire.bench.option_names import OPTION, split_options
 from bywire.bench.relative_changes import settled
 from bywire.bench.requirements import check
 from bywire.bench.stimuli.registry import Stimulus
@@ -143,7 +144,7 @@ class Bench:
         parameters = PARAMETER_SETS.find(self.parameters).values.keys()
         for name in self.overrides:
             if name in options and name not in parameters:
-                raise unknown_name("parameter", name, [f"options.{name}"])
+                raise unknown_name("parameter", name, [f"{OPTION}{name}"])
 
     @cached_property
     def system(self) -> str:
@@ -187,7 +188,7 @@ class Bench:
 
         ``varied``: quantities that take several values, ``options.NAME`` among them.
         """
-        own = {name.removeprefix("options.") for name in varied if name.startswith("options.")}
+        _, own = split_options(dict.fromkeys(varied))
         return self.definition.summary_with(self.chosen_options, own)
 
     def cases(self) -> tuple[Case, ...]:

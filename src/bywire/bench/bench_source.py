@@ -11,7 +11,8 @@ from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.errors import ParameterError
-from bywire.data.file_kinds import BENCH, kind_of_file
+from bywire.data.file_kinds import BENCH
+from bywire.data.meant_file import first_there, near_files
 
 _NAME = re.compile(r"[a-z][a-z0-9-]*")
 _FOLDER = "benches"  # where bench files usually are
@@ -58,24 +59,21 @@ def meant_by(file: Path) -> str:
     The nearest is named, of the bench files beside it and of experiments; a file of its very name
     in a folder of benches goes before.
     """
-    try:
-        for folder in (file.parent / _FOLDER, file.parent / ".." / _FOLDER):
-            if (folder / file.name).is_file():
-                return f"did you mean {folder / file.name}?"
-        near = max(_near(file), default=None)
-    except (OSError, ValueError):  # ValueError: a null character in the path
-        near = None
+    folders = (file.parent / _FOLDER, file.parent / ".." / _FOLDER)
+    there = first_there(folder / file.name for folder in folders)
+    if there is not None:
+        return f"did you mean {there}?"
+    near = max(_near(file), default=None)
     if near is not None:
         return f"did you mean {near[1]}?"
     return "check the path, or name an experiment of 'bywire list'"
 
 
 def _near(file: Path) -> Iterator[tuple[float, str]]:
-    """Yield bench files and experiments that resemble a file, each with how much it does."""
-    for path in file.parent.glob("*.toml"):
-        likeness = SequenceMatcher(None, path.name, file.name).ratio()
-        if likeness >= _NEAR and kind_of_file(path) in ("", BENCH):
-            yield likeness, str(path)
+    """Yield bench files and experiments that a file resembles, each with how much it does."""
+    kinds = ("", BENCH)
+    files = near_files(file, kinds, [file.parent], _NEAR, with_ending=True)
+    yield from ((likeness, str(path)) for likeness, path in files)
     if _NAME.fullmatch(file.name):
         for name in {**EXPERIMENTS.all(), **_any_brake()}:
             likeness = SequenceMatcher(None, name, file.name).ratio()

@@ -13,11 +13,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
+from bywire.bench.option_names import OPTION, split_options
 from bywire.bench.result import Result
 from bywire.bench.running import Progress, judged, recording_of, static_recordings
 from bywire.bench.side_by_side import rounds
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, unestimated
-from bywire.bench.varied_choices import OPTION, choices_that_vary
+from bywire.bench.varied_choices import choices_that_vary
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.parameters import ParameterSet, leaf_fields
@@ -180,9 +181,9 @@ def _names_within(
     for name in names:
         if name not in choices:
             _varied_leaf(of, chosen, name)
-    options = tuple((n, n.removeprefix(OPTION)) for n in names if n.startswith(OPTION))
+    parameters, options = split_options({name: name for name in names})
     switches = frozenset(n for n in names if choices.get(n) == (False, True))
-    return _Names(tuple(n for n in names if not n.startswith(OPTION)), options, switches)
+    return _Names(tuple(parameters), tuple((n, own) for own, n in options.items()), switches)
 
 
 def changed(

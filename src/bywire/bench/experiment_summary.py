@@ -8,7 +8,8 @@ from typing import Any, Self
 
 from bywire.core.errors import ModelError, quoted
 from bywire.core.parameters import ParameterSet, leaf_fields
-from bywire.core.units import shown
+from bywire.core.quantities import display_unit
+from bywire.core.units import convert, unit_text
 
 
 class Summary(str):
@@ -80,10 +81,7 @@ def _told(value: Any, symbol: str, unit: str) -> str:
     if isinstance(value, str):
         return value.replace("-", " ")
     several = value if isinstance(value, tuple) else (value,)
-    ends = [
-        shown(float(each), symbol, unit).replace("**", "^").replace("*", " ")
-        for each in dict.fromkeys((min(several), max(several)))
-    ]
-    if len(ends) == 2:  # 2 to 100 Hz
-        ends[0] = ends[0].split(" ", 1)[0]
-    return " to ".join(ends)
+    unit = unit or display_unit(symbol)
+    ends = dict.fromkeys((min(several), max(several)))  # 2 to 100 Hz
+    numbers = " to ".join(f"{convert(float(each), symbol, unit):.6g}" for each in ends)
+    return f"{numbers} {unit_text(unit)}".rstrip()

@@ -26,7 +26,7 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.quantities import Unit
 from bywire.core.registry import Kind, instances
-from bywire.core.signals import Signal, signals_of, zeros
+from bywire.core.signals import Signal, signals_of, without_noise, zeros
 from bywire.core.typing import Array
 
 Course = Callable[[Array], Array]
@@ -297,7 +297,7 @@ def _known(model: Model, place: str) -> dict[str, Signal]:
     """Return the signals of a model that an option may name."""
     states = signals_of(model.State)
     stimuli, outputs = signals_of(model.Stimulus), signals_of(model.Output)
-    driven = {name: each for name, each in stimuli.items() if not name.startswith("noise_")}
+    driven = {name: stimuli[name] for name in without_noise(stimuli)}
     return {
         "friction": {name: states[name] for name in model.frictions},
         "state": states,

@@ -7,10 +7,8 @@ from functools import lru_cache
 from typing import Any
 
 from bywire.bench.bench import Bench
+from bywire.bench.option_names import OPTION
 from bywire.core.parameters import ParameterSet, choice_fields, choices_of
-
-OPTION = "options."
-"""what stands before the name of an option where parameters are named too"""
 
 
 def varied_choices(bench: Bench) -> Mapping[str, tuple[Any, ...]]:

@@ -13,6 +13,7 @@ from bywire.bench.faults.course import AT_ZERO
 from bywire.bench.faults.fault_section import Injection
 from bywire.bench.faults.injected import taps_of, touched
 from bywire.bench.faults.modes import Mode
+from bywire.bench.option_names import split_options
 from bywire.campaigns.criterion import Criterion
 from bywire.campaigns.residual import Residual, missed_ticks
 from bywire.core.catalog import PARAMETER_SETS
@@ -150,9 +151,7 @@ class CampaignPlan:
         made = []
         for k in range(self.healthy):
             given = {name: column[k] for name, column in drawn.items()}
-            options = {n.removeprefix("options."): v for n, v in given.items()
-                       if n.startswith("options.")}  # fmt: skip
-            parameters = {n: v for n, v in given.items() if not n.startswith("options.")}
+            parameters, options = split_options(given)
             made.append(self.bench.varied(parameters, options, self.bench.seed + k))
         return tuple(made)
 

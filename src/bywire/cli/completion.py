@@ -68,9 +68,10 @@ def varied(args: list[str], incomplete: str) -> Completed:
 def _keys_of(bench: str) -> dict[str, str]:
     """Return parameters, and options, of a bench with what they are now."""
     from bywire.bench.bench_file import read
+    from bywire.bench.option_names import OPTION
 
     made = read(bench, {})
-    options = {f"options.{name}": value for name, value in made.chosen_options.flat().items()}
+    options = {f"{OPTION}{name}": value for name, value in made.chosen_options.flat().items()}
     known = {**made.par.flat(), **options}
     return {name: f"{value!r} in SI" for name, value in known.items()}
 

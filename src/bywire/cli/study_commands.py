@@ -11,7 +11,6 @@ from typer.core import TyperGroup
 from bywire.cli.options import BenchChanges, JsonFlag, changes
 from bywire.cli.output_folder import folder
 from bywire.cli.show import show
-from bywire.cli.study_names import require_study_file
 from bywire.core import option_texts as texts
 from bywire.core.errors import ParameterError
 
@@ -79,7 +78,9 @@ def study_run_command(
     json: JsonFlag = False,
 ) -> None:
     """Run a bench for many values of what varies: probabilities, spread, what drives them."""
-    require_study_file(study)
+    from bywire.studies.meant_study import require_study_file
+
+    require_study_file(study)  # before a folder is made by its name
     from bywire.api.run_study import run_study
 
     place = out if out is not None else Path(study.stem)

@@ -1,17 +1,11 @@
-"""What is meant by a word behind ``bywire study``: a study file without its ending, perhaps."""
+"""What is meant by a word behind ``bywire study``: a sizing study, or perhaps a study file."""
 
 from __future__ import annotations
 
-import os
-from difflib import get_close_matches
 from pathlib import Path
 
 from bywire.core.brake import loaded_files
-from bywire.core.errors import FileError, UnknownNameError, unknown_name
-
-_ENDING = ".toml"
-_FOLDER = Path("studies")  # where study files usually are
-_NEAR = 0.8  # resemblance of a study file that was meant
+from bywire.core.errors import UnknownNameError, unknown_name
 
 
 def require_sizing(name: str) -> None:
@@ -22,11 +16,12 @@ def require_sizing(name: str) -> None:
     UnknownNameError
         With the command that runs the study file that was meant, or the nearest sizing studies.
     """
+    from bywire.studies.meant_study import meant_study
     from bywire.synthesis.study import STUDIES
 
     if STUDIES.get(name) is not None:
         return
-    file = _meant(Path(name))
+    file = meant_study(Path(name))
     if file is not None:
         raise UnknownNameError(
             f"unknown sizing study {name!r}: the study file {file} is run by 'bywire study run "
@@ -40,36 +35,3 @@ def require_sizing(name: str) -> None:
         "study run FILE'"
     )
     raise UnknownNameError(error if error.endswith("?") else error + more)
-
-
-def require_study_file(file: Path) -> None:
-    """Refuse a study file that is not there, before a folder is made by its name.
-
-    Raises
-    ------
-    FileError
-        With the one that was meant.
-    """
-    if os.path.isfile(file):
-        return
-    meant = _meant(file)
-    if meant is None and os.path.exists(file):
-        return  # whoever reads it says what it is
-    advice = "check the path" if meant is None else f"did you mean {meant}?"
-    raise FileError(f"cannot read study file {file}: there is none: {advice}")
-
-
-def _meant(file: Path) -> Path | None:
-    """Return the study file that is meant: its name, with its ending, is the same or near."""
-    from bywire.data.file_kinds import STUDY, kind_of_file
-
-    stem = file.name.removesuffix(_ENDING)
-    places = dict.fromkeys((file.parent, _FOLDER)) if file.parent == Path() else (file.parent,)
-    try:
-        there = {path.stem: path for place in places for path in sorted(place.glob(f"*{_ENDING}"))}
-    except (OSError, ValueError):  # ValueError: a null character in the path
-        return None
-    for near in get_close_matches(stem, there, n=3, cutoff=_NEAR):
-        if kind_of_file(there[near]) == STUDY:
-            return there[near]
-    return None

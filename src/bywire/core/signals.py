@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 from bywire.core.errors import ModelError, place_of
 
 T = TypeVar("T", bound=tuple[Any, ...])
+_NOISE = "noise_"  # what the name of a stimulus that is noise begins with
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,17 @@ def signal_in(annotation: Any) -> Signal | None:
     """Return the Signal of an annotation; None where it has none."""
     notes = getattr(annotation, "__metadata__", ())
     return next((note for note in notes if isinstance(note, Signal)), None)
+
+
+def without_noise(stimuli: Iterable[str]) -> list[str]:
+    """Return the names of stimuli that can be driven: all but the noise, which is drawn.
+
+    Examples
+    --------
+    >>> without_noise(["p_set", "noise_p"])
+    ['p_set']
+    """
+    return [name for name in stimuli if not name.startswith(_NOISE)]
 
 
 def places_of(model: Any) -> dict[str, type[NamedTuple]]:

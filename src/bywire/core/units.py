@@ -7,6 +7,7 @@ import re
 from functools import cache
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
+from bywire.core.clean_text import clean
 from bywire.core.errors import ParameterError, UnitError, quoted
 from bywire.core.quantities import display_unit
 
@@ -56,6 +57,8 @@ _POWER = r"[A-Za-zµμΩ%°]+(?:(?:\*\*|\^)-?\d|[²³])?"
 _FACTOR = rf"(?:{_POWER}|\({_POWER}(?: *[*·] *{_POWER})*\))"
 _UNIT = re.compile(rf"(?:1? */ *)?{_FACTOR}(?:(?: *[*/·] *| +){_FACTOR})*")
 _MOMENT = re.compile(r"(?<=N)m(s?)(?![A-Za-z])")  # Nm, kNm, Nms: pint knows N*m alone
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SIGNS = {"ohm": "Ω", "percent": "%", "degree": "°", "deg": "°", "degC": "°C"}
 _LONGEST = 100  # characters: no quantity is longer, and patterns stay quick on hostile text
 _WORDS = {"1": "a pure number", "delta_degC": "a temperature difference in K"}
 ICE = 273.15
@@ -238,6 +241,21 @@ def _converted(size: float, number: float) -> float:
 
 def _wanted(symbol: str) -> str:
     return _WORDS.get(symbol, symbol)
+
+
+def unit_text(symbol: str) -> str:
+    """Return a unit as people write it; empty for a pure number.
+
+    Examples
+    --------
+    >>> unit_text("N*m"), unit_text("m**3/s"), unit_text("1")
+    ('N·m', 'm³/s', '')
+    """
+    if symbol == "1":
+        return ""
+    raised = re.sub(r"\*\*(-?\d+)", lambda m: m[1].translate(_SUPERSCRIPTS), clean(symbol))
+    dotted = re.sub(r"\s*\*\s*", "·", raised)
+    return re.sub(r"[A-Za-z]+", lambda m: _SIGNS.get(m[0], m[0]), dotted)
 
 
 def shown(value: float, symbol: str, unit: str = "") -> str:

@@ -15,7 +15,7 @@ from bywire.bench.result import Result
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.line_role import Role
-from bywire.report.study.readable_axis import scale_of
+from bywire.report.readable_axis import scale_of
 from bywire.report.wording import in_display_unit
 
 _COLUMNS = 2

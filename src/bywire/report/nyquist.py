@@ -14,6 +14,7 @@ from bywire.analysis.loop_curves import Family, LoopCurve, disk
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.curve_family import draw_family, value_bar
+from bywire.report.legend import legend_outside
 
 _LEFT, _RIGHT, _HALF = -3.2, 1.6, 1.9  # what of the plane is shown
 
@@ -42,8 +43,7 @@ def nyquist(family: Family) -> Figure:
     axes.set_xlabel("real part of L [-]")
     axes.set_ylabel("imaginary part of L [-]")
     value_bar(figure, [axes], family)
-    figure.legend(handles=axes.get_legend_handles_labels()[0], loc="outside upper left", ncols=3,
-                  frameon=False, fontsize=style.TEXT_SIZE)  # fmt: skip
+    legend_outside(figure, axes.get_legend_handles_labels()[0], columns=3)
     return figure
 
 

@@ -14,6 +14,7 @@ from bywire.analysis.linear.rates import STILL
 from bywire.analysis.locus import Border, Locus
 from bywire.core.typing import Array
 from bywire.report import style
+from bywire.report.legend import legend_outside
 from bywire.report.pole_map import slow_radius
 from bywire.report.s_plane import draw_plane, planes, shown_radius
 from bywire.report.wording import amount, in_display_unit
@@ -52,8 +53,7 @@ def root_locus(locus: Locus, bandwidth: float) -> Figure:
     bar.ax.tick_params(labelsize=style.TEXT_SIZE)
     bar.set_label(style.axis_label(locus.name, locus.unit), fontsize=style.TEXT_SIZE)
     handles, _ = panels[0].get_legend_handles_labels()
-    figure.legend(handles=handles, loc="outside upper left", frameon=False,
-                  fontsize=style.TEXT_SIZE)  # fmt: skip
+    legend_outside(figure, handles, columns=1)
     return figure
 
 

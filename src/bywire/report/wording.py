@@ -3,46 +3,15 @@
 from __future__ import annotations
 
 import math
-import re
-import unicodedata
 from typing import TypeVar
 
+from bywire.core.clean_text import clean as clean
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import display_unit
 from bywire.core.units import convert, difference_unit
+from bywire.core.units import unit_text as unit_text
 
 F = TypeVar("F")
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_NAMES = {"ohm": "Ω", "percent": "%", "degree": "°", "deg": "°", "degC": "°C"}
-
-
-def clean(text: object) -> str:
-    """Return text without what could disturb a page, a figure or a terminal.
-
-    White space becomes a plain space (line breaks stay); control characters, marks that reverse
-    the reading direction and broken code points become the replacement character.
-
-    Examples
-    --------
-    >>> clean("brake" + chr(27) + "[31m test")
-    'brake�[31m test'
-    """
-    return "".join(map(_clean_character, str(text)))
-
-
-def unit_text(symbol: str) -> str:
-    """Return a unit as people write it; empty for a pure number.
-
-    Examples
-    --------
-    >>> unit_text("N*m"), unit_text("m**3/s"), unit_text("1")
-    ('N·m', 'm³/s', '')
-    """
-    if symbol == "1":
-        return ""
-    raised = re.sub(r"\*\*(-?\d+)", lambda m: m[1].translate(_SUPERSCRIPTS), clean(symbol))
-    dotted = re.sub(r"\s*\*\s*", "·", raised)
-    return re.sub(r"[A-Za-z]+", lambda m: _NAMES.get(m[0], m[0]), dotted)
 
 
 def in_display_unit(value: F, symbol: str) -> tuple[F, str]:
@@ -215,11 +184,3 @@ def range_text(leaf: Leaf) -> str:
 def duration(seconds: float) -> str:
     """Return a time span in ms or s, whichever reads better."""
     return f"{1e3 * seconds:.3g} ms" if abs(seconds) < 1.0 else f"{seconds:.4g} s"
-
-
-def _clean_character(character: str) -> str:
-    if character == "\n" or character.isprintable():
-        return character
-    if character in "\t\r" or unicodedata.category(character) == "Zs":
-        return " "
-    return "\N{REPLACEMENT CHARACTER}"

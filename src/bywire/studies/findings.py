@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import limit_of
 from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.magnitude import size_of
 from bywire.core.typing import Array
 from bywire.studies.choice_influence import ChoiceInfluence, choice_influence
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
@@ -80,8 +81,7 @@ class Findings:
 
     def size(self, name: str) -> float:
         """Return the largest magnitude of a key figure in any case; 0 where none has it."""
-        values = self.figure(name)
-        return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+        return size_of(self.figure(name))
 
     @cached_property
     def judgments(self) -> tuple[Judgment, ...]:

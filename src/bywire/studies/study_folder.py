@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bywire.core.errors import FileError
 from bywire.data.file_kinds import STUDY, kind_of_file
+from bywire.data.meant_file import first_there
 
 RECORD = "study.json"
 """file that says which study a folder holds"""
@@ -23,13 +24,13 @@ def require_no_file(folder: Path) -> None:
     try:
         if not folder.is_file():
             return
-        near = (Path(folder.stem), _RESULTS / folder.stem, folder.parent)
-        there = next((str(each) for each in near if (each / RECORD).is_file()), "")
     except (OSError, ValueError):  # ValueError: a null character in the path
         return
+    near = (Path(folder.stem), _RESULTS / folder.stem, folder.parent)
+    there = first_there(each / RECORD for each in near)
     is_study = kind_of_file(folder) == STUDY
     advice = (
-        f"did you mean {there}?" if there
+        f"did you mean {there.parent}?" if there is not None
         else f"'bywire study run {folder}' makes one" if is_study
         else "name the one that 'bywire study run' has written"
     )  # fmt: skip

@@ -9,7 +9,8 @@ from typing import Any
 
 from bywire.bench.bench import Bench
 from bywire.bench.ensemble import varied_leaf
-from bywire.bench.varied_choices import OPTION, varied_choices
+from bywire.bench.option_names import OPTION
+from bywire.bench.varied_choices import varied_choices
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import leaf_fields
 from bywire.studies.admissible import require_following

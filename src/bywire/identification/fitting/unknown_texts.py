@@ -13,7 +13,7 @@ from bywire.bench.values import number
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.parameters import ParameterSet, leaf_fields
-from bywire.core.signals import signals_of
+from bywire.core.signals import signals_of, without_noise
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, shown, split
 from bywire.identification.fitting.question import Question
@@ -73,7 +73,7 @@ def _bare(
     """Return an unknown without range and prior."""
     if name.startswith(_STIMULUS):
         stimuli = signals_of(case.model.Stimulus)
-        driven = [k for k in stimuli if not k.startswith("noise_")]
+        driven = without_noise(stimuli)
         if name.removeprefix(_STIMULUS) not in driven:
             raise unknown_name("input", name, [f"{_STIMULUS}{k}" for k in driven])
         signal = stimuli[name.removeprefix(_STIMULUS)]

@@ -12,7 +12,7 @@ import xarray as xr
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case, as_run
 from bywire.core.errors import ParameterError, unknown_name, unknown_of_few
-from bywire.core.signals import Signal, signals_of
+from bywire.core.signals import Signal, signals_of, without_noise
 from bywire.identification.fitting.bench_fit import BenchFit
 from bywire.identification.fitting.output_noise import noise_given
 from bywire.identification.fitting.question import BenchMethod, Options, Question
@@ -66,7 +66,7 @@ def simulated(bench: Bench, question: Question, options: Options, seed: int) -> 
         noisy = values + random.normal(0.0, sigma, values.size)
         rows[name] = ("time", noisy, _attrs(known[name]))
     stimuli, given = signals_of(run.model.Stimulus), case.stimulus(t)
-    driven = question.inputs or {n: n for n in given if not n.startswith("noise_")}
+    driven = question.inputs or {n: n for n in without_noise(given)}
     for name, signal in driven.items():
         values = np.asarray(given.get(name, np.zeros(t.size)), dtype=float)
         rows[signal] = ("time", np.broadcast_to(values, t.shape), _attrs(stimuli[name]))
@@ -101,7 +101,7 @@ def on(bench: Bench, question: Question) -> Method:
     _require_known(case, question)
     unknowns_of(case, bench.par, question)
     stimuli, outputs = signals_of(case.model.Stimulus), signals_of(case.model.Output)
-    driving = [name for name in stimuli if not name.startswith("noise_")]
+    driving = without_noise(stimuli)
     measured = {name: outputs[name].unit for name in question.noise}
     for name, text in question.noise.items():
         if text:
@@ -145,7 +145,7 @@ def _require_known(case: Case, question: Question) -> None:
             "no output is measured: give --output SIGNAL, once for each of the model's outputs "
             f"that the record has, for instance {', '.join(list(outputs)[:6])}"
         )
-    driven = [name for name in stimuli if not name.startswith("noise_")]
+    driven = without_noise(stimuli)
     states = case.model.State._fields
     for kind, names, known, refused in (
         ("output", question.noise, outputs, unknown_name),

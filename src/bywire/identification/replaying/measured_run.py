@@ -23,7 +23,7 @@ from bywire.core.errors import (
     unknown_of_few,
 )
 from bywire.core.parameters import leaf_fields
-from bywire.core.signals import signals_of
+from bywire.core.signals import signals_of, without_noise
 from bywire.core.typing import Array
 from bywire.identification.measured import as_even
 from bywire.identification.output_error import Between, even_interval
@@ -153,7 +153,7 @@ def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> d
     stimuli, there = signals_of(case.model.Stimulus), [str(name) for name in data.data_vars]
     if wanted is None:
         wanted = {name: name for name in there if name in stimuli}
-    driven = [name for name in stimuli if not name.startswith("noise_")]
+    driven = without_noise(stimuli)
     if not wanted:
         raise ParameterError(
             f"nothing measured drives the model: give --input STIMULUS=SIGNAL with one of "

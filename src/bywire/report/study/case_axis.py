@@ -10,7 +10,7 @@ from matplotlib.axis import Axis
 
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.study.readable_axis import CHARACTER, Scale, few_labels, scale_of
+from bywire.report.readable_axis import CHARACTER, Scale, few_labels, scale_of
 
 _JITTER = 0.3  # how far points of a choice lie from its place, of the distance of two
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # its multiples are spread evenly, however many there are

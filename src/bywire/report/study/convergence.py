@@ -8,8 +8,9 @@ from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
 from bywire.report import style
+from bywire.report.legend import legend_outside
 from bywire.report.line_role import Role
-from bywire.report.study.readable_axis import few_labels, write_out
+from bywire.report.readable_axis import few_labels, write_out
 from bywire.studies.statistics import Share
 
 _MARGIN = 8.0  # shown at most of an interval, in what the wanted probability leaves to failure
@@ -66,8 +67,9 @@ def convergence(
     else:
         few_labels(last.xaxis, style.WIDTH - 1.0)
     last.set_xlabel("cases [-]")
-    figure.legend(list(entries.values()), list(entries), loc="outside upper left", ncols=3,
-                  frameon=False, fontsize=style.TEXT_SIZE)  # fmt: skip
+    for text, artist in entries.items():
+        artist.set_label(text)
+    legend_outside(figure, list(entries.values()), columns=3)
     return figure
 
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.line_role import Role
-from bywire.report.study.readable_axis import few_labels, scale_of
+from bywire.report.readable_axis import few_labels, scale_of
 
 
 @dataclass(frozen=True)

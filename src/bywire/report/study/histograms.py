@@ -12,17 +12,17 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 
+from bywire.core.magnitude import size_of
 from bywire.core.typing import Array
 from bywire.report import style
+from bywire.report.legend import legend_outside
 from bywire.report.line_role import Role
-from bywire.report.study.legend import legend_outside
-from bywire.report.study.readable_axis import (
+from bywire.report.readable_axis import (
     beyond,
     few_labels,
     limit_text,
     name_beyond,
     scale_of,
-    size_of,
 )
 
 _COLUMNS = 2

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from bywire.report import style
+from bywire.report.legend import legend_outside
 from bywire.report.study.drawn_cases import BARS
-from bywire.report.study.legend import legend_outside
 from bywire.studies.choice_influence import ChoiceInfluence
 from bywire.studies.statistics import Influence
 

@@ -13,9 +13,9 @@ from matplotlib.lines import Line2D
 
 from bywire.core.typing import Array
 from bywire.report import style
+from bywire.report.legend import legend_outside
 from bywire.report.study.case_axis import CaseAxis
 from bywire.report.study.drawn_cases import DrawnCases
-from bywire.report.study.legend import legend_outside
 
 _MANY = 100  # lines from which on they are translucent
 _NONE = 1.3  # where cases are that do not have a figure, in lengths of an axis

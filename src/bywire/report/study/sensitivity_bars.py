@@ -11,9 +11,9 @@ from matplotlib.patches import Patch
 
 from bywire.core.typing import Array
 from bywire.report import style
+from bywire.report.legend import legend_outside
+from bywire.report.readable_axis import difference_scale
 from bywire.report.study.drawn_cases import BARS
-from bywire.report.study.legend import legend_outside
-from bywire.report.study.readable_axis import difference_scale
 from bywire.studies.sensitivity import ElementaryEffects, VarianceShares
 
 Drivers = Sequence[VarianceShares] | Sequence[ElementaryEffects]

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from bywire.core.magnitude import size_of
 from bywire.report import style
-from bywire.report.study.drawn_cases import BARS
-from bywire.report.study.legend import legend_outside
-from bywire.report.study.readable_axis import (
+from bywire.report.legend import legend_outside
+from bywire.report.readable_axis import (
     CHARACTER,
     Scale,
     beyond,
@@ -22,8 +22,8 @@ from bywire.report.study.readable_axis import (
     limit_text,
     name_beyond,
     scale_of,
-    size_of,
 )
+from bywire.report.study.drawn_cases import BARS
 from bywire.studies.effects import Effect
 
 _BAR = 0.28  # height of a quantity [inch]

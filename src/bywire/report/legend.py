@@ -14,10 +14,11 @@ _COLUMNS = 4  # that have room
 
 
 def legend_outside(
-    figure: Figure, handles: Sequence[Artist], place: Literal["left", "right"] = "left"
-) -> None:
+    figure: Figure, handles: Sequence[Artist], place: Literal["left", "right"] = "left", *,
+    columns: int = _COLUMNS,
+) -> None:  # fmt: skip
     """Put one legend above all panels of a figure, at its left or right end."""
     figure.legend(
-        handles=list(handles), ncols=_COLUMNS, frameon=False, fontsize=style.TEXT_SIZE,
+        handles=list(handles), ncols=columns, frameon=False, fontsize=style.TEXT_SIZE,
         loc="outside upper left" if place == "left" else "outside upper right",
     )  # fmt: skip

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FixedLocator, MaxNLocator, ScalarFormatter
 
+from bywire.core.magnitude import size_of
 from bywire.core.typing import Array
 from bywire.core.units import convert, difference_unit
 from bywire.report import style
@@ -71,11 +72,6 @@ def scale_of(values: Array, symbol: str) -> Scale:
         return plain
     power = 3 * math.floor(math.log10(largest) / 3.0)
     return Scale(plain.factor * 10.0**-power, f"{unit_text(f'10**{power}')} {plain.unit}".strip())
-
-
-def size_of(values: Array) -> float:
-    """Return the largest magnitude of values; 0 without any."""
-    return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
 
 
 def difference_scale(size: float, symbol: str) -> Scale:
