@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.readable_axis import few_labels, scale_of
+from bywire.report.readable_axis import few_labels
 from bywire.report.study.case_axis import CaseAxis, choice_axis
 from bywire.report.study.convergence import convergence
 from bywire.report.study.drawn_cases import LINES, DrawnCases, drawn_cases
@@ -91,23 +91,6 @@ def test_labels_of_a_histogram_never_touch(middle: float, spread: float, unit: s
     assert_readable(drawn(histograms({
         name: Spread(values, unit, middle) for name in ("share_sat_current", "share_sat_duty")
     })))  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("largest", "symbol", "unit", "shown"),
-    [
-        (0.0686, "s", "ms", 68.6), (1.2, "s", "s", 1.2), (25e5, "Pa", "bar", 25.0),
-        (773.0, "Pa", "10⁻³ bar", 7.73), (3e-5, "kg*m**2", "10⁻⁶ kg·m²", 30.0),
-        (2e6, "1", "10⁶", 2.0), (0.0, "1", "", 0.0), (6.2, "%", "%", 6.2),
-        (41.2, "m", "m", 41.2), (4e-3, "m", "mm", 4.0), (373.15, "K", "°C", 100.0),
-    ],
-)  # fmt: skip
-def test_scales_spare_the_reader_powers_of_ten(
-    largest: float, symbol: str, unit: str, shown: float
-) -> None:
-    scale = scale_of(np.array([-0.1 * largest, np.nan, largest]), symbol)
-    assert scale.unit == unit
-    assert scale(largest) == pytest.approx(shown, rel=1e-12)
 
 
 def test_a_histogram_names_a_limit_that_lies_far_off() -> None:

@@ -175,7 +175,12 @@ class Findings:
     def failures(self) -> Mapping[int, str]:
         """Row -> why the case has no result."""
         texts = self._texts(FAILURE)
-        return {k: texts[k] for k in np.flatnonzero(texts != "").tolist()}
+        return {k: texts[k] for k in np.flatnonzero(self._failed).tolist()}
+
+    @cached_property
+    def _failed(self) -> NDArray[np.bool_]:
+        """Whether each case has no result, shape (cases,): texts of a million are told once."""
+        return np.asarray(self._texts(FAILURE) != "")
 
     @property
     def reasons(self) -> Mapping[str, Sequence[int]]:
@@ -248,8 +253,7 @@ class Findings:
 
     def _judgment(self, demand: Demand) -> Judgment:
         kpi = demand.kpi
-        failed = self._texts(FAILURE) != ""
         return judgment_of(
-            demand, self.units[kpi], self.figure(kpi), failed, self._error(kpi),
+            demand, self.units[kpi], self.figure(kpi), self._failed, self._error(kpi),
             self.plan.confidence,
         )  # fmt: skip

@@ -1,0 +1,131 @@
+"""Who computes the chunks of a study changes no bit of them: processes, pools, a cluster."""
+
+from __future__ import annotations
+
+import re
+import signal
+import sys
+import time
+import warnings
+from functools import partial
+from multiprocessing import active_children
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bywire.core.errors import FileError, ParameterError, RunError
+from bywire.studies.cluster import CLUSTER_MEMORY, CLUSTER_SETTINGS, Cluster
+from bywire.studies.executor import InProcess, Pool, executor_of
+from bywire.studies.store import Origin, StudyStore
+from bywire.studies.study_file import read_study
+
+
+@pytest.mark.parametrize("is_copied", [False, True], ids=["begun", "copied"])
+def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(
+    study, tmp_path, monkeypatch, is_copied
+):
+    """Processes end as after Ctrl-C: what they are at may take long."""
+    if is_copied and sys.platform != "linux":
+        pytest.skip("processes are copied on Linux alone")
+    monkeypatch.setattr("bywire.studies.executor.may_copy", lambda: is_copied)
+    plan = read_study(study())
+    alone, shared = (StudyStore(tmp_path / name) for name in ("alone", "shared"))
+    for store in (alone, shared):
+        store.open(plan, Origin(tmp_path / "study.toml"))
+    for chunk, columns in InProcess().computed(plan, [2, 0, 1]):  # in whatever order
+        alone.write(chunk, columns, {})
+    computing = Pool(2).computed(plan, range(100))
+    while not all(shared.path(k).exists() for k in range(3)):
+        shared.write(*next(computing), {})
+    workers = active_children()
+    assert workers
+    computing.close()
+    pd.testing.assert_frame_equal(alone.read(3), shared.read(3), check_exact=True)
+    anew = StudyStore(shared.folder)  # from its files
+    pd.testing.assert_frame_equal(alone.read(3), anew.read(3), check_exact=True)
+    if sys.platform == "win32":
+        return  # signals of POSIX
+    until = time.monotonic() + 10.0  # the pool's own thread may wait for them too
+    while any(each.exitcode is None for each in workers) and time.monotonic() < until:
+        time.sleep(0.01)
+    assert {each.exitcode for each in workers} == {-signal.SIGTERM}
+
+
+@pytest.mark.parametrize("kind", ["pool", "alone"])
+def test_what_stands_beside_chunks_warns_and_fails_where_it_was_asked(study, monkeypatch, kind):
+    if kind == "pool" and sys.platform != "linux":
+        pytest.skip("processes are copied on Linux alone")
+    monkeypatch.setattr("bywire.studies.executor.may_copy", lambda: True)
+    plan = read_study(study())
+    with (Pool(1) if kind == "pool" else InProcess()).opened(plan) as compute:
+        with pytest.warns(UserWarning, match="coarse"):
+            assert compute.beside(partial(warnings.warn, "coarse")).result() is None
+        if kind == "pool":  # the other fails at once
+            failing = compute.beside(partial(read_study, "nowhere.toml"))
+            assert [chunk for chunk, _ in compute([0])] == [0]
+            with pytest.raises(FileError, match="nowhere"):
+                failing.check()
+
+
+def test_the_page_says_how_a_cluster_is_best_started():
+    config = pytest.importorskip("dask").config
+    pytest.importorskip("distributed")
+    page = (Path(__file__).parents[2] / "docs/studies.md").read_text(encoding="utf-8")
+    said = dict(re.findall(r"^export (DASK_DISTRIBUTED\w+)=(\w+)$", page, re.M))
+    read = config.collect_env(said)
+    assert len(said) == len(CLUSTER_SETTINGS)
+    for name, value in CLUSTER_SETTINGS.items():
+        assert config.get(name) != value  # there is such a setting, and it is another one
+        assert config.get(name, config=read) == value
+    memory = dict(re.findall(r"^export (MALLOC_\w+)=(\d+)$", page, re.M))
+    assert {name: int(value) for name, value in memory.items()} == CLUSTER_MEMORY
+    known = config.get("distributed.nanny.pre-spawn-environ")
+    assert int(known["MALLOC_TRIM_THRESHOLD_"]) < CLUSTER_MEMORY["MALLOC_TRIM_THRESHOLD_"]
+
+
+def test_a_cluster_computes_the_same_until_its_workers_are_gone(study):
+    distributed = pytest.importorskip("distributed")
+    plan = read_study(study())
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0"
+    ) as cluster:
+        ((_, theirs),) = Cluster(cluster.scheduler_address).computed(plan, [1])
+        with Cluster(cluster.scheduler_address).opened(plan) as compute:
+            given = compute(range(64))
+            next(given)
+            cluster.scale(0)
+            with pytest.raises(RunError, match=r"lost its workers.*resume the study"):
+                list(given)
+    ((_, ours),) = InProcess().computed(plan, [1])
+    for name, column in ours.items():
+        np.testing.assert_array_equal(column, theirs[name])
+
+
+def test_a_cluster_that_is_not_there_is_named(study, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("bywire.studies.cluster._SECONDS", 0.5)
+    with pytest.raises(RunError, match=r"no cluster answers at 'tcp://192\.0\.2\.1:9'"):
+        next(iter(Cluster("tcp://192.0.2.1:9").computed(read_study(study()), [0])))
+
+
+def test_who_computes_is_chosen_by_the_work(monkeypatch):
+    assert isinstance(executor_of(None, "", 2), InProcess)
+    with monkeypatch.context() as copied:
+        copied.setattr("bywire.studies.executor.os.cpu_count", lambda: 2)
+        copied.setattr("bywire.studies.executor.may_copy", lambda: True)
+        assert isinstance(executor_of(None, "", 1), InProcess)
+        assert isinstance(executor_of(None, "", 2), Pool)
+    assert isinstance(executor_of(1, "", 100), InProcess)
+    assert isinstance(executor_of(3, "", 100), Pool)
+    with pytest.raises(ParameterError, match="workers = 0"):
+        executor_of(0, "", 1)
+    with pytest.raises(ParameterError, match="the cluster's own"):
+        executor_of(2, "tcp://host:8786", 1)
+    alone = executor_of(None, "", 1000, engine="cuda")
+    assert isinstance(alone, InProcess)
+    assert alone.together > 1
+    for workers, cluster in ((4, ""), (None, "tcp://host:8786")):
+        with pytest.raises(ParameterError, match="one graphics processor: leave out"):
+            executor_of(workers, cluster, 1000, engine="cuda")
