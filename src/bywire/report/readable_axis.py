@@ -1,4 +1,4 @@
-"""Axes of figures of studies: readable units, labels that never touch, limits that lie far off."""
+"""Axes of figures: readable units, labels that never touch, limits that lie far off."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FixedLocator, MaxNLocator, ScalarFormatter
 
-from bywire.core.magnitude import size_of
 from bywire.core.typing import Array
 from bywire.core.units import convert, difference_unit
 from bywire.report import style
@@ -22,6 +21,17 @@ CHARACTER = 0.62 * style.TEXT_SIZE / 72.0
 """width of a digit [inch], rounded off"""
 _GAP = 2  # characters between two labels, at least
 _PLAIN = (1e-2, 1e5)  # the largest magnitude that is written without a power of ten
+
+
+def size_of(values: Array) -> float:
+    """Return the largest magnitude of values; 0 without any that is finite.
+
+    Examples
+    --------
+    >>> size_of(np.array([1.0, -3.0, np.nan])), size_of(np.array([]))
+    (3.0, 0.0)
+    """
+    return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
 
 
 @dataclass(frozen=True)

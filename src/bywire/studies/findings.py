@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import limit_of
 from bywire.core.errors import ParameterError, unknown_name
-from bywire.core.magnitude import size_of
 from bywire.core.typing import Array
 from bywire.studies.choice_influence import ChoiceInfluence, choice_influence
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
@@ -81,7 +80,13 @@ class Findings:
 
     def size(self, name: str) -> float:
         """Return the largest magnitude of a key figure in any case; 0 where none has it."""
-        return size_of(self.figure(name))
+        self._require(name)
+        return self._sizes.get(name, 0.0)
+
+    @cached_property
+    def _sizes(self) -> Mapping[str, float]:
+        """Largest magnitude of every key figure: every cell of a table asks for it."""
+        return {s.name: max(abs(s.least), abs(s.largest)) for s in self.spreads}
 
     @cached_property
     def judgments(self) -> tuple[Judgment, ...]:

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 
-from bywire.core.magnitude import size_of
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.legend import legend_outside
@@ -23,6 +22,7 @@ from bywire.report.readable_axis import (
     limit_text,
     name_beyond,
     scale_of,
+    size_of,
 )
 
 _COLUMNS = 2

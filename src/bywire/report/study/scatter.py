@@ -8,11 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from bywire.core.magnitude import size_of
 from bywire.report import style
 from bywire.report.legend import legend_outside
 from bywire.report.line_role import Role
-from bywire.report.readable_axis import beyond, limit_text, write_out
+from bywire.report.readable_axis import beyond, limit_text, size_of, write_out
 from bywire.report.study.case_axis import CaseAxis
 from bywire.report.study.drawn_cases import DrawnCases
 

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from bywire.core.magnitude import size_of
 from bywire.report import style
 from bywire.report.legend import legend_outside
 from bywire.report.readable_axis import (
@@ -22,6 +21,7 @@ from bywire.report.readable_axis import (
     limit_text,
     name_beyond,
     scale_of,
+    size_of,
 )
 from bywire.report.study.drawn_cases import BARS
 from bywire.studies.effects import Effect
