@@ -1,18 +1,14 @@
-"""The files of the repository: sizes, paths that exist, nothing of anybody's machine."""
+"""The files of the repository: paths that exist, nothing of anybody's machine."""
 
 from __future__ import annotations
 
 import configparser
 import re
-import warnings
-from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
-from repository_sources import MODULES, PACKAGE, PROJECT, ROOT, label, tracked
+from repository_sources import PACKAGE, PROJECT, ROOT, label, tracked
 
-SIGN = 250  # lines; CONTRIBUTING says the same
-WALL = 400
 # Home folders, temporary folders, hosts that serve packages.
 FOREIGN = re.compile(
     r"(?<![\w.])/(?:root|home/\w|Users/\w|work/|mnt/|opt/\w|tmp/\w)[\w/.-]*"
@@ -40,32 +36,6 @@ def locked(name: str) -> set[str]:
     """Return the names in a lock file."""
     lines = (ROOT / name).read_text(encoding="utf-8").splitlines()
     return names_in([line for line in lines if line[:1].isalnum()])
-
-
-def longer(files: Iterable[Path], lines: int) -> dict[str, int]:
-    """Return the files that are longer than some number of lines."""
-    sizes = {label(p): len(p.read_text(encoding="utf-8").splitlines()) for p in files}
-    return {name: size for name, size in sizes.items() if size > lines}
-
-
-@pytest.mark.filterwarnings("default:longer than")
-def test_files_stay_small():
-    """What is beyond the sign is reported below the run; one beyond the wall is refused."""
-    reported = longer(MODULES, SIGN)
-    if reported:
-        warnings.warn(f"longer than {SIGN} lines: {reported}", stacklevel=1)
-    assert longer(MODULES, WALL) == {}
-
-
-def test_the_gate_of_sizes_can_fail():
-    path = PACKAGE / "plant" / "dc_motor.py"
-    size = len(path.read_text(encoding="utf-8").splitlines())
-    assert longer([path], size - 1) == {label(path): size}
-    assert longer([path], size) == {}
-
-
-def test_one_number_says_how_long_a_file_is():
-    assert f"below {SIGN} lines" in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
 def test_nothing_names_a_machine_or_a_package_host():
