@@ -50,8 +50,8 @@ def read_bench(asked: Mapping[str, Any], place: Place) -> object:
 
 def bench(hint: str = texts.TEST_BENCH, *, is_required: bool = True) -> Field:
     """Return the field of a bench."""
-    return Field("bench", "Bench", "thing", hint, names("experiments"), _benches,
-                 is_required=is_required)  # fmt: skip
+    known = names("experiments", "generic_experiments")
+    return Field("bench", "Bench", "thing", hint, known, _benches, is_required=is_required)
 
 
 def bench_changes(fits: Fits | None) -> Field:
