@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 import pytest
-from measurement_files import file_of, measurement
+from measurement_files import NEEDS, file_of, measurement
 from misbehaving_format import FORMAT
 
 from bywire.core.errors import FileError, UnitError
@@ -51,6 +51,18 @@ def test_every_way_to_fail_is_one_error_and_the_next_file_is_read(read, when, wi
     numbers = read("late print")
     np.testing.assert_array_equal(numbers["y"], np.arange(1000.0))
     assert limited_source._idle[os.getpid(), "misbehaving_format"] == [child]  # it forked for each
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="children fork on Linux alone")
+@pytest.mark.parametrize("name", ["netcdf", *NEEDS])
+def test_a_child_that_forks_has_a_single_thread(tmp_path, monkeypatch, name):
+    """A lock that another thread holds would stay locked in what is forked."""
+    pytest.importorskip(NEEDS.get(name, "netCDF4"))
+    monkeypatch.setattr(limited_source, "_idle", {})
+    read_measurement(file_of(tmp_path, name))
+    ((child,),) = limited_source._idle.values()
+    assert len(os.listdir(f"/proc/{child._process.pid}/task")) == 1
+    child.close()
 
 
 @pytest.mark.parametrize("when", ["early", "late"])

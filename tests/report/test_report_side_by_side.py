@@ -16,7 +16,10 @@ from bywire.report.inline_figure import inline_figures
 from bywire.report.picture import Picture
 from bywire.report.side_by_side import FEW, drawn_side_by_side
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="copies are of Linux alone")
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="copies are of Linux alone"),
+    pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning"),
+]  # a process of tests has threads; commands that are copied have none
 
 
 def line(k: int) -> Figure:

@@ -13,6 +13,8 @@ from bywire.studies.store import Origin, StudyStore
 from bywire.studies.study_file import read_study
 
 
+# A process of tests has threads; commands that are copied have none.
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 def test_what_waits_for_chunks_is_used_meanwhile(study, tmp_path, monkeypatch):
     if sys.platform != "linux":
         pytest.skip("processes are copied on Linux alone")

@@ -22,6 +22,8 @@ from bywire.studies.store import Origin, StudyStore
 from bywire.studies.study_file import read_study
 
 
+# A process of tests has threads; commands that are copied have none.
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 @pytest.mark.parametrize("is_copied", [False, True], ids=["begun", "copied"])
 def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(
     study, tmp_path, monkeypatch, is_copied
@@ -53,6 +55,8 @@ def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(
     assert {each.exitcode for each in workers} == {-signal.SIGTERM}
 
 
+# A process of tests has threads; commands that are copied have none.
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 @pytest.mark.parametrize("kind", ["pool", "alone"])
 def test_what_stands_beside_chunks_warns_and_fails_where_it_was_asked(study, monkeypatch, kind):
     if kind == "pool" and sys.platform != "linux":

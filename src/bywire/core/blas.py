@@ -21,12 +21,24 @@ if TYPE_CHECKING:
     from threadpoolctl import threadpool_limits
 
 _DEFAULTS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+# Libraries that start threads as soon as they are loaded, which bywire never uses: numexpr beside
+# pandas, and the allocator of pyarrow. A process with threads cannot be copied.
+_IDLE_THREADS = {
+    "NUMEXPR_NUM_THREADS": "1", "JE_ARROW_MALLOC_CONF": "background_thread:false",
+}  # fmt: skip
 VARIABLES = (*_DEFAULTS, "OMP_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """environment variables by which a user chooses"""
 
 
+def one_thread_environment() -> dict[str, str]:
+    """Environment of a child process whose libraries start no threads of their own."""
+    chosen = {**dict.fromkeys(_DEFAULTS, "1"), "OMP_NUM_THREADS": "1", **_IDLE_THREADS}
+    return {**os.environ, **chosen}
+
+
 def keep_one_thread() -> None:
     """Have this process of ours compute on one thread, whether or not its libraries are loaded."""
+    os.environ.update({k: v for k, v in _IDLE_THREADS.items() if k not in os.environ})
     if _is_chosen():
         return
     os.environ.update(dict.fromkeys(_DEFAULTS, "1"))

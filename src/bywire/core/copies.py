@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -22,15 +23,32 @@ from bywire.core.brake import load_brakes, loaded_files
 from bywire.core.callers import is_command_line
 from bywire.core.errors import RunError
 
+_ENDING = 0.05  # s for which a thread that was joined may still be there
+
 
 def may_copy() -> bool:
-    """Return whether processes may be forked from this one: a command's that runs no threads.
+    """Whether processes may be forked from this one: a command's, with a single thread.
 
-    What a thread held when its process was copied, nobody gives back in the copy. A program of
-    others may have threads that Python knows nothing of; those of the libraries that commands
-    load take care of themselves.
+    A copy has one thread. A lock that another thread held stays locked in it forever. The threads
+    of libraries count too, so the operating system counts them; `keep_one_thread` has the libraries
+    that commands load start none. A program of others is never copied: what it holds is unknown.
     """
-    return sys.platform == "linux" and is_command_line() and threading.active_count() == 1
+    if sys.platform != "linux" or not is_command_line() or threading.active_count() > 1:
+        return False
+    until = time.monotonic() + _ENDING
+    while (is_threaded := _thread_count() > 1) and time.monotonic() < until:
+        time.sleep(0.001)
+    return not is_threaded
+
+
+def _thread_count() -> int:
+    """Number of threads of this process, as the operating system counts them."""
+    return len(os.listdir("/proc/self/task"))
+
+
+# A new process begins as ``python -c``: a module in the working folder would run in place of one of
+# Python's own.
+_SAFE_PATH = "PYTHONSAFEPATH"
 
 
 class _WithoutMain(SpawnProcess):
@@ -46,10 +64,16 @@ class _WithoutMain(SpawnProcess):
         nameless = ModuleType("__main__")
         vars(nameless).update(vars(main), __spec__=None, __file__=None)
         sys.modules["__main__"] = nameless
+        path = os.environ.get(_SAFE_PATH)
+        os.environ[_SAFE_PATH] = "1"
         try:
             super().start()
         finally:
             sys.modules["__main__"] = main
+            if path is None:
+                del os.environ[_SAFE_PATH]
+            else:
+                os.environ[_SAFE_PATH] = path
 
 
 class _Anew(SpawnContext):

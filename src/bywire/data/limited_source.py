@@ -25,6 +25,7 @@ from typing import IO, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.blas import one_thread_environment
 from bywire.core.errors import FileError
 from bywire.core.extras import how_to_install
 from bywire.core.machine_memory import machine_memory
@@ -65,8 +66,8 @@ class Child:
             [sys.executable, "-P", "-m", "bywire.data.reading_child", module,
              "forks" if _IS_LINUX else "alone"],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0,
-            env={**os.environ, "PYTHONPATH": paths, "OMP_NUM_THREADS": "1",
-                 "OPENBLAS_NUM_THREADS": "1", "TMPDIR": self._folder, "TEMP": self._folder},
+            env={**one_thread_environment(), "PYTHONPATH": paths,  # it forks: it has no threads
+                 "TMPDIR": self._folder, "TEMP": self._folder},
             start_new_session=True,  # Ctrl-C reaches the parent, which ends the child
         )  # fmt: skip
         self.state: _State = "idle"
