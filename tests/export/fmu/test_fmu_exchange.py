@@ -60,6 +60,21 @@ def thrown(tmp_path_factory: pytest.TempPathFactory) -> ExportedFmu:
     return export_fmu(THROWN, tmp_path_factory.mktemp("exchange"), kind="model-exchange")
 
 
+def test_a_solver_may_start_at_any_time(thrown: ExportedFmu) -> None:
+    def pressure(start: float) -> np.ndarray:
+        rows = simulate_fmu(
+            str(thrown.path), start_time=start, stop_time=start + 0.03, output=["time", "p_mc"],
+            output_interval=TICK, relative_tolerance=1e-7, record_events=False,
+            start_values={"v_source": 6.0},
+        )  # fmt: skip
+        np.testing.assert_allclose(rows["time"], start + TICK * np.arange(31), rtol=1e-12)
+        return rows["p_mc"]
+
+    at_zero = pressure(0.0)
+    assert np.ptp(at_zero) > 1e5
+    np.testing.assert_allclose(pressure(4.0), at_zero, atol=5.0)
+
+
 def test_frictions_limits_and_contacts_are_met_as_the_kernel_meets_them(
     thrown: ExportedFmu,
 ) -> None:
