@@ -11,7 +11,7 @@ import numpy as np
 from bywire.analysis.linear.closed_loop import closed_again, closed_loop
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.open_loop import analog_gain, cut_open, open_loop
-from bywire.analysis.linear.sampled_system import sampled_system
+from bywire.analysis.linear.sampled_system import sampled_models
 from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.analysis.response.saturation import Saturation
 from bywire.core.errors import unknown_name
@@ -228,10 +228,15 @@ class Loop:
         if self.analog:
             return self.gain(par, value), self.closed(par, value)
         p = self.point(self.smooth(par), value)
-        at, outputs = (p.state, p.memory, p.stimulus), (self.output,)
-        system = sampled_system(p.model, p.par, at, self.inputs, outputs, self.locked)
-        closed = closed_again(p.model, system, self.inputs)
-        return cut_open(p.model, system, self.cut), closed.together(self.inputs)
+        closed, gain = sampled_models(
+            p.model, p.par, (p.state, p.memory, p.stimulus),
+            lambda system: (
+                closed_again(p.model, system, self.inputs).together(self.inputs),
+                cut_open(p.model, system, self.cut),
+            ),
+            inputs=self.inputs, outputs=(self.output,), locked=self.locked,
+        )  # fmt: skip
+        return gain, closed
 
 
 LOOPS = Kind("loop", ("loops",), instances(Loop), declared="a Loop")

@@ -111,7 +111,7 @@ def _jacobians(loop: Loop, at: Point, moving: Point) -> list[Any]:
         return rows
     rows.append(_by_rows(B[kept, :]))
     for tick in functions.ticks:
-        M_x, M_m, _ = tick(x, m, u, p)
+        M_x, M_m, *_ = tick(x, m, u, p)
         rows += [_by_rows(M_x[:, kept]), _by_rows(M_m)]
     return rows
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.linear.sampled_system import Jacobians, SampledSystem, sampled_system
+from bywire.analysis.linear.sampled_system import Jacobians, SampledSystem, sampled_models
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
@@ -53,9 +53,13 @@ def open_loop(
     ParameterError
         When no controller reads or writes the field, several do, another one runs more slowly,
         or nobody takes what is handed on.
+    CornerError
+        As `bywire.analysis.linear.linearize.linearize`.
     """
-    system = sampled_system(model, par, (state, memory, stimulus), (), (), locked)
-    return cut_open(model, system, cut)
+    return sampled_models(
+        model, par, (state, memory, stimulus), lambda system: (cut_open(model, system, cut),),
+        locked=locked,
+    )[0]  # fmt: skip
 
 
 def cut_open(model: Model, system: SampledSystem, cut: str) -> LinearModel:
