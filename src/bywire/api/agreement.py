@@ -90,6 +90,7 @@ class LoopAgreement(Answer):
             brief=[f"{head}: nonlinear less linear", sizes, table, legend, text],
             data=self._data(),
             banner=Banner(text[0].upper() + text[1:], "good" if compared.holds else "bad"),
+            changes=case.subject.changes,
         )
 
     def _draw(self) -> Figure:

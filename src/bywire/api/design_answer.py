@@ -126,6 +126,7 @@ class DesignAnswer(Answer):
             banner=Banner(f"requirements {state} {where}", "good" if self.holds else "bad"),
             attachments=[Attachment(f"{loop.name}-design.toml", self._write_bench)],
             remarks=self._remarks(),
+            changes=self.case.subject.changes,
         )
 
     def _remarks(self) -> list[str]:

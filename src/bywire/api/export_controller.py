@@ -20,6 +20,7 @@ from bywire.export.controller.files import files
 from bywire.export.controller.program import program
 from bywire.export.controller.vectors import vectors as test_vectors
 from bywire.report.answer import Answer, use_case
+from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Flat, Listing, Paragraph, Section
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ class ControllerExport(Answer):
         What was translated.
     vectors
         Test vectors of each task.
+    bench
+        Whose ECU it is.
     check
         How it did on processors; None where that was not asked for.
     """
@@ -50,6 +53,7 @@ class ControllerExport(Answer):
     files: tuple[str, ...]
     program: Program
     vectors: int
+    bench: Bench
     check: ControllerCheck | None = None
 
     @property
@@ -83,6 +87,7 @@ class ControllerExport(Answer):
             brief=[what, written, *(checked or [following])],
             data=self._data(),
             is_paged=False,
+            changes=bench_changes(self.bench),
         )
 
     def _data(self) -> dict[str, Any]:
@@ -160,4 +165,4 @@ def export_controller(
         for name in texts:
             os.replace(scratch / name, folder / name)
     checked = check_controller(case, cited, vectors) if check else None
-    return ControllerExport(folder, tuple(texts), made, vectors, checked)
+    return ControllerExport(folder, tuple(texts), made, vectors, chosen, checked)

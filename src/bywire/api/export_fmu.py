@@ -19,6 +19,7 @@ from bywire.export.fmu.binaries import PLATFORMS, this_platform
 from bywire.export.interface import KINDS, PARTS
 from bywire.export.variables import Causality
 from bywire.report.answer import Answer, use_case
+from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Paragraph, Section, TableBlock
 from bywire.report.tables import Table, text_table
 
@@ -83,6 +84,7 @@ class ExportedFmu(Answer):
             brief=[table, steps, written],
             data=self._data(),
             is_paged=False,
+            changes=bench_changes(unit.made.bench),
         )
 
     def _table(self) -> Table:

@@ -111,6 +111,7 @@ class FrequencyResponse(Answer):
                 recording_file(f"{loop.name}-frequency-response.nc", response)
             ],
             heed=[self.note] if self.note else [],
+            changes=self.case.subject.changes,
         )
 
     def _brief(self, table: TableBlock) -> list[str | Flat]:

@@ -93,6 +93,7 @@ class LinearizedLoop(Answer):
             data=self._data(),
             banner=Banner("stable", "good") if model.is_stable else Banner("unstable", "bad"),
             attachments=self._attachments(),
+            changes=self.case.subject.changes,
         )
 
     def _locus_listing(self, locus: Locus) -> Listing:

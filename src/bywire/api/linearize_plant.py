@@ -111,6 +111,7 @@ class LinearizedPlant(Answer):
             brief=[head, *texts.poles_block(model), *self._notes(), *self._brief_reduced()],
             data=self._data(),
             attachments=[texts.json_file(f"{case.plant.name}-linear-model.json", self._data())],
+            changes=case.subject.changes,
         )
 
     def _brief_reduced(self) -> list[str | Flat]:
@@ -199,6 +200,7 @@ class PlantLocus(Answer):
             brief=[head, listing],
             data=data,
             attachments=[texts.json_file(f"{name}-locus.json", data)],
+            changes=case.subject.changes,
         )
 
 

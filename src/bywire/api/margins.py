@@ -114,6 +114,7 @@ class Margins(Answer):
             brief=[head, table, *worst_line, Paragraph(LEGEND)],
             data=self._data(),
             banner=self._banner(),
+            changes=self.case.subject.changes,
         )
 
     def _data(self) -> dict[str, Any]:

@@ -23,6 +23,9 @@ from bywire.identification.fitting.question import (
     find_method,
 )
 from bywire.identification.measured import measured
+from bywire.report.changes import defaults_of, value_changes
+from bywire.report.document import Change
+from bywire.report.subject import Subject
 
 if TYPE_CHECKING:
     from bywire.core.parameters import ParameterSet
@@ -52,6 +55,30 @@ class ChosenMethod:
     name: str = ""
     par: ParameterSet | None = None
     changes: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def subject(self) -> Subject | None:
+        """What a report says of the method's brake; None for a method of any assembly."""
+        method = self.method
+        if method.bench is not None:
+            return Subject.of_bench(
+                method.bench, method.name, method.summary, further=self._option_changes
+            )
+        if self.par is None:
+            return None
+        return Subject(
+            method.name, method.summary, self.name, self.par, further=self._option_changes
+        )
+
+    @property
+    def changed(self) -> tuple[Change, ...]:
+        """What the user changed of the bench or parameter set, and of the method's options."""
+        return self._option_changes if self.subject is None else self.subject.changes
+
+    @property
+    def _option_changes(self) -> tuple[Change, ...]:
+        method = self.method
+        return value_changes(self.options, method.defaults.flat(), defaults_of(method.name))
 
 
 def choose(

@@ -82,10 +82,7 @@ class Replay(Answer):
     def document(self) -> Document:
         """Return how well it fits, stretch by stretch, with figures and tracked parameters."""
         bench, inputs = self.bench, ", ".join(map(str, self.replayed.inputs.data_vars))
-        subject = Subject(
-            bench.name or bench.experiment, bench.summary(), bench.parameters,
-            self.replayed.run.par,
-        )  # fmt: skip
+        subject = Subject.of_bench(bench)
         table = TableBlock(fit_table(self.fits), width=110)
         definitions = [f"{k.name}: {k.definition}" for k in self.fits[0].kpis] if self.fits else []
         head = f"{self.source} drives {bench.experiment} of {bench.parameters} by {inputs}"
@@ -104,6 +101,7 @@ class Replay(Answer):
             banner=self._banner(),
             attachments=[Attachment("replay.nc", self._write_signals)],
             record="replay.json",
+            changes=subject.changes,
         )  # fmt: skip
 
     def _figures(self) -> list[FigureBlock]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, overload
 
-from bywire.api.run_remarks import remarks, unexpected
+from bywire.api.run_remarks import remarks
 from bywire.api.run_sections import energy, how_it_was_made, outcome, schematic_section, source_says
 from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
@@ -21,6 +21,7 @@ from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Progress
 from bywire.bench.stated import stated_figures
 from bywire.report.answer import Answer, use_case
+from bywire.report.changes import bench_changes
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -93,8 +94,7 @@ class BenchResult(Result, Answer):
         narrow = TableBlock(kpi_table([replace(row, where="") for row in self.rows]))
         said = [*remarks(self), *self._unplayed()]
         notes: list[Block] = [Paragraph(f"Warning: {text}.") for text in self.warnings]
-        beside = [*unexpected(self), *self._unplayed()]  # the page has a table of changes
-        notes += [Listing(beside)] if beside else []
+        notes += [Listing(said)] if said else []
         return Document(
             bench.name or bench.experiment,
             f"{bench.summary()}; parameter set {bench.parameters}",
@@ -116,6 +116,7 @@ class BenchResult(Result, Answer):
             record="result.json",
             remarks=[_remark(v) for v in self.verdicts if not v.met],
             is_paged=self.status != "interrupted",
+            changes=bench_changes(bench),
         )  # fmt: skip
 
     def _animations(self) -> list[Attachment]:

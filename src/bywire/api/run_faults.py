@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bywire.api.study_tested import varied_texts
 from bywire.bench.running import Progress
 from bywire.campaigns.campaign_file import read_campaign
 from bywire.campaigns.findings import CampaignFindings, FaultFinding
@@ -78,28 +79,28 @@ class FaultCampaign(Answer):
 
     def document(self) -> Document:
         """Return the table of faults, coverage, and when each is too much and seen."""
-        plan, findings = self.findings.plan, self.findings
-        bench = plan.bench
-        varied = [each.name for each in plan.varied]
-        subject = Subject(plan.name, bench.summary(varied), bench.parameters, bench.par)
+        plan, bench, findings = self.findings.plan, self.findings.plan.bench, self.findings
+        subject = Subject.of_bench(bench, plan.name, varied=[each.name for each in plan.varied])
         table = TableBlock(self._table(), width=0)
         residuals = TableBlock(self._residual_table(), width=120)
         kinds = ", ".join(f"{n} {kind}" for kind, n in findings.kinds().most_common())
+        known = Listing([kinds, *varied_texts(plan.varied), *self.notes])
         return Document(
             f"Faults: {plan.name}",
             f"{len(plan.faults)} faults, {plan.total} runs of {subject.line}",
             sections=lambda: [
                 Section("Faults", [table]),
-                Section("What else to know", [Listing([kinds, *self.notes])]),
+                Section("What else to know", [known]),
                 Section("Figures", self._figures()),
                 Section("Residuals", [residuals]),
                 Section("Criteria", [TableBlock(self._criteria_table())]),
                 subject.provenance("" if self.folder is None else f"Outcomes: {self.folder}."),
             ],
-            brief=[table, "", residuals, "", Listing([kinds, *self.notes])],
+            brief=[table, "", residuals, "", known],
             data=self._data(),
             banner=self._banner(),
             record="report.json",
+            changes=subject.changes,
         )  # fmt: skip
 
     def _banner(self) -> Banner:

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.api.loop_case import spread
+from bywire.api.run_remarks import fault_texts
 from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed, run_benches, varied_leaf
 from bywire.bench.kpis.kpi import Kpi
@@ -106,21 +107,22 @@ class BenchRange(Answer):
         bench = self.bench
         kpis = self._kpis()
         title = bench.name or bench.experiment
-        subject = Subject(title, bench.summary([self.name]), bench.parameters, bench.par)
+        subject = Subject.of_bench(bench, varied=[self.name])
         pieces = [kpis[k : k + _COLUMNS] for k in range(0, len(kpis), _COLUMNS)]
         tables = [TableBlock(self._table(piece), width=110) for piece in pieces]
         judged = list(self._judged())
         listing = [Listing([text for _, text in judged], "Requirements:")] if judged else []
         listing += [Listing(said)] if (said := self._indistinct()) else []
+        faults = [Listing(said)] if (said := fault_texts(bench)) else []
         return Document(
             f"{title} over {self.name}",
             subject.line,
             sections=lambda: [
-                Section("Key figures", [*listing, TableBlock(self._table(kpis))]),
+                Section("Key figures", [*faults, *listing, TableBlock(self._table(kpis))]),
                 Section("Figures", self._figures()),
                 subject.provenance(f"Engine: {', '.join(self._engines())}."),
             ],
-            brief=spaced([*tables, *listing]),
+            brief=spaced([*faults, *tables, *listing]),
             data=self._data(),
             banner=self._banner(),
             attachments=[
@@ -132,6 +134,7 @@ class BenchRange(Answer):
                 f"requirement {'undecided' if outcome == 'undecided' else 'not met'}: {text}"
                 for outcome, text in judged if outcome != "met"
             ],
+            changes=subject.changes,
         )
 
     def _write(self, label: str, path: Any) -> Any:

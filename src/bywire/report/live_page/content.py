@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bywire.bench.bench import Bench
 from bywire.bench.bench_text import bench_text
 from bywire.bench.kpis.cases import FamilyJudge
 from bywire.bench.kpis.in_c import entry_of, source_of
@@ -31,6 +32,7 @@ from bywire.core.units import convert
 from bywire.core.version import __version__
 from bywire.export.exported import Exported
 from bywire.export.wasm.module import module_files
+from bywire.report.changes import bench_changes
 from bywire.report.inline_script import bare
 from bywire.report.live_page.dependence import dependence
 from bywire.report.live_page.loops import loops_of, told
@@ -39,6 +41,7 @@ from bywire.report.panels import Panel, Trace
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.policy import admitted
 from bywire.report.stated_levels import stated_figure
+from bywire.report.terminal import change_texts
 from bywire.report.wording import unit_text
 from bywire.simulation.c_runtime import SCALAR
 
@@ -97,6 +100,7 @@ def page_text(
     return Template(_text("page.html")).substitute(
         kernel=_block("kernel", _packed(module[f"{_NAME}.wasm"])),
         policy=policy, title=escape(name), summary=escape(_summary(made)),
+        changes=_changes(made.bench),
         style=style, library=library, script=script, footer=escape(_footer(made)),
         data="\n".join(_block(key, value) for key, value in blocks.items()),
     )  # fmt: skip
@@ -229,6 +233,16 @@ def _shown(symbol: str) -> Mapping[str, float]:
 def _summary(made: Exported) -> str:
     label = f", run {made.case.label}" if len(made.bench.cases()) > 1 else ""
     return f"{made.bench.summary()}{label}; parameters {made.bench.parameters}"
+
+
+def _changes(bench: Bench) -> str:
+    """Return the paragraphs on what the bench itself changes."""
+    texts = change_texts(bench_changes(bench))
+    return "".join(f'<p class="summary">{escape(_capital(text))}.</p>\n' for text in texts)
+
+
+def _capital(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 def _footer(made: Exported) -> str:
