@@ -144,7 +144,7 @@ def lock() -> int:
               "--extra", "studies"]  # fmt: skip
     return (
         run(*common, "-o", "requirements.lock")
-        or run(*common, "--extra", "dev", "-o", "requirements-dev.lock")
+        or run(*common, "--extra", "dev", "--extra", "benchmark", "-o", "requirements-dev.lock")
         or run(*common, "--extra", "docs", "-c", "requirements-dev.lock",
                "-o", "requirements-docs.lock")
     )  # fmt: skip

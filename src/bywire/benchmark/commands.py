@@ -7,11 +7,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bywire.benchmark.result import Result, at_most
+from bywire.benchmark.result import Result, at_most, failed
 from bywire.core.registry import Kind, instances
 from bywire.simulation.kernel_cache import usable_folder
 
@@ -53,18 +53,14 @@ COMMANDS = Kind("timed command", ("benchmarks",), instances(Command), "bywire.be
 """every command that the benchmark measures"""
 
 
-def measured(commands: Sequence[Command]) -> list[Result]:
+def measured(commands: Sequence[Command]) -> Iterator[Result]:
     """Measure commands in turn with L, kernels compiled and files of Python's byte code there."""
-    results = []
     with tempfile.TemporaryDirectory() as folder:
         for command in commands:
             try:
-                results.append(_measured(command, Path(folder)))
-            except subprocess.CalledProcessError as failed:
-                last = (failed.stderr.strip().splitlines() or ["no message"])[-1]
-                note = f"exit status {failed.returncode}: {last}"
-                results.append(Result(command.name, None, "L", f"<= {command.goal:g}", None, note))
-    return results
+                yield _measured(command, Path(folder))
+            except subprocess.CalledProcessError as error:
+                yield failed(command.name, error, "L", f"<= {command.goal:g}")
 
 
 def _measured(command: Command, folder: Path) -> Result:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 import platform
+import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+from bywire.core.author_lines import said_with_line
+from bywire.core.errors import BywireError
 from bywire.simulation.compiler import find_compiler
 
+_PACKAGE = Path(__file__).parents[1]
 _VECTOR_BITS = (("avx512f", 512), ("avx2", 256), ("asimd", 128), ("sse2", 128))
 
 
@@ -28,6 +32,8 @@ class Result:
         Whether the goal is met; None where there is none or nothing was measured.
     note
         How it was measured, or why not.
+    is_failed
+        Whether its measurement failed, so that the note is the reason.
     """
 
     id: str
@@ -36,6 +42,20 @@ class Result:
     goal: str = ""
     holds: bool | None = None
     note: str = ""
+    is_failed: bool = False
+
+
+def failed(name: str, error: Exception, unit: str = "1", goal: str = "") -> Result:
+    """Row of a measurement that failed, with the reason: what a process said last, or the error."""
+    if isinstance(error, subprocess.CalledProcessError):
+        said = error.stderr or ""
+        text = said if isinstance(said, str) else said.decode(errors="replace")
+        last = (text.strip().splitlines() or ["no message"])[-1]
+        reason = f"exit status {error.returncode}: {last}"
+    else:
+        is_ours = isinstance(error, BywireError)
+        reason = str(error) if is_ours else said_with_line(error, str(_PACKAGE))
+    return Result(name, None, unit, goal, None, reason, is_failed=True)
 
 
 def at_most(name: str, value: float, limit: float, unit: str, note: str) -> Result:

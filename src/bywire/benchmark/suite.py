@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 
-from bywire.benchmark.result import Result, machine
+from bywire.benchmark.result import Result, failed, machine
 from bywire.core.errors import CompilerError
+from bywire.core.interrupts import interrupt_heard
 from bywire.core.registry import Kind, instances
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Section, TableBlock
@@ -23,11 +24,11 @@ class Part:
     name
         What the progress bar calls it.
     measure
-        ``measure()``: its figures.
+        ``measure()``: its figures, one by one where they take long.
     """
 
     name: str
-    measure: Callable[[], list[Result]]
+    measure: Callable[[], Iterable[Result]]
 
 
 PARTS = Kind("part of the benchmark", ("benchmarks",), instances(Part), "bywire.benchmark.parts")
@@ -40,6 +41,22 @@ class Benchmark(Answer):
 
     machine: dict[str, object]
     results: tuple[Result, ...]
+    status: str = "done"
+
+    @property
+    def failures(self) -> list[str]:
+        """What could not be measured, and why."""
+        return [f"{r.id} failed: {r.note}" for r in self.results if r.is_failed]
+
+    @property
+    def holds(self) -> bool:
+        """Whether every part was measured; a goal that is missed is a figure like another."""
+        return not self.failures
+
+    @property
+    def partial(self) -> str:
+        """What an interrupted benchmark still shows."""
+        return "the figures above were measured before" if self.results else ""
 
     def document(self) -> Document:
         """Return the figures with their goals."""
@@ -51,15 +68,16 @@ class Benchmark(Answer):
             sections=[Section("Figures", [table])],
             brief=[table],
             has_files=False,
-            data={"machine": self.machine, "results": [asdict(each) for each in self.results]},
-        )
+            data={"machine": self.machine, "status": self.status,
+                  "results": [asdict(each) for each in self.results]},
+        )  # fmt: skip
 
     def _table(self) -> Table:
         verdict = {True: "yes", False: "no", None: "-"}
         rows = [
             (
                 r.id,
-                "-" if r.value is None else f"{r.value:.3g} {r.unit}",
+                "failed" if r.is_failed else "-" if r.value is None else f"{r.value:.3g} {r.unit}",
                 r.goal or "-",
                 verdict[r.holds],
                 r.note,
@@ -73,6 +91,8 @@ def measure(
     progress: Callable[[str, float], None] | None = None, parts: Sequence[str] = ()
 ) -> Benchmark:
     """Measure everything, which takes several minutes, or parts of it.
+
+    A part that fails is a row that names the reason. After Ctrl-C the finished rows are kept.
 
     Parameters
     ----------
@@ -90,7 +110,6 @@ def measure(
     ------
     UnknownNameError
         When there is no such part.
-    ------
     CompilerError
         Without a C compiler there is nothing to compare.
     """
@@ -99,10 +118,18 @@ def measure(
     wanted = {name: PARTS.find(name) for name in parts} or PARTS.all()
     here = machine()
     results: list[Result] = []
-    for label, part in wanted.items():
-        if progress is not None:
-            progress(f"benchmark: {label}", 0.0)
-        results += part.measure()
-        if progress is not None:
-            progress(f"benchmark: {label}", 1.0)
+    try:
+        for label, part in wanted.items():
+            if progress is not None:
+                progress(f"benchmark: {label}", 0.0)
+            try:
+                for result in part.measure():
+                    results.append(result)
+            except Exception as error:  # of whatever kind: the other parts do not depend on it
+                results.append(failed(label, error))
+            if progress is not None:
+                progress(f"benchmark: {label}", 1.0)
+    except KeyboardInterrupt:
+        interrupt_heard()
+        return Benchmark(here, tuple(results), "interrupted")
     return Benchmark(here, tuple(results))

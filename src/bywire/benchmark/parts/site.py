@@ -11,12 +11,13 @@ import time
 from pathlib import Path
 
 from bywire.benchmark.commands import environment
-from bywire.benchmark.result import Result, at_most
+from bywire.benchmark.result import Result, at_most, failed
 from bywire.benchmark.suite import Part
 from bywire.core.extras import how_to_install
 
 COLD, WARM = 180.0, 20.0
 """goals [s]"""
+_GOALS = {"docs.build_s": COLD, "docs.rebuild_s": WARM}
 _LEFT = (".*", "_build", "_generated", "__pycache__", "results", "*.egg-info")
 
 
@@ -38,9 +39,10 @@ def measured(root: Path | None = None) -> list[Result]:
             begin = time.perf_counter()
             done = _made(copy)
             seconds.append(time.perf_counter() - begin)
-            if done.returncode:
-                last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-                return _skipped(f"exit status {done.returncode}: {last}")
+            try:
+                done.check_returncode()
+            except subprocess.CalledProcessError as error:
+                return [failed(name, error, "s", f"<= {goal:g}") for name, goal in _GOALS.items()]
     cold, warm = seconds
     return [
         at_most("docs.build_s", cold, COLD, "s", "the site anew: sources, gallery, live pages"),
@@ -59,8 +61,7 @@ def _made(root: Path) -> subprocess.CompletedProcess[str]:
 
 
 def _skipped(why: str) -> list[Result]:
-    goals = {"docs.build_s": COLD, "docs.rebuild_s": WARM}
-    return [Result(name, None, "s", f"<= {goal:g}", None, why) for name, goal in goals.items()]
+    return [Result(name, None, "s", f"<= {goal:g}", None, why) for name, goal in _GOALS.items()]
 
 
 PART = Part("site", measured)

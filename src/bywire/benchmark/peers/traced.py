@@ -6,6 +6,7 @@ tracing; an object with ``_bywire_op`` brings its own functions.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import jax.numpy as jnp
@@ -68,6 +69,11 @@ class Traced:
 
 def _bare(x: Any) -> Any:
     return x.value if isinstance(x, Traced) else x
+
+
+def stacked(values: Iterable[Any]) -> Any:
+    """Vector of traced scalars, and of numbers where an equation is a constant."""
+    return jnp.stack([jnp.asarray(_bare(value), dtype=float) for value in values])
 
 
 def traced_signals(tuple_type: Any, values: Any) -> Any:

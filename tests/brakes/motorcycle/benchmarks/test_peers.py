@@ -80,11 +80,10 @@ def test_rates_agree_between_floats_and_symbols(omega: float, par: MotorcyclePar
 
 def test_traced_rates_agree_with_floats(par: MotorcycleParameters) -> None:
     jax = pytest.importorskip("jax")
-    from bywire.benchmark.peers.traced import Traced
+    from bywire.benchmark.peers.traced import Traced, stacked
 
     def traced(z: Any) -> Any:
-        found = rates([Traced(entry) for entry in z], 0.3, par, WIDTH)
-        return jax.numpy.stack([r.value for r in found])
+        return stacked(rates([Traced(entry) for entry in z], 0.3, par, WIDTH))
 
     with jax.enable_x64(True):
         found = np.asarray(jax.jit(traced)(jax.numpy.asarray(state())))

@@ -89,13 +89,11 @@ def solve(
 def _program(par: MotorcycleParameters, width: float, tolerance: float) -> Any:
     import diffrax
     import jax
-    import jax.numpy as jnp
 
-    from bywire.benchmark.peers.traced import Traced, traced_signals
+    from bywire.benchmark.peers.traced import Traced, stacked, traced_signals
 
     def slope(t: Any, z: Any, duty: Any) -> Any:
-        found = rates([Traced(entry) for entry in z], Traced(duty), par, width)
-        return jnp.stack([r.value for r in found])
+        return stacked(rates([Traced(entry) for entry in z], Traced(duty), par, width))
 
     term, solver = diffrax.ODETerm(slope), diffrax.Kvaerno3()
     control = diffrax.PIDController(rtol=tolerance, atol=tolerance)
@@ -108,7 +106,7 @@ def _program(par: MotorcycleParameters, width: float, tolerance: float) -> Any:
         after: Any = motorcycle_ecu.tick(
             readings, traced_signals(Memory, memory), traced_signals(Stimulus, u), par
         )
-        memory = jnp.stack([v.value for v in after])
+        memory = stacked(after)
         solved = diffrax.diffeqsolve(
             term, solver, 0.0, par.ecu.T_s, FIRST_STEP, z, memory[duty_at],
             stepsize_controller=control, max_steps=None,

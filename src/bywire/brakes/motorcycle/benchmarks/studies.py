@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -72,7 +73,7 @@ with open("/proc/self/status") as status:
 """
 
 
-def studies() -> list[Result]:
+def studies() -> Iterator[Result]:
     """Measure the cases of a study on one core, and the memory of its command."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "study.toml"
@@ -82,29 +83,26 @@ def studies() -> list[Result]:
         whole = min(_seconds(plan) for _ in range(_ROUNDS)) / (_CHUNKS * CHUNK)
         simulated, judged = simulated_and_judged(plan, _ROUNDS)
         cores = os.cpu_count() or 1
-        results = [
-            at_most(
-                "study.million_seconds", 1e6 * whole / cores, 600.0, "s",
-                f"a million stops with all key figures on {cores} cores, {1e3 * whole:.3g} ms of a "
-                f"core each, measured over {_CHUNKS * CHUNK}",
-            ),
-            at_most(
-                "study.kpi_share", judged / simulated, 0.05, "1",
-                f"key figures, {1e6 * judged:.3g} us a case, over its simulation with noise, "
-                f"{1e3 * simulated:.3g} ms",
-            ),
-            _of_steps(Path(folder)),
-            Result(
-                "study.beside_share", (whole - simulated - judged) / simulated, "1",
-                note="cases made and checked, warnings and books over the simulation",
-            ),
-        ]  # fmt: skip
-        results.append(_command(Path(folder)))
+        yield at_most(
+            "study.million_seconds", 1e6 * whole / cores, 600.0, "s",
+            f"a million stops with all key figures on {cores} cores, {1e3 * whole:.3g} ms of a "
+            f"core each, measured over {_CHUNKS * CHUNK}",
+        )  # fmt: skip
+        yield at_most(
+            "study.kpi_share", judged / simulated, 0.05, "1",
+            f"key figures, {1e6 * judged:.3g} us a case, over its simulation with noise, "
+            f"{1e3 * simulated:.3g} ms",
+        )  # fmt: skip
+        yield _of_steps(Path(folder))
+        yield Result(
+            "study.beside_share", (whole - simulated - judged) / simulated, "1",
+            note="cases made and checked, warnings and books over the simulation",
+        )  # fmt: skip
+        yield _command(Path(folder))
         if Path("/proc/self/status").exists():
-            results.append(_memory(path, Path(folder) / "out"))
+            yield _memory(path, Path(folder) / "out")
         if find_spec("distributed") is not None:
-            results.append(_efficiency(plan, cores, whole * CHUNK))
-    return results
+            yield _efficiency(plan, cores, whole * CHUNK)
 
 
 def _seconds(plan: StudyPlan) -> float:
