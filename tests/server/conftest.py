@@ -100,7 +100,7 @@ def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visitor]:
 def standin(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have jobs be processes that only speak as a job's does: they take no time to start."""
 
-    def started() -> subprocess.Popen[bytes]:
+    def started(_: Path) -> subprocess.Popen[bytes]:
         return subprocess.Popen(
             [sys.executable, "-S", "-E", "-c", STANDIN], start_new_session=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,

@@ -19,6 +19,7 @@ from typing import Any
 
 from bywire.cli.output import INTERRUPTED, flush, message, open_streams
 from bywire.core.blas import keep_one_thread
+from bywire.core.child_process import leave_out_working_folder
 from bywire.core.errors import BywireError, ModelError, ParameterError
 from bywire.core.interrupts import interrupts_noted
 from bywire.core.unneeded import leave_out_dask
@@ -42,6 +43,7 @@ def process() -> None:
             os._exit(status[0] if isinstance(status[0], int) else 0)
 
     atexit.register(leave)  # the first, and so the last that is called
+    leave_out_working_folder()
     leave_out_dask()
     keep_one_thread()
     try:

@@ -21,6 +21,7 @@ from typing import Any
 from bywire.core.blas import keep_one_thread
 from bywire.core.brake import load_brakes, loaded_files
 from bywire.core.callers import is_command_line
+from bywire.core.child_process import safe_start
 from bywire.core.errors import RunError
 
 _ENDING = 0.05  # s for which a thread that was joined may still be there
@@ -46,11 +47,6 @@ def _thread_count() -> int:
     return len(os.listdir("/proc/self/task"))
 
 
-# A new process begins as ``python -c``: a module in the working folder would run in place of one of
-# Python's own.
-_SAFE_PATH = "PYTHONSAFEPATH"
-
-
 class _WithoutMain(SpawnProcess):
     """A process that loads what it computes, and not the program that asked for it.
 
@@ -64,16 +60,11 @@ class _WithoutMain(SpawnProcess):
         nameless = ModuleType("__main__")
         vars(nameless).update(vars(main), __spec__=None, __file__=None)
         sys.modules["__main__"] = nameless
-        path = os.environ.get(_SAFE_PATH)
-        os.environ[_SAFE_PATH] = "1"
         try:
-            super().start()
+            with safe_start():
+                super().start()
         finally:
             sys.modules["__main__"] = main
-            if path is None:
-                del os.environ[_SAFE_PATH]
-            else:
-                os.environ[_SAFE_PATH] = path
 
 
 class _Anew(SpawnContext):

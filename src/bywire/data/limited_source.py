@@ -10,7 +10,6 @@ import contextlib
 import os
 import shutil
 import signal
-import subprocess
 import sys
 import threading
 import warnings
@@ -19,13 +18,15 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
+from subprocess import DEVNULL
 from tempfile import mkdtemp
 from typing import IO, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.blas import one_thread_environment
+from bywire.core.blas import one_thread_variables
+from bywire.core.child_process import start_python
 from bywire.core.errors import FileError
 from bywire.core.extras import how_to_install
 from bywire.core.machine_memory import machine_memory
@@ -60,15 +61,12 @@ class Child:
     def __init__(self, module: str) -> None:
         # asammdf writes a temporary file; with its folder it goes, whatever becomes of the child.
         self._folder = mkdtemp(dir=process_folder())
-        paths = os.pathsep.join(path for path in sys.path if path)
-        self._process = subprocess.Popen(
-            # -P: a module beside the measurement must not run in place of a library's.
-            [sys.executable, "-P", "-m", "bywire.data.reading_child", module,
-             "forks" if _IS_LINUX else "alone"],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0,
-            env={**one_thread_environment(), "PYTHONPATH": paths,  # it forks: it has no threads
-                 "TMPDIR": self._folder, "TEMP": self._folder},
-            start_new_session=True,  # Ctrl-C reaches the parent, which ends the child
+        self._process = start_python(
+            "bywire.data.reading_child", module, "forks" if _IS_LINUX else "alone", bufsize=0,
+            stderr=DEVNULL, further={
+                **one_thread_variables(),  # it forks: it has no threads
+                "TMPDIR": self._folder, "TEMP": self._folder,
+            },
         )  # fmt: skip
         self.state: _State = "idle"
         self._is_late = False

@@ -186,7 +186,7 @@ class Jobs:
             if job.is_unwanted:
                 job.state = "canceled"
                 return
-            job.state, job.process = "running", started()
+            job.state, job.process = "running", started(self._place.root)
         order = {
             "task": job.task.name, "asked": dict(job.asked), "folder": str(self._place.root),
             "out": str(job.out), "systems": list(loaded_files()),

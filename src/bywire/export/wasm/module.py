@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import subprocess
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -13,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from bywire.core.child_process import run_program
 from bywire.core.errors import CompilerError
 from bywire.core.scratch import process_folder, scratch_folder
 from bywire.core.signals import Signal, signals_of
@@ -23,7 +22,7 @@ from bywire.export.variables import finite_range, parameter_variables
 from bywire.export.wasm.formulas import with_section
 from bywire.export.wasm.run_formulas import run_formulas
 from bywire.simulation.c_runtime import SCALAR
-from bywire.simulation.compiler import KERNEL_MATH, TIMEOUT
+from bywire.simulation.compiler import KERNEL_MATH, TIMEOUT, bundled_compiler
 from bywire.simulation.rare_text import CUT
 from bywire.simulation.run import sampled_stimulus
 
@@ -68,7 +67,8 @@ def _module(made: Exported, further: Mapping[str, str]) -> bytes:
 
 def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
     """Return what is compiled of a module."""
-    if importlib.util.find_spec("ziglang") is None:
+    compiler = bundled_compiler()
+    if compiler is None:
         raise CompilerError(
             "WebAssembly is compiled by the extra bywire[compiler], which is not installed: "
             "pip install 'bywire[compiler]'"
@@ -84,12 +84,9 @@ def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
             sources[-1].write_text(text, encoding="utf-8")
         made = folder / "module.wasm"
         exported = [f"-Wl,--export={entry}" for entry in further]
-        command = [sys.executable, "-m", "ziglang", "cc", *_FLAGS, *exported, f"-I{folder}",
-                   *map(str, sources), "-o", str(made)]  # fmt: skip
+        command = [*compiler, *_FLAGS, *exported, f"-I{folder}", *map(str, sources)]
         try:
-            done = subprocess.run(
-                command, capture_output=True, text=True, timeout=TIMEOUT, check=False
-            )
+            done = run_program([*command, "-o", str(made)], TIMEOUT)
         except subprocess.TimeoutExpired:
             raise CompilerError(f"the compiler took longer than {TIMEOUT:g} s") from None
         if done.returncode != 0:

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from bywire.core.child_process import find_program, run_program
 from bywire.core.errors import CompilerError
 from bywire.export.controller.harness import FLAGS, SMALL_FLAGS
 from bywire.export.controller.program import Program
@@ -149,10 +150,7 @@ def _sources(program: Program, folder: Path) -> list[Path]:
 def _call(command: list[str], may_fail: bool = False) -> str:
     name = Path(command[0]).name
     try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=_TIMEOUT, check=False,
-            stdin=subprocess.DEVNULL,
-        )  # fmt: skip
+        done = run_program([find_program(command[0]) or command[0], *command[1:]], _TIMEOUT)
     except subprocess.TimeoutExpired:
         raise CompilerError(f"{name} took longer than {_TIMEOUT:g} s for an exported ECU") from None
     except OSError as error:
