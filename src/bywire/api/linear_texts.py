@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -128,6 +128,12 @@ def reduced_object(reduced: Reduced) -> dict[str, Any]:
         "bound": reduced.bound.tolist(),
         "error": error_object(reduced.error),
     }
+
+
+def corner_notes(corners: Iterable[Sequence[str]]) -> list[str]:
+    """Return on which side of corners linear models are, each once; nothing where on none."""
+    texts = dict.fromkeys(text for each in corners for text in each)
+    return [f"the operating point lies on a corner: the linear model is {each}" for each in texts]
 
 
 def reduced_line(reduced: Reduced) -> str:

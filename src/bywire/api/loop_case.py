@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bywire.analysis.linear.corners import read_sides
 from bywire.analysis.loop import LOOPS, Loop, Quantity
 from bywire.api.parameter_choice import parameters_for
 from bywire.bench.values import number
@@ -84,7 +85,11 @@ class LoopCase:
 
 
 def loop_case(
-    name: str, parameters: str = "", at: str = "", changes: Mapping[str, Any] = MappingProxyType({})
+    name: str,
+    parameters: str = "",
+    at: str = "",
+    changes: Mapping[str, Any] = MappingProxyType({}),
+    side: str = "",
 ) -> LoopCase:
     """Return a loop with its parameters and its operating point.
 
@@ -98,13 +103,16 @@ def loop_case(
         Operating point with its unit; empty for the loop's own.
     changes
         Parameters by dotted name, with units.
+    side
+        Side on which linear models are taken at a corner, see `read_sides`.
 
     Raises
     ------
     InputError
         For names that are unknown, values out of range, and sets of another brake.
     """
-    loop = LOOPS.find(name)
+    read_sides(side)
+    loop = replace(LOOPS.find(name), side=side)
     name, par = parameters_for(f"loop {loop.name!r}", loop.assembly, parameters, changes)
     value = number(at, loop.at.unit, loop.at.name) if at else loop.at.default
     return LoopCase(loop, name, par, value)

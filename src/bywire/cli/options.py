@@ -48,6 +48,7 @@ BenchChanges = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help=texts.BENCH_CHANGES,
                  autocompletion=completion.changeable),
 ]
+Side = Annotated[str, typer.Option("--side", help=texts.SIDE)]
 ErrorEstimate = Annotated[bool, typer.Option(help=texts.ERROR_ESTIMATE)]
 Frequencies = Annotated[str, typer.Option(help=texts.FREQUENCIES)]
 Map = Annotated[Path | None, typer.Option("--map", metavar="PATH", help=texts.MAP)]

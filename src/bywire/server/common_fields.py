@@ -114,6 +114,17 @@ def of_loops() -> tuple[Field, ...]:
     )  # fmt: skip
 
 
+def side() -> Field:
+    """Return the field of the side on which linear models are taken at a corner."""
+
+    def fit(asked: Mapping[str, Any], place: Place) -> object:
+        from bywire.analysis.linear.corners import read_sides
+
+        return read_sides(asked["side"])
+
+    return Field("side", "Side of corners", hint=texts.SIDE, fits=fit)
+
+
 def frequencies() -> Field:
     """Return the field of frequencies."""
 

@@ -205,6 +205,19 @@ def magnitudes(point: SmoothPoint) -> Array:
     return usual
 
 
+def beside_point(point: SmoothPoint, free: NDArray[np.bool_]) -> Array:
+    """Return how far state, memory and stimulus are displaced to be beside corners, in a row."""
+    by = np.zeros(free.size)
+    by[free] = REACH * _generic(int(free.sum()))[0] * magnitudes(point)[free]
+    return by
+
+
+def _generic(count: int) -> Array:
+    """Return two directions in which no corner lies by chance, shape (2, count)."""
+    rng = np.random.default_rng(20)
+    return np.asarray(rng.uniform(0.5, 1.0, (2, count)) * rng.choice([-1.0, 1.0], (2, count)))
+
+
 def linear_models(of: Linearization) -> tuple[LinearModel, ...]:
     """Return the linear models at an operating point, on the stated side of its corners.
 
@@ -223,9 +236,7 @@ class _Corner:
     def __init__(self, of: Linearization) -> None:
         self.of = of
         self.usual = magnitudes(of.point)[of.free]
-        rng = np.random.default_rng(20)
-        size = (2, int(of.free.sum()))
-        generic = rng.uniform(0.5, 1.0, size) * rng.choice([-1.0, 1.0], size)
+        generic = _generic(int(of.free.sum()))
         self.generic = [*generic, *-generic]
         self.known: dict[tuple[bytes, float], Jacobians] = {}
 

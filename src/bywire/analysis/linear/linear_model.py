@@ -144,7 +144,9 @@ class LinearModel:
         """
         poles = self.poles()
         if self.period:
-            return bool(np.abs(poles).max() < 1.0 + _ON_BORDER)
+            return bool(np.abs(poles).max(initial=0.0) < 1.0 + _ON_BORDER)
+        if not poles.size:
+            return True
         return bool(poles.real.max() < _ON_BORDER * np.abs(poles).max())
 
     @property

@@ -53,18 +53,45 @@ function exponential(X) {
   return scaled(sum, scale.map((value) => 1 / value));
 }
 
-/** Return the Jacobians of a loop at parameters that lie in the module; null where it has no point. */
-function jacobiansOf({ memory, room, parameters, ...functions }, { entry, size, contacts, states, held, every }) {
+/** Return the Jacobians of a loop at parameters that lie in the module, or beside its point (side 1, -1); null where it has no point. */
+function jacobiansOf({ memory, room, parameters, ...functions }, { entry, size, contacts, states, held, every }, side = 0) {
   const begin = (room() + 15) & ~15, missing = begin + 8 * size - memory.buffer.byteLength;
   if (missing > 0) memory.grow(Math.ceil(missing / 65536));
   const numbers = new Float64Array(memory.buffer, begin, size).fill(0);
-  functions[entry](parameters(), begin);
+  functions[entry](parameters(), side, begin);
   if (!numbers.every(Number.isFinite) || numbers.subarray(0, contacts).some((slack) => slack < TOUCH)) return null;
   let at = contacts;
   const next = (rows, columns) =>
     Array.from({ length: rows }, () => numbers.slice(at, (at += columns)));
   const A = next(states, states), B = next(states, held);
-  return { A, B, ticks: every.map(() => ({ X: next(held, states), M: next(held, held) })) };
+  return { A, B, numbers: numbers.slice(contacts), ticks: every.map(() => ({ X: next(held, states), M: next(held, held) })) };
+}
+
+const EQUAL = 1e-5, SAME = 1e-6, FREQUENCIES = 40; // models, numbers that count as one; where models are compared
+
+/** Return a loop's gain where sides of corners agree; null without a point, "corner" where they do not. */
+function modelOf(exported, loop) {
+  const found = [0, 1, -1].map((side) => jacobiansOf(exported, loop, side));
+  if (found.includes(null)) return null;
+  const [here, above, below] = found;
+  const differ = (one, other) => one.numbers.some((value, k) =>
+    Math.abs(value - other.numbers[k]) > SAME * Math.max(Math.abs(value), Math.abs(other.numbers[k])));
+  const model = gainOf(here, loop);
+  if (!model || !(differ(here, above) || differ(above, below))) return model;
+  const [one, other] = [gainOf(above, loop), gainOf(below, loop)];
+  if (unlike(one, other)) return "corner";
+  return unlike(one, model) ? one : model;
+}
+
+/** Return whether two loop gains differ at any frequency. */
+function unlike(one, other) {
+  const highest = NYQUIST * 0.5 / one.period;
+  for (let k = 0; k < FREQUENCIES; ++k) {
+    const f = LOWEST * (highest / LOWEST) ** (k / (FREQUENCIES - 1));
+    const [a, b] = responseAt(one, f), [c, d] = responseAt(other, f);
+    if (!(Math.hypot(a - c, b - d) <= EQUAL * Math.max(Math.hypot(a, b), Math.hypot(c, d)) + 1e-12)) return true;
+  }
+  return false;
 }
 
 /** Return what tasks at the same instant make of memory X x + M m + U u, in a row. */
