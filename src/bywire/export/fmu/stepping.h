@@ -85,7 +85,7 @@ static inline void tick(run *r, const int *is_active) {
 /* Time since the beginning of the run [s]. */
 static inline double seconds(const run *r) { return STEP * SUBSTEPS * (double)r->frame; }
 
-static double unsettled(const run *r) { return r->state[STATE - 2]; }
+static double unsettled(const run *r) { return r->state[STATE - COUNTERS]; }
 
 static double *place_of(run *r, unsigned k) {
   const int at = variables[k].index;
