@@ -10,7 +10,7 @@ import xarray as xr
 
 import bywire
 from bywire.bench.energy_ledger import role_attributes
-from bywire.bench.recording import energy_residual, open_books, parameter_hash
+from bywire.bench.recording import energy_doubts, energy_residual, parameter_hash
 from bywire.core.errors import FileError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
@@ -180,4 +180,4 @@ def test_a_run_whose_energy_balance_is_open_says_so(k_lf, is_open):
 def test_a_standing_body_with_much_energy_stored_closes_its_books():
     names = {"E_source": 0.0, "E_stored": 1e3, "E_friction": 0.0}
     rows = {n: ("time", value + 1e-13 * np.arange(3.0)) for n, value in names.items()}
-    assert open_books(xr.Dataset(rows, {"time": [0.0, 1.0, 2.0]})) == []
+    assert energy_doubts(xr.Dataset(rows, {"time": [0.0, 1.0, 2.0]})) == []

@@ -23,6 +23,10 @@ class Role:
     side
         Whether it is given (``"source"``) or taken (``"sink"``: losses and stores). A time in which
         all stands still is ``"standstill"``.
+    returns
+        Of a sink: what it may give back. A loss gives nothing back, and a run in which one does
+        warns of it; ``"taken"``: at most what it took, like a spring that begins slack; ``"any"``:
+        like a store that begins full, or air that may be warmer.
     label
         What the books call it.
     split
@@ -38,6 +42,7 @@ class Role:
     side: Literal["source", "sink", "standstill"]
     label: str = ""
     split: bool = False
+    returns: Literal["", "taken", "any"] = ""
     whole: str = ""
     rest: str = ""
     rest_label: str = ""

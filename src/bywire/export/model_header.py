@@ -12,6 +12,7 @@ from bywire.export.initial_values import HEADING
 from bywire.export.interface import Interface, tables
 from bywire.export.variables import Variable, finite_range
 from bywire.simulation.c_runtime import SCALAR
+from bywire.simulation.layout import COUNTERS
 
 _PLACES = {
     "parameter": "PARAMETER", "stimulus": "STIMULUS", "state": "IN_STATE", "row": "IN_ROW",
@@ -47,6 +48,7 @@ def model_header(
         "ROWS": n.output,
         "STATES": n.x,
         "STATE": made.layout.total,
+        "COUNTERS": COUNTERS,
         "VARIABLES": len(faces.variables),
         "IS_PLANT": int(faces.part == "plant"),
         "IS_ECU": int(faces.part == "ecu"),

@@ -16,6 +16,7 @@ BodyInertia = Annotated[float, Unit("kg*m**2", 35.0), Field(ge=0, allow_inf_nan=
 Sine = Annotated[float, Signal("1", "sine of the slope", 0.05)]
 Cosine = Annotated[float, Signal("1", "cosine of the slope", 1.0)]
 Drag = Annotated[float, Signal("W", "air drag", role=Role("sink", "air drag", book="vehicle"))]
+_LEAST_FACTOR = 1e-9  # below, the load lies at one of its ends
 
 
 class Parameters(ParameterSet):
@@ -135,12 +136,12 @@ def rear_load(
     cosine: Cosine,
     par: Parameters,
 ) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
-    r"""Return the load that holds the body level, >= 0.
+    r"""Return the load that holds the body level, between nothing and the whole weight.
 
     .. math:: N_r = (m g l_f \cos\gamma - F h - F_d (h - h_a))/L
     """
     carried = F * par.h + F_d * (par.h - par.h_a)
-    return ops.fmax(static_load(cosine, par) - carried / par.L, 0.0)
+    return carried_load(static_load(cosine, par) - carried / par.L, cosine, par)
 
 
 def rigid_rear_load(
@@ -150,10 +151,30 @@ def rigid_rear_load(
     cosine: Cosine,
     par: Parameters,
 ) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
-    """Return `rear_load` where the braking forces follow the loads at once."""
+    r"""Return `rear_load` where the braking forces follow the loads at once.
+
+    .. math::
+        N_r \left(1 + (\mu_r - \mu_f) h/L\right)
+            = (m g \cos\gamma\, (l_f - \mu_f h) - F_d (h - h_a))/L
+
+    Load on the rear wheel is missing on the front one, whose force then pitches less. Where the
+    factor on the left is not positive, no load between the ends is stable: a rear wheel that sinks
+    a little sinks further. It then carries nothing where the right-hand side is negative, and the
+    whole weight where that is positive.
+    """
     carried = mu_f * par.m * par.g * cosine * par.h + F_d * (par.h - par.h_a)
     left = static_load(cosine, par) - carried / par.L
-    return ops.fmax(left / (1.0 + (mu_r - mu_f) * par.h / par.L), 0.0)
+    factor = ops.fmax(1.0 + (mu_r - mu_f) * par.h / par.L, _LEAST_FACTOR)
+    return carried_load(left / factor, cosine, par)
+
+
+def carried_load(
+    N_r: Annotated[float, Signal("N", "load that holds the body level", 1e3)],
+    cosine: Cosine,
+    par: Parameters,
+) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
+    """Return a load of the rear wheel with which neither wheel pulls on the road."""
+    return ops.clip(N_r, 0.0, par.m * par.g * cosine)
 
 
 def loads(

@@ -12,7 +12,7 @@ from bywire.core.interrupts import interrupt_heard
 from bywire.core.typing import Array
 from bywire.simulation.engine import Engine
 from bywire.simulation.layout import Layout
-from bywire.simulation.native import Request
+from bywire.simulation.native import CHUNK, Request
 
 Progress = Callable[[float], None]
 
@@ -51,7 +51,8 @@ def advance_all(
     """
     schedule = request.schedule
     first = -(-begin // schedule.record_frames)
-    last, size = schedule.frames if last is None else last, 16 * schedule.record_frames
+    last = schedule.frames if last is None else last
+    size = min(16 * schedule.record_frames, max(CHUNK // schedule.substeps, 1))
     while begin < last:
         end = min(begin + size, last)
         started, saved = time.perf_counter(), vector.copy()
@@ -73,7 +74,7 @@ def advance_all(
             return begin
         elapsed = max(time.perf_counter() - started, 1e-9)
         factor = min(max(_CHUNK_SECONDS / elapsed, 0.5), 8.0)
-        size = max(int(size * factor) // schedule.record_frames, 1) * schedule.record_frames
+        size = max(int(size * factor), 1)
     return begin
 
 

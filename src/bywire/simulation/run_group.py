@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import overload
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
+from bywire.core.interrupts import thread_pool
 from bywire.core.parameters import ParameterSet, leaf_table
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
@@ -191,12 +191,8 @@ def simulate_group(
         apart = Ends(at_ends[:, cases], frames) if ends else None
         return carried.to_the_end(values[:, cases], edges, first, watch, apart)
 
-    with ThreadPoolExecutor(threads or kernel.at_once) as pool:
-        try:
-            vectors = list(pool.map(computed, range(0, len(runs), kernel.lanes)))
-        except BaseException:
-            watch.stop.set()
-            raise
+    with thread_pool(threads or kernel.at_once) as pool:
+        vectors = list(pool.map(computed, range(0, len(runs), kernel.lanes)))
     vector = np.concatenate(vectors, axis=1)[:, : len(runs)]
     return RunGroup(
         tuple(runs), schedule.record_times[first:], values, recorded, vector, kernel, at_ends,
@@ -218,10 +214,9 @@ def _edges(schedule: Schedule, first: int, runs: Sequence[Run]) -> list[int]:
 
 
 class _Watch:
-    """Progress of several threads, and whether they shall stop."""
+    """Progress of several threads."""
 
     def __init__(self, pieces: int, progress: Callable[[float], None] | None) -> None:
-        self.stop = threading.Event()
         self._pieces, self._done = pieces, 0
         self._progress, self._lock = progress, threading.Lock()
 
@@ -275,8 +270,6 @@ class _Carried:
         schedule, every = self._schedule, self._schedule.record_frames
         silent = replace(schedule, record_frames=schedule.frames + 1)  # but for the first row
         for begin, end in pairwise(edges):
-            if watch.stop.is_set():
-                break
             first = -(-begin // every) - skipped
             self._change(begin, values[:, :, max(first, 0) :])
             last = (schedule.rows if end == schedule.frames else -(-end // every)) - skipped

@@ -89,7 +89,7 @@ static inline double seconds(const run *r) {
   return r->origin + STEP * SUBSTEPS * (double)r->frame;
 }
 
-static double unsettled(const run *r) { return r->state[STATE - 2]; }
+static double unsettled(const run *r) { return r->state[STATE - COUNTERS]; }
 
 static double *place_of(run *r, unsigned k) {
   const int at = variables[k].index;

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.recording import energy_signals, open_books_of
+from bywire.bench.recording import energy_doubts_of, energy_signals
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, unestimated
 from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of
@@ -86,7 +86,7 @@ def replay(
     return Replayed(
         _driving(measured), _beside_all(measured, modeled), measured.run,
         (*measured.notes, *missed_samples(measured.data, measured.compared),
-         *open_books_of(measured.run, modeled),
+         *energy_doubts_of(measured.run, modeled),
          *([unestimated(failures)] if failures and not others else [])),
         others,
     )  # fmt: skip
