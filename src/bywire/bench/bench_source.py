@@ -8,6 +8,7 @@ from difflib import SequenceMatcher
 from pathlib import Path
 
 from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.experiment_choice import former_names
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.errors import ParameterError
@@ -45,9 +46,13 @@ def content_of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, s
         return {"experiment": name}
     if definition is None:
         sets = ", ".join(PARAMETER_SETS.all())
+        former = "".join(
+            f"; that of the {assembly} is called {now!r} now"
+            for now, assembly in former_names(name).items()
+        )
         raise ParameterError(
             f"experiment {name!r} is for any brake: say for which, with --set parameters=NAME "
-            f"({sets})"
+            f"({sets}){former}"
         )
     chosen = main_set(definition.assembly, beside=type(definition.defaults))
     return {"experiment": name, "parameters": chosen}
