@@ -194,10 +194,10 @@ def test_different_spans_are_said(results):
 def test_a_static_characteristic_is_compared_by_its_figures():
     with pytest.warns(AnswerWarning, match="not drawn"):
         comparison = bywire.compare(
-            "stribeck", "hard-braking", overrides={"seal.T_pr": "0.003 N*m"}
+            "seal-stribeck", "hard-braking", overrides={"seal.T_pr": "0.003 N*m"}
         )
     (row,) = [each for each in comparison.settings if each.name == "experiment"]
-    assert row.values == ("stribeck", "hard-braking")
+    assert row.values == ("seal-stribeck", "hard-braking")
 
 
 @pytest.mark.parametrize("count", [0, 1])
@@ -248,7 +248,7 @@ def test_a_damaged_recording(folders, tmp_path):
 
 def test_a_folder_whose_settings_another_bench_lacks(results, folders):
     """Other options: what only one of two benches has stands beside a gap."""
-    ramp = bywire.run("stribeck")
+    ramp = bywire.run("seal-stribeck")
     (row,) = [e for e in bywire.compare(results[0], ramp).settings if e.name == "options.p_to"]
     assert row.values == (37e5, None)
 

@@ -87,7 +87,7 @@ def test_netcdf_gives_the_same_recording_back(recording, tmp_path):
 
 
 def test_static_characteristic_gives_itself_back_too(tmp_path):
-    curve = run_once(bywire.Bench("stribeck", "dardanelli2010")).recordings["curve"]
+    curve = run_once(bywire.Bench("seal-stribeck", "dardanelli2010")).recordings["curve"]
     path = bywire.write_recording(curve, tmp_path / "curve.nc")
     xr.testing.assert_identical(bywire.read_recording(path), curve)
 

@@ -83,7 +83,7 @@ def test_noise_is_the_same_whatever_the_duration():
 
 
 def test_recording_can_be_made_again():
-    bench = bywire.Bench("open-loop", SET, options=SHORT, stimulus=STEP, seed=4)
+    bench = bywire.Bench("motor-open-loop", SET, options=SHORT, stimulus=STEP, seed=4)
     recording = run_once(bench).recording
     attrs = recording.attrs
     again = bywire.Bench(
@@ -98,7 +98,7 @@ def test_recording_can_be_made_again():
 def test_breakaway_is_that_of_the_highest_pressure_in_any_order():
     names = ("breakaway_apply", "breakaway_release")
     found = [
-        [run_once(bywire.Bench("stribeck", SET, options={"pressures": p})).kpi(n).value
+        [run_once(bywire.Bench("seal-stribeck", SET, options={"pressures": p})).kpi(n).value
          for n in names]
         for p in ("2 bar, 20 bar, 40 bar", "40 bar, 2 bar, 20 bar")
     ]  # fmt: skip

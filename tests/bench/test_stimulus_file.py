@@ -15,7 +15,7 @@ from bywire.data.writing import write_measurement
 from run_once import run_once
 
 BENCH = """
-experiment = "open-loop"
+experiment = "motor-open-loop"
 parameters = "dardanelli2010"
 [options]
 duration = "0.3 s"

@@ -199,7 +199,7 @@ def test_parameters_go_on_as_a_bench_file(tmp_path: Path, dither: str) -> None:
     assert "# the experiment sets this itself: drive.mode" in other
     path.write_text(other)
     load(path)
-    driven = parameter_file("open-loop", "dardanelli2010", par, {"motor.R_m": 0.321})
+    driven = parameter_file("motor-open-loop", "dardanelli2010", par, {"motor.R_m": 0.321})
     assert "# experiment 'open-loop' wants more than this file says" in driven
     path.write_text(driven)
     assert load(path).par.leaves()["motor.R_m"] == 0.321

@@ -15,7 +15,7 @@ from command_line import BRAKING, OPEN_LOOP, QUICK, SCRIPT, refused
 from bywire import __version__
 from bywire.bench.experiment import EXPERIMENTS
 
-CURVE = 'experiment = "stribeck"\nparameters = "dardanelli2010"\n'  # the quickest result
+CURVE = 'experiment = "seal-stribeck"\nparameters = "dardanelli2010"\n'  # the quickest result
 MISSED = CURVE + '[requirements]\nbreakaway_apply = "<= 1 mN*m"\n'
 STRICT = QUICK + '\n[requirements]\npeak_current = "<= 1 A"\nenergy = ">= 1 kJ"\n'
 

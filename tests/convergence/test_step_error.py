@@ -22,7 +22,7 @@ from bywire.bench.step_error import OTHER_STEPS, with_step_errors
 from bywire.core.errors import BywireError, RunError
 from bywire.simulation.run import simulate
 
-STATIC = ("stribeck", "open-loop")
+STATIC = ("seal-stribeck", "motor-open-loop")
 """one is computed without a run, the other needs a stimulus"""
 SERIES = ("repeated-stops",)
 """twenty stops, each time"""

@@ -19,7 +19,7 @@ WRITERS = {
     "run": ["run", "hard-braking", "--set", "options.duration=40 ms", "--out", "{out}"],
     "ramp": ["run", "friction-ramp", "--set", "options.slope=2 A/s",
              "--set", "options.i_max=0.1 A", "--out", "{out}"],
-    "stribeck": ["run", "stribeck", "--out", "{out}"],
+    "stribeck": ["run", "seal-stribeck", "--out", "{out}"],
     "identify": ["identify", "seal-friction", "--synthetic", "1", "--out", "{out}"],
     "study": ["identify", "seal-friction", "--study", "3", "--out", "{out}"],
     "margins": ["margins", "pressure", "--out", "{out}"],

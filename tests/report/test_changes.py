@@ -86,7 +86,7 @@ def test_every_road_lists_what_was_changed(tmp_path):
 
 
 def test_a_comparison_reads_changes_back_from_a_folder(tmp_path):
-    bywire.run("stribeck", {"seal.T_pr": "4 mN*m"}, estimate_error=False).write(tmp_path)
+    bywire.run("seal-stribeck", {"seal.T_pr": "4 mN*m"}, estimate_error=False).write(tmp_path)
     found = bywire.compare(tmp_path, tmp_path)
     assert "seal.T_pr = 0.004 N·m (was 0.002 N·m)" in str(found)
     assert found.as_object()["runs"][0]["changes"]["seal.T_pr"]["instead_of"] == "0.002 N·m"

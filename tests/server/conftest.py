@@ -19,7 +19,7 @@ from bywire.server.guard import cookie_name
 from bywire.server.serving import Opened, opened
 
 LARGEST = 3_000_000
-CURVE = 'experiment = "stribeck"\nparameters = "dardanelli2010"\n'
+CURVE = 'experiment = "seal-stribeck"\nparameters = "dardanelli2010"\n'
 
 STANDIN = """
 import json, sys, time

@@ -303,6 +303,8 @@ def _remark(verdict: Verdict) -> str:
             f"requirement undecided: {verdict.kpi} is {written}, give or take "
             f"{amount(verdict.error, verdict.unit, 2)} from the step{wanted}: take a smaller step"
         )
+    if not verdict.is_decided and not math.isinf(verdict.error):
+        return f"requirement undecided: {verdict.kpi} is not defined{wanted} ({verdict.note})"
     if not verdict.is_decided:
         return (
             f"requirement undecided: {verdict.kpi} is defined with one of the steps and half of "

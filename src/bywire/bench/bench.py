@@ -107,6 +107,7 @@ class Bench:
         if self.assembly == known.assembly:
             object.__setattr__(self, "assembly", "")
         chosen = self.definition
+        object.__setattr__(self, "experiment", chosen.name)  # not an earlier name of it
         if chosen.assembly != self.system:
             raise ParameterError(
                 f"experiment {chosen.name!r} tests a {chosen.assembly}, but "
@@ -156,7 +157,7 @@ class Bench:
 
     @cached_property
     def definition(self) -> Experiment:
-        """The experiment behind the name: one of the brake itself goes before one of any brake."""
+        """The experiment behind the name."""
         return experiment_of(self.experiment, self.parameters, self.assembly, self.options)
 
     @cached_property

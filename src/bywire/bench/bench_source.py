@@ -8,6 +8,7 @@ from difflib import SequenceMatcher
 from pathlib import Path
 
 from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.experiment_choice import former_names
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.core.catalog import PARAMETER_SETS, main_set, sets_of_loaded
 from bywire.core.errors import ParameterError
@@ -63,9 +64,14 @@ def usual_set(name: str) -> str:
     sets = sets_of_loaded()
     if len(sets) == 1:
         return sets[0]
+    known = ", ".join(sets or PARAMETER_SETS.all())
+    former = "".join(
+        f"; that of the {assembly} is called {now!r} now"
+        for now, assembly in former_names(name).items()
+    )
     raise ParameterError(
         f"experiment {name!r} is for any brake: say for which, with --set parameters=NAME "
-        f"({', '.join(sets or PARAMETER_SETS.all())})"
+        f"({known}){former}"
     )
 
 

@@ -45,7 +45,8 @@ class Verdict:
     error
         Estimated error of the value, in ``unit``; NaN where it was not estimated.
     is_decided
-        Whether the value is further from the limit than it may be wrong.
+        Whether the recording shows what the value is, and this is further from the limit than it
+        may be wrong.
     """
 
     kpi: str
@@ -86,15 +87,16 @@ def check(requirements: Mapping[str, str], kpis: Mapping[str, str]) -> None:
 def judge(requirements: Mapping[str, str], kpis: Sequence[Kpi]) -> tuple[Verdict, ...]:
     """Compare KPIs with their limits, which :func:`check` has admitted.
 
-    Undecided is what lies no further from its limit than its error; a KPI without an error
-    estimate is taken as it is.
+    Undecided is what lies no further from its limit than its error, and what the recording leaves
+    open; a KPI without an error estimate is taken as it is.
     """
     by_name = {kpi.name: kpi for kpi in kpis}
     verdicts = []
     for name, text in requirements.items():
         kpi = by_name[name]
         compare, bound = limit_of(name, text, kpi.unit)
-        is_decided = not (abs(kpi.value - bound) <= kpi.error or math.isinf(kpi.error))
+        is_close = abs(kpi.value - bound) <= kpi.error or math.isinf(kpi.error)
+        is_decided = not (is_close or kpi.is_open)
         met = is_decided and not math.isnan(kpi.value) and bool(_COMPARE[compare](kpi.value, bound))
         verdicts.append(
             Verdict(name, text, kpi.value, kpi.unit, met, kpi.note, kpi.error, is_decided)

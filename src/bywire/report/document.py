@@ -214,6 +214,8 @@ class Document:
         File of the page.
     has_files
         Whether it may be written into a folder; its JSON object then lists the files.
+    headline
+        What a reader must know first: the first words on a terminal and of the JSON object.
     changes
         What the user changed, which a terminal shows first and the JSON object has by name; None
         where nothing can be. A page has it where its sections put it (`bywire.report.changes`).
@@ -234,6 +236,7 @@ class Document:
     is_paged: bool = True
     page_name: str = "report.html"
     has_files: bool = True
+    headline: str = ""
     changes: Sequence[Change] | None = None
 
     @cached_property
@@ -245,6 +248,7 @@ class Document:
     def facts(self) -> Mapping[str, Any]:
         """The JSON object, made on first use."""
         data = self.data() if callable(self.data) else self.data
+        data = {"headline": self.headline, **data} if self.headline else data
         if self.changes is None:
             return data
         return {**data, "changes": {

@@ -31,8 +31,9 @@ LONGEST_VALUE = 60
 def terminal_text(document: Document) -> str:
     """Return what a terminal shows of a document; figures are left out."""
     shown = (each for each in document.brief if not isinstance(each, FigureBlock | Drawing))
+    first = [_text(Paragraph(document.headline)), ""] if document.headline else []
     changed = [_bullet(text) for text in change_texts(document.changes or ())]
-    return "\n".join([*changed, *map(_text, shown)])
+    return "\n".join([*first, *changed, *map(_text, shown)])
 
 
 def change_texts(changes: Sequence[Change]) -> list[str]:

@@ -267,7 +267,7 @@ def test_what_cannot_be_exported_is_said(tmp_path: Path, monkeypatch: pytest.Mon
     with pytest.raises(ParameterError, match="makes 9 runs, and one is exported"):
         export_fmu("friction-sweep", tmp_path)
     with pytest.raises(ParameterError, match="without any run"):
-        export_fmu("stribeck", tmp_path)
+        export_fmu("seal-stribeck", tmp_path)
     with pytest.raises(UnknownNameError, match="part 'plants': did you mean 'plant'"):
         export_fmu(MOTORCYCLE, tmp_path, part="plants")
     failing = [{"fault": "motor.demagnetized", "onset": "50 ms"}]

@@ -21,7 +21,8 @@ TICK = 1e-3
 MODES = ["mode.omega", "mode.p_mc", "mode.contact_1", "mode.changes"]
 # Pressure builds up, the piston sticks, is thrown back to its end stop, and touches it again.
 THROWN = bywire.Bench(
-    "open-loop", "dardanelli2010", options={"settle": 0.02, "duration": 0.12, "source": "voltage"},
+    "motor-open-loop", "dardanelli2010",
+    options={"settle": 0.02, "duration": 0.12, "source": "voltage"},
     stimulus={"kind": "table", "times": [0.0, 0.025, 0.04, 0.08],
               "values": [6.0, 0.6, -7.2, -2.4], "between": "hold"},
 )  # fmt: skip

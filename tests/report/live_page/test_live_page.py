@@ -216,7 +216,7 @@ def test_parameters_that_drive_the_run_are_held(pages):
         ({"vary": ["motor.R"]}, UnknownNameError, "motor.R_m"),
         ({"vary": ["motor_heat.R_wh"]}, bywire.BywireError, "motor_heat"),
         ({"bench": "force-cycle"}, ParameterError, "choose it"),
-        ({"bench": "stribeck"}, ParameterError, "without any run"),
+        ({"bench": "seal-stribeck"}, ParameterError, "without any run"),
     ],
 )
 def test_what_makes_no_page_is_said(tmp_path, given, error, text):

@@ -48,14 +48,16 @@ function judge() {
   place("stated").hidden = !isStated;
   place("figures").tBodies[0].replaceChildren(...judged.figures.map((figure) => {
     const computed = followed.length && following.includes(figure.name)
-      ? { value: NaN, reason: `an option follows ${followed}: save the bench file and run it` }
+      ? { value: NaN, reason: `an option follows ${followed}: save the bench file and run it`, open: true }
       : run.figures[figure.name];
     const unit = figure.unit && ` ${figure.unit}`;
     const value = computed.reason ? element("td", { class: "number", title: computed.reason }, "–")
       : element("td", { class: "number" }, digits(shownOf(computed.value, figure)) + unit);
     const met = figure.limit && isMet(computed, figure.limit);
+    const outcome = computed.open ? "undecided" : met ? "met" : "missed";
+    const mark = { undecided: "?", met: "✓", missed: "✗" }[outcome];
     const verdict = figure.limit
-      ? element("td", { class: met ? "met" : "missed" }, `${met ? "✓" : "✗"} ${figure.text}`)
+      ? element("td", { class: outcome, title: computed.reason }, `${mark} ${figure.text}`)
       : element("td", {}, computed.reason);
     const { text, where } = figure.stated ?? { text: "", where: "" };
     const stated = isStated ? [element("td", {}, text, element("span", { class: "meaning" }, ` ${where}`))] : [];

@@ -159,7 +159,7 @@ def _family(name: str, setting: Any) -> dict[str, Any]:
         "name": name, "entry": entry_of(name), "figures": list(family.measures),
         "signals": [getattr(setting, field) for field in how.signals],
         "setting": np.nan_to_num(how.packed(setting, 1)).tolist(), "room": how.room,
-        "reasons": ["", *how.reasons], "failures": ["", *how.failures],
+        "reasons": ["", *how.reasons], "open": list(how.open), "failures": ["", *how.failures],
     }  # fmt: skip
 
 
