@@ -106,7 +106,7 @@ def read_wanted(
         known = {**meaning.signals, **dict.fromkeys(source.columns if not meaning.signals else ())}
         named = dict(_named(text, known) for text in wanted)
         is_mapped = bool(meaning.signals) and {*named} <= {*wanted}
-        if named and not is_mapped and any(column != name or name not in known for name, column in named.items()):
+        if named and not is_mapped:
             signals = {name: _signal(meaning, name, column) for name, column in named.items()}
             meaning = replace(meaning, signals=signals)
         return dataset_of(file, source, meaning, list(named) or None, progress, room())
