@@ -56,14 +56,13 @@ def usual_set(name: str) -> str:
     ParameterError
         For an experiment of any brake where there are several sets to choose from.
     """
-    definition = EXPERIMENTS.get(name)
+    definition, is_generic, sets = EXPERIMENTS.get(name), name in _any_brake(), sets_of_loaded()
+    if is_generic and len(sets) == 1:
+        return sets[0]
     if definition is not None:
         return main_set(definition.assembly, beside=type(definition.defaults))
-    if name not in _any_brake():
+    if not is_generic:
         raise EXPERIMENTS.unknown(name, GENERIC_EXPERIMENTS)
-    sets = sets_of_loaded()
-    if len(sets) == 1:
-        return sets[0]
     known = ", ".join(sets or PARAMETER_SETS.all())
     former = "".join(
         f"; that of the {assembly} is called {now!r} now"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,53 @@ from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
 
 _CLOCKS = ("time", "t")
 _SHOWN = 12
+
+
+class MissingUnitsError(UnitError):
+    """Columns that have no unit, all of those that are to be read.
+
+    Parameters
+    ----------
+    file
+        Where they stand.
+    signals
+        Name of the signal -> its column.
+    clock
+        Column of the instants, where it has none either.
+    """
+
+    def __init__(self, file: Path, signals: Mapping[str, str], clock: str = "") -> None:
+        self.signals, self.clock = dict(signals), clock
+        columns = [*map(quoted, self.signals.values()), *([quoted(clock)] if clock else [])]
+        each = "it has" if self.signals else "the time has"
+        self.lacking = (
+            f"{file}, columns {', '.join(columns)}: they have no unit"
+            if len(columns) > 1
+            else f"{file}, column {columns[0]}: {each} no unit"
+        )
+        title, inside = f"{clock} [ms]", f'time = {{ column = "{clock}", unit = "ms" }}'
+        for name, column in self.signals.items():
+            title, inside = f"{column} [mm]", f"[signals.{name}] unit = 'mm'"
+        super().__init__(
+            f"{self.lacking}: write it behind the title, as '{title}', or in a mapping, as "
+            f"{inside}, or '1' for none"
+        )
+
+
+class NoClockError(FileError):
+    """A file that does not say when it was measured.
+
+    Parameters
+    ----------
+    text
+        What to do about it.
+    signals
+        Name of the signal -> its column, of those to be read that have no unit either.
+    """
+
+    def __init__(self, text: str, signals: Mapping[str, str]) -> None:
+        self.text, self.signals = text, dict(signals)
+        super().__init__(text)
 
 
 @dataclass(frozen=True)
@@ -102,7 +149,29 @@ def choose(
         wanted = {name: wanted[name] for name in signals}
     if not wanted:
         raise FileError(f"{file} holds no signal: {_listing(source.columns)}")
-    return [_chosen(file, source, meaning, signal) for signal in wanted.values()]
+    chosen: list[Chosen] = []
+    lacking: dict[str, str] = {}
+    clock, timeless = "", ""
+    for signal in wanted.values():
+        try:
+            unit = signal.unit or _title_unit(source, signal.column)
+            chosen.append(_chosen(file, source, meaning, replace(signal, unit=unit)))
+        except MissingUnitsError as error:
+            lacking |= error.signals
+            clock = clock or error.clock
+        except NoClockError as error:
+            lacking |= error.signals
+            timeless = error.text
+    if timeless:
+        raise NoClockError(timeless, lacking)
+    if lacking or clock:
+        raise MissingUnitsError(file, lacking, clock)
+    return chosen
+
+
+def _title_unit(source: Source, column: str) -> str:
+    """Return the unit that stands in brackets behind the name of a column, if it is not its own."""
+    return "" if column in source.columns else split_title(column)[1]
 
 
 def every_signal(
@@ -111,7 +180,7 @@ def every_signal(
     """Return every column that is no clock under its own name."""
     clocks = {c.clock for c in source.columns.values()}
     if meaning.clock is not None and meaning.clock.column:
-        clocks |= {meaning.clock.column}
+        clocks |= {_column(file, source, meaning.clock.column, "time.column").name}
     elif clocks == {None} or meaning.clock is not None:
         clocks |= {_usual_clock(source)}
     names = [name for name in source.columns if name not in clocks]
@@ -122,14 +191,17 @@ def _chosen(
     file: Path, source: Source, meaning: MeasurementMapping, signal: SignalMapping
 ) -> Chosen:
     column = _column(file, source, signal.column, f"signals.{signal.name}.column")
-    clock = _clock(file, source, column, signal.clock or meaning.clock)
     unit = signal.unit or column.unit
+    lacking = {} if unit else {signal.name: column.name}
+    try:
+        clock = _clock(file, source, column, signal.clock or meaning.clock)
+    except MissingUnitsError as error:
+        raise MissingUnitsError(file, lacking, error.clock) from None
+    except NoClockError as error:
+        raise NoClockError(error.text, lacking) from None
     where = f"{file}, column {quoted(column.name)}"
-    if not unit:
-        raise UnitError(
-            f"{where}: it has no unit: write it behind the title, as '{signal.name} [mm]', or in a "
-            f"mapping, as [signals.{signal.name}] unit = 'bar', or '1' for none"
-        )
+    if lacking:
+        raise MissingUnitsError(file, lacking)
     known_unit = _known_unit(unit, where)
     if signal.unit and column.unit and signal.scale is None:
         _require_same(signal, column, where)
@@ -176,6 +248,7 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
     if given is not None and given.rate:
         return given
     if given is not None:
+        given = replace(given, unit=given.unit or _title_unit(source, given.column))
         clock = _column(file, source, given.column, "time.column")
     else:
         name = column.clock or _usual_clock(source)
@@ -183,21 +256,19 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
             before = (
                 "; where other lines stand before the table, a mapping's skip_lines tells how many"
             )
-            raise FileError(
+            raise NoClockError(
                 f"{file} does not say when it was measured: call a column 'time [s]', or write in "
                 "a mapping "
                 'time = { column = "t", unit = "ms" } or rate = "1 kHz"; '
                 + _listing(source.columns)
-                + (before if len(source.columns) == 1 else "")
+                + (before if len(source.columns) == 1 else ""),
+                {},
             )
         clock = source.columns[name]
     unit = (given.unit if given is not None else "") or clock.unit
     where = f"{file}, column {quoted(clock.name)}"
     if not unit:
-        raise UnitError(
-            f"{where}: the time has no unit: write in a mapping "
-            f'time = {{ column = "{clock.name}", unit = "ms" }}'
-        )
+        raise MissingUnitsError(file, {}, clock.name)
     if not measures(_known_unit(unit, where), "s"):
         raise UnitError(f"{where}: {unit!r} is no unit of time: choose another column")
     if given is not None and given.unit and clock.unit:

@@ -69,6 +69,11 @@ def mapping() -> Field:
     return Field("mapping", "What the columns mean", "thing", texts.MAP, offered=_maps)
 
 
+def time() -> Field:
+    """Return the field of the column that holds the instants."""
+    return Field("time", "Time", hint=texts.TIME)
+
+
 def error_estimate() -> Field:
     """Return the field of the estimate of the error from the step."""
     return Field("error_estimate", "Estimate the error", "flag", texts.ERROR_ESTIMATE, default=1)
