@@ -12,14 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import FileError, UnitError, quoted, unknown_name
-from bywire.data.column_units import (
-    convert_in_place,
-    converted,
-    measures,
-    si_symbol,
-    split_title,
-    unit_of,
-)
+from bywire.core.unit_list import Scale
+from bywire.data.column_units import convert_in_place, measures, si_symbol, split_title, unit_of
 from bywire.data.file_format import Column, Source
 from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
 
@@ -130,29 +124,20 @@ def _chosen(
             f"{where}: it has no unit: write it behind the title, as '{signal.name} [mm]', or in a "
             f"mapping, as [signals.{signal.name}] unit = 'bar', or '1' for none"
         )
-    known_unit = _known_unit(unit, where)
+    symbol = si_symbol(_known_unit(unit, where))
     if signal.unit and column.unit and signal.scale is None:
         _require_same(signal, column, where)
-    # A unit that is SI already keeps its name, for instance Pa*s.
-    plain = float(converted(np.array([1.0]), known_unit, si_symbol(known_unit))[0]) == 1.0
-    keeps = plain and si_symbol(known_unit) != "1" and unit.isascii() and unit[0].isalpha()
-    symbol = _plain(unit) if keeps else si_symbol(known_unit)
     label = signal.label or column.label or signal.name
     return Chosen(signal, column.name, clock, unit, symbol, label, column.meanings)
 
 
-def _plain(unit: str) -> str:
-    """Return the SI unit as the dataset writes it."""
-    return {"Nm": "N*m"}.get(unit, unit)
-
-
-def _known_unit(unit: str, where: str) -> Any:
+def _known_unit(unit: str, where: str) -> Scale:
     try:
         return unit_of(unit)
-    except ValueError:
+    except UnitError as error:
         raise UnitError(
-            f"{where}: {quoted(unit)} is no known unit: write it in a mapping, for instance "
-            "unit = 'bar', or '1' for none"
+            f"{where}: {error}: write the unit in a mapping, for instance unit = 'bar', or '1' for "
+            "a pure number"
         ) from None
 
 
@@ -160,10 +145,7 @@ def _require_same(signal: SignalMapping, column: Column, where: str) -> None:
     """Refuse a mapping whose unit is another one than the file's."""
     unit = _known_unit(column.unit, where)
     said = unit_of(signal.unit)
-    two = np.array([1.0, 2.0])
-    if measures(unit, si_symbol(said)) and np.array_equal(
-        converted(two, unit, si_symbol(said)), converted(two, said, si_symbol(said))
-    ):
+    if (unit.factor, unit.zero, unit.powers) == (said.factor, said.zero, said.powers):
         return
     raise UnitError(
         f"{where}: the file says {column.unit!r} and the mapping {signal.unit!r}: leave "
@@ -217,7 +199,7 @@ def _usual_clock(source: Source) -> str | None:
 def _is_time(unit: str) -> bool:
     try:
         return measures(unit_of(unit), "s")
-    except ValueError:
+    except UnitError:
         return False
 
 

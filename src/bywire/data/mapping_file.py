@@ -152,9 +152,9 @@ def _unit(table: Mapping[str, Any], name: str) -> str:
     try:
         if "unit" in table:
             unit_of(text)
-    except ValueError:
+    except UnitError as error:
         raise UnitError(
-            f"{name} = {quoted(text)} is no known unit: write for instance 'bar', or '1' for none"
+            f"{name} = {quoted(text)}: {error}: write for instance 'bar', or '1' for a pure number"
         ) from None
     return text
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bywire.core.errors import FileError, quoted
+from bywire.core.errors import FileError, UnitError, quoted
 from bywire.data.column_units import split_title, unit_of
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
@@ -171,7 +171,7 @@ def _bare(cell: str) -> str:
 def _is_unit(text: str) -> bool:
     try:
         unit_of(text)
-    except ValueError:
+    except UnitError:
         return False
     return True
 

@@ -13,7 +13,7 @@ _BASES = {"kg": "kg", "m": "m", "s": "s", "A": "A", "K": "K", "mol": "mol", "cd"
 
 
 def unit_definitions(units: Iterable[str]) -> Element:
-    """Return the element ``UnitDefinitions`` of both versions, for SI units in the syntax of pint.
+    """Return the element ``UnitDefinitions`` of both versions.
 
     Each with the unit in which bywire shows it, where that is another one.
     """
@@ -24,7 +24,7 @@ def unit_definitions(units: Iterable[str]) -> Element:
         shown = SubElement(made, "Unit", name=unit)
         powers = base_powers(unit, tuple(_BASES))
         exponents = {name: str(int(p)) for name, p in zip(_BASES, powers, strict=True) if p}
-        if "rad" in unit:  # pint takes it as a pure number
+        if "rad" in unit:  # `base_powers` of these bases leaves it out
             exponents["rad"] = str(_radians(unit))
         SubElement(shown, "BaseUnit", {k: v for k, v in exponents.items() if v != "0"})
         display = display_unit(unit)
