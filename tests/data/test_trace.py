@@ -71,7 +71,7 @@ def test_without_names_every_column_comes_in_si(tmp_path):
         ("time [s], pedl [mm]\n0,1\n1,2\n", r"no column 'pedal'.* is it 'pedl'"),
         ("clock [s], pedal [mm]\n0,1\n1,2\n", r"does not say when .*: call a column 'time \[s\]'"),
         ("time [s], pedal [mm], Pedal [mm]\n0,1,1\n1,2,1\n", "'pedal': the name stands twice"),
-        (b"time [s], pedal [mm]\n0,1\n1,2 \xb5\n", "line 3: it is not UTF-8: save"),
+        (b"time [s], pedal [mm]\n0,1\n1,2 \xb5\n", "line 3: it is not UTF-8: name its encoding"),
     ],
 )
 def test_refused_files(tmp_path, content, text):

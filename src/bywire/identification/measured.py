@@ -15,7 +15,7 @@ from bywire.data.channel_quality import AlignmentReport
 from bywire.data.column_units import measures, unit_of_symbol
 from bywire.data.file_format import Progress, no_progress
 from bywire.data.mapping_file import read_mapping
-from bywire.data.measurement import read_measurement
+from bywire.data.measurement import read_with_notes
 from bywire.identification.noise import noise_of
 from bywire.identification.records import joined
 
@@ -84,7 +84,9 @@ def measured(
         if isinstance(source, xr.Dataset):
             data, where, label = source, "the measurement", f"record_{number}"
         else:
-            data, where = read_measurement(source, meaning, progress=progress), str(source)
+            data, remarks = read_with_notes(source, meaning, progress=progress)
+            where = str(source)
+            notes += [f"{name_of(source)}: {remark}" for remark in remarks]
             label = Path(source).stem if Path(source).stem not in records else where
         if signals is not None:
             too = {n: unit for n, unit in (optional or {}).items() if n in data}

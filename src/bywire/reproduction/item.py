@@ -52,7 +52,7 @@ class Fact:
     value
         The number in ``unit``, as printed.
     unit
-        Unit as the source prints it,; ``"1"`` for a pure number.
+        Unit as the source prints it; ``"1"`` for a pure number.
     where
         Place in the source.
     kind
