@@ -81,7 +81,7 @@ def test_nodes_come_from_any_measurement_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ('unit = "bra"', "stimulus.unit = 'bra' is no known unit"),
+        ('unit = "bra"', "stimulus.unit = 'bra': the unit 'bra' is not known"),
         ("column = true", "stimulus.column"),
         ('rate = "5 ms"', "rate = '5 ms' has the wrong unit"),
         ('tme = "t"', "tme"),

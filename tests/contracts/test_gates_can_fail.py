@@ -83,14 +83,14 @@ MISTAKES = {
         "par.K_e * u.omega)",
         "par.K_e)",
         on(check_units, "balance"),
-        "DimensionalityError",
+        "DimensionError",
     ),
     "unlike branches": Mistake(
         "plant/caliper",
         "(p > p0, s, slope)",
         "(p > p0, s, 1.0)",
         on(check_units, "mass"),
-        "DimensionalityError",
+        "DimensionError",
     ),
     "wrong unit of one choice": Mistake(
         "plant/reservoir_port", "G=0.0 * par.G_port", "G=par.x_port", on(check_units, "output")

@@ -37,12 +37,20 @@ class Conversion(Answer):
         Its signals, SI.
     alignment
         How they were brought to one time axis; None where they were left on their own.
+    remarks
+        What the user should know of how the file was read.
     """
 
     source: Path
     target: Path
     recording: xr.Dataset
     alignment: AlignmentReport | None = None
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> list[str]:
+        """What is left out, counts as missing, or was guessed when the file was read."""
+        return list(self.remarks)
 
     def document(self) -> Document:
         """Return the signals, and what was found while they were aligned."""
@@ -93,6 +101,7 @@ class Conversion(Answer):
                 "folded": list(report.folded),
                 "channels": {channel.name: _channel(channel) for channel in report.channels},
             },
+            "notes": list(self.remarks),
             "files": [str(self.target)],
         }  # fmt: skip
 
@@ -168,12 +177,12 @@ def convert(
             raise ParameterError(
                 f"--{option} {value}: it says how to resample: give the rate too, as --rate '1 kHz'"
             )
-    dataset = read_wanted(source, mapping_of(mapping), signals, time, shown)
+    dataset, notes = read_wanted(source, mapping_of(mapping), signals, time, shown)
     report = None
     if rate is not None:
         dataset, report = _aligned(dataset, rate, method, exclude, max_gap)
     write_measurement(dataset, target, format=format, overwrite=force, progress=shown)
-    return Conversion(source, target, dataset, report)
+    return Conversion(source, target, dataset, report, notes)
 
 
 def _aligned(

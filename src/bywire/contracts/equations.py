@@ -61,7 +61,7 @@ def is_in_SI(function: Function) -> Iterator[Evidence]:
     arguments, returns = signature_of(function)
     for argument, annotation in (*arguments.items(), ("result", returns)):
         for name, number in numbers(argument, annotation).items():
-            factor = float(Dimensioned(1.0, number.unit).quantity.magnitude)
+            factor = Dimensioned(1.0, number.unit).value
             yield measured(
                 abs(factor - 1.0), PREFIX, f"{name} [{number.unit}] is {factor:g} of SI"
             )

@@ -56,7 +56,7 @@ class Signal:
     Parameters
     ----------
     unit
-        SI unit in the syntax of pint; ``"1"`` for a pure number.
+        SI unit; ``"1"`` for a pure number.
     label
         What an axis of a figure says.
     nominal

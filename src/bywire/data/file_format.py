@@ -59,6 +59,21 @@ class Source(Protocol):
         """Every column of numbers by its name, clocks among them."""
         ...
 
+    @property
+    def order(self) -> Sequence[str]:
+        """Names by the number of a column, from 1, those of `left_out` among them."""
+        ...
+
+    @property
+    def left_out(self) -> Mapping[str, str]:
+        """What the file holds beside the columns, by its name, and why it is not read."""
+        ...
+
+    @property
+    def remarks(self) -> Sequence[str]:
+        """What the user should know of the file, as far as it was read."""
+        ...
+
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
         """Return the numbers of some columns, each of shape ``(row,)`` and free to be changed.
 
@@ -75,7 +90,10 @@ class Source(Protocol):
 
 
 class PieceSource(Protocol):
-    """An open file of columns as a library reads it in a child process, piece by piece."""
+    """An open file of columns as a library reads it in a child process, piece by piece.
+
+    It may have ``left_out`` and ``remarks``, as a `Source` has them.
+    """
 
     @property
     def columns(self) -> Mapping[str, Column]:
@@ -100,10 +118,19 @@ class ReadOptions:
         Decimal mark of a text table, ``"."`` or ``","``; found out where it is empty.
     skip_lines
         Lines before the header of a text table.
+    titles
+        Whether the first row of a text table holds titles; found out where it is None.
+    encoding
+        How a text table writes characters; UTF-8, or as its byte-order mark says, where empty.
+    missing
+        Cells of a text table that say that nothing was measured, beside the usual ones.
     """
 
     decimal: str = ""
     skip_lines: int = 0
+    titles: bool | None = None
+    encoding: str = ""
+    missing: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -132,6 +159,8 @@ class FileFormat:
         A module that names some declares its format as ``FORMAT``.
     counts
         What a library calls a row, and the number of its first one.
+    also_reads
+        Endings of files that are read and never written.
     """
 
     name: str
@@ -143,6 +172,7 @@ class FileFormat:
     has_many_axes: bool = False
     libraries: tuple[str, ...] = ()
     counts: tuple[str, int] = ("row", 0)
+    also_reads: tuple[str, ...] = ()
 
 
 def library(name: str, what: str, extra: str = "measurements") -> ModuleType:

@@ -32,7 +32,7 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
     UnknownNameError
         When there is no such format.
     """
-    wanted = [FORMATS.find(name)] if name else _of_ending(path)
+    wanted = [FORMATS.find(name)] if name else _of_ending(path, to_read=True)
     head = head_of(path)
     if not head:
         raise FileError(f"{path} is empty (0 bytes): was the recording stopped or the copy cut?")
@@ -69,8 +69,12 @@ def format_to_write(path: Path, name: str = "") -> FileFormat:
     raise FileError(f"{path}: the ending {path.suffix!r} belongs to no format: use {endings}")
 
 
-def _of_ending(path: Path) -> list[FileFormat]:
-    return [kind for kind in FORMATS.all().values() if path.suffix.lower() in kind.endings]
+def _of_ending(path: Path, *, to_read: bool = False) -> list[FileFormat]:
+    ending = path.suffix.lower()
+    return [
+        kind for kind in FORMATS.all().values()
+        if ending in kind.endings or (to_read and ending in kind.also_reads)
+    ]  # fmt: skip
 
 
 def _names() -> str:

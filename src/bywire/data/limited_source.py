@@ -150,6 +150,9 @@ class LimitedSource:
         })  # fmt: skip
         columns = [Column(*fields) for fields in answer["columns"]]
         self.columns: Mapping[str, Column] = {column.name: column for column in columns}
+        self.left_out: Mapping[str, str] = answer["left_out"]
+        self.order: Sequence[str] = list(self.columns)
+        self.remarks: Sequence[str] = answer["remarks"]
         self.notes: Mapping[str, Any] = answer["notes"]
 
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
@@ -174,6 +177,7 @@ class LimitedSource:
             filled[k] += size
             progress(f"reading {self._path.name}", sum(filled) / total)
             answer = self._answer(None)
+        self.remarks = answer["remarks"]
         for name, column, size in zip(names, columns, filled, strict=True):
             if size != column.size:
                 raise self._torn(name, size, column.size)

@@ -52,8 +52,8 @@ class NamedColumns:
 
 def read_named(
     file: Path, meaning: MeasurementMapping, named: NamedColumns, progress: Progress
-) -> xr.Dataset:
-    """Read a measurement file: the signals that a user names, and all others of it.
+) -> tuple[xr.Dataset, tuple[str, ...]]:
+    """Read the signals of a measurement file that a user names, all others, and notes on them.
 
     Parameters
     ----------
@@ -82,8 +82,8 @@ def read_named(
 
 def read_wanted(
     file: Path, meaning: MeasurementMapping, wanted: Sequence[str], time: str, progress: Progress
-) -> xr.Dataset:
-    """Read the signals that a user wants of a measurement file.
+) -> tuple[xr.Dataset, tuple[str, ...]]:
+    """Read the signals that a user wants of a measurement file, and notes on them.
 
     Parameters
     ----------

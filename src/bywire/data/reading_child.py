@@ -5,8 +5,8 @@ crash, run without an end, or ask for all memory. Here that ends a child, and no
 
 Both ways messages go as a length, a JSON object, and for a piece of a column its numbers as they
 lie in memory: nothing is unpickled. The reader asks ``{path, folder, memory, seconds}``; the answer
-is ``{columns, notes}``. It asks for ``{names}`` as often as it likes, and ends with none; the
-answers are pieces ``{column, begin, count, kind}`` and ``{end}``. ``{error}`` and ``{memory}`` end
+is ``{columns, left_out, remarks, notes}``. It asks for ``{names}`` as often as it likes, and ends
+with none; the answers are pieces ``{column, begin, count, kind}`` and ``{end, remarks}``. ``{error}`` and ``{memory}`` end
 it early.
 
 On Linux the process imports the library once and forks for each file, so that a file costs
@@ -111,7 +111,9 @@ def _serve(
         with kind.open(path, ReadOptions()) as opened:
             source = cast(PieceSource, opened)
             columns = source.columns
-            described = {"columns": [astuple(column) for column in columns.values()]}
+            described: dict[str, Any] = {"columns": [astuple(c) for c in columns.values()]}
+            described["left_out"] = dict(getattr(source, "left_out", {}))
+            described["remarks"] = list(getattr(source, "remarks", []))
             send(answers, described | {"notes": getattr(source, "notes", {})})
             while names := (receive(requests) or {"names": []})["names"]:
                 for name, begin, part in source.pieces(names):
@@ -122,7 +124,7 @@ def _serve(
                     place = {"column": names.index(name), "begin": begin, "count": numbers.size,
                              "kind": NUMBERS.index(numbers.dtype.name)}  # fmt: skip
                     send(answers, place, numbers)
-                send(answers, {"end": True})
+                send(answers, {"end": True, "remarks": list(getattr(source, "remarks", []))})
     except FileError as error:
         send(answers, {"error": str(error)})
     except MemoryError:

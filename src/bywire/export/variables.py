@@ -33,7 +33,7 @@ class Variable:
     place, index
         Where the C code keeps it.
     unit, label
-        SI unit in the syntax of pint, and what it means.
+        SI unit, and what it means.
     start
         Value before anything is set; None of what is computed.
     leaf

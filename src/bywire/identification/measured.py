@@ -89,7 +89,9 @@ def measured(
         if isinstance(source, xr.Dataset):
             data, where, label = renamed(source, named), "the measurement", f"record_{number}"
         else:
-            data, where = read_named(Path(source), meaning, named, progress), str(source)
+            data, remarks = read_named(Path(source), meaning, named, progress)
+            where = str(source)
+            notes += [f"{name_of(source)}: {remark}" for remark in remarks]
             label = Path(source).stem if Path(source).stem not in records else where
         if signals is not None:
             too = {n: unit for n, unit in (optional or {}).items() if n in data}

@@ -57,7 +57,7 @@ class KpiRow:
     Parameters
     ----------
     name, value, unit
-        What it is called, its value in ``unit`` (``None`` for none) and the unit in pint's syntax.
+        What it is called, its value in ``unit`` (``None`` for none) and the unit.
     definition
         How it is computed.
     limit
@@ -92,7 +92,7 @@ class ReproductionRow:
     stated, computed
         Values in ``unit``; ``None`` where nothing is stated or computed.
     unit
-        Unit in pint's syntax.
+        Unit.
     tolerance
         Text, or a number in ``unit``; ``None`` for none; ``"<="`` or ``">="`` where the statement
         is a bound, which is then shown before it.
@@ -126,7 +126,7 @@ class ParameterRow:
     Parameters
     ----------
     name, value, unit
-        Dotted name, value in the SI ``unit`` of pint's syntax; a choice or a table may be a value.
+        Dotted name, value in the SI ``unit``; a choice or a table may be a value.
     range
         Admissible range as text.
     kind

@@ -65,7 +65,7 @@ def amount(
     value
         Number in ``symbol``; ``None`` where there is none, NaN where it is not defined.
     symbol
-        Unit in the syntax of pint; SI units are shown in their display unit.
+        Unit; SI units are shown in their display unit.
     digits
         Significant digits.
     like
@@ -107,7 +107,7 @@ def measured_amount(value: float | None, symbol: str, error: float, digits: int 
     value
         Number in ``symbol``; ``None`` where there is none, NaN where it is not defined.
     symbol
-        Unit in the syntax of pint; SI units are shown in their display unit.
+        Unit; SI units are shown in their display unit.
     error
         How far the value may be off, in ``symbol``; NaN where that is not known.
     digits
