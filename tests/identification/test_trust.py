@@ -93,11 +93,12 @@ def test_failures_are_told() -> None:
 
 
 def test_a_study_goes_on_from_its_store(tmp_path: Path) -> None:
-    store, seen = tmp_path / "experiments.jsonl", []
+    store, stopped, seen = tmp_path / "experiments.jsonl", tmp_path / "stopped", []
 
     def counted(par: None, options: Options, seed: int) -> xr.Dataset:
         seen.append(seed)
-        if seed == 103:
+        if seed == 103 and not stopped.exists():
+            stopped.touch()
             raise KeyboardInterrupt
         return made(par, options, seed)
 
@@ -106,13 +107,16 @@ def test_a_study_goes_on_from_its_store(tmp_path: Path) -> None:
         trust(watched, None, METHOD.defaults, range(100, 106), store=store)
     store.write_text(store.read_text() + '{"key": "cut o')
     seen.clear()
-    again = replace(METHOD, synthetic=lambda p, o, s: (seen.append(s), made(p, o, s))[1])
-    found = trust(again, None, METHOD.defaults, range(100, 106), store=store)
+    found = trust(watched, None, METHOD.defaults, range(100, 106), store=store)
     assert seen == [103, 104, 105]
     assert found.recovered == trust(METHOD, None, METHOD.defaults, range(100, 106)).recovered
-    other = trust(again, None, Options(F=7.0), range(100, 102), store=store)
+    other = trust(watched, None, Options(F=7.0), range(100, 102), store=store)
     assert other.recovered[0].truth == 7.0
     assert seen[3:] == [100, 101]
+    seen.clear()
+    louder = replace(watched, identify=lambda d, p, o, e: METHOD.identify(2.0 * d, p, o, e))
+    trust(louder, None, METHOD.defaults, range(100, 102), store=store)
+    assert seen == [100, 101]  # what another method has found is not taken for its own
 
 
 def fatal_once(mark: Path, par: None, options: Options, seed: int) -> xr.Dataset:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bywire.core.typing import Array, Complex
+from bywire.core.undefined import EqualWhereUndefined
 
 Response = Callable[[Array], Complex]
 """``response(frequencies [Hz]) -> complex``, shape (n,) each"""
@@ -80,8 +81,8 @@ def gain_crossings(
     return crossings
 
 
-@dataclass(frozen=True)
-class Margin:
+@dataclass(frozen=True, eq=False)
+class Margin(EqualWhereUndefined):
     """Stability margin of an open loop.
 
     Parameters

@@ -13,6 +13,7 @@ from bywire.analysis.loop import Loop
 from bywire.analysis.loop_figures import LoopFigures
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
+from bywire.core.undefined import EqualWhereUndefined
 
 SENSES = {
     "gain": 1, "lower_gain": -1, "phase": 1, "delay": 1, "disk": 1, "bandwidth": 1,
@@ -22,8 +23,8 @@ SENSES = {
 _POINTS = 2000
 
 
-@dataclass(frozen=True)
-class LoopMargins:
+@dataclass(frozen=True, eq=False)
+class LoopMargins(EqualWhereUndefined):
     """Margins of a sampled loop as it is, with its delays and filters.
 
     NaN where it is unstable, and where there is no loop.

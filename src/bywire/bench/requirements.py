@@ -16,6 +16,7 @@ from bywire.bench.values import number
 from bywire.core import units
 from bywire.core.errors import ParameterError, UnitError, quoted, unknown_name
 from bywire.core.typing import Array
+from bywire.core.undefined import EqualWhereUndefined
 
 # Longer signs first, as "<=" begins with "<".
 _COMPARE: dict[str, Callable[[Any, float], Any]] = {
@@ -26,8 +27,8 @@ _COMPARE: dict[str, Callable[[Any, float], Any]] = {
 }
 
 
-@dataclass(frozen=True)
-class Verdict:
+@dataclass(frozen=True, eq=False)
+class Verdict(EqualWhereUndefined):
     """A requirement beside what was found.
 
     Parameters

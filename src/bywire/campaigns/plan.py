@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from bywire.bench.bench import Bench
+from bywire.bench.computation import computation
 from bywire.bench.experiment import Case
 from bywire.bench.faults.course import AT_ZERO
 from bywire.bench.faults.fault_section import Injection
@@ -16,11 +17,10 @@ from bywire.bench.faults.modes import Mode
 from bywire.bench.option_names import split_options
 from bywire.campaigns.criterion import Criterion
 from bywire.campaigns.residual import Residual, missed_ticks
-from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.parameters import ParameterSet
 from bywire.core.version import __version__
 from bywire.simulation.tapped import Tap
-from bywire.studies.identity import as_json, digest_of, source_digest
+from bywire.studies.identity import as_json, digest_of
 from bywire.studies.plan import CHUNK, StudyPlan, Varied
 
 _LONG_AGO = -1e6  # s: before any run starts
@@ -202,6 +202,11 @@ class CampaignPlan:
         mode = failing.mode
         return self.rates.get(mode.name, self.rates.get(mode.place, 1.0))
 
+    @property
+    def _functions(self) -> list[Any]:
+        """What its faults change, and what its residuals compute."""
+        return [*(each.mode.changes for each in self.faults), *self.residuals]
+
     @cached_property
     def digest(self) -> str:
         """What tells a campaign from another."""
@@ -213,7 +218,7 @@ class CampaignPlan:
         bench, reaction = self.bench, self.reaction
         return as_json({
             "version": __version__,
-            "brake": source_digest(PARAMETER_SETS.owner(bench.parameters)),
+            "computed": computation(bench, beside=self._functions),
             "experiment": bench.experiment,
             "parameters": bench.par.flat(),
             "options": bench.chosen_options.flat(),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
@@ -15,6 +14,7 @@ from bywire.cli import output
 from bywire.cli.output_folder import ANOTHER, output_folder
 from bywire.cli.progress import progress_bar
 from bywire.core.errors import BywireError
+from bywire.core.heard_warnings import heard_warnings
 from bywire.core.interrupts import interrupt_heard
 
 if TYPE_CHECKING:
@@ -58,8 +58,7 @@ def show(
         leave_out_descriptions()
     files: list[Path] = []
     trouble: BywireError | None = None
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with heard_warnings() as caught:
         try:
             with nullcontext() if out is None else output_folder(out, advice):
                 with progress_bar() as progress:

@@ -28,6 +28,9 @@ if sys.platform != "win32":
 PREFIX = ".bywire-"
 """what the names of temporary folders begin with"""
 
+NULL_CHARACTER = "a path cannot hold a null character"
+"""what is wrong where Python raises ValueError for a path, in words that differ by its version"""
+
 UNFINISHED = "unfinished"
 """file of a folder whose result was not written to its end"""
 
@@ -65,8 +68,8 @@ def made_folder(folder: Path) -> Iterator[None]:
     try:
         try:
             folder.mkdir(parents=True, exist_ok=True)
-        except ValueError as error:  # a null character in the path
-            raise OSError(errno.EINVAL, str(error)) from None
+        except ValueError:
+            raise OSError(errno.EINVAL, NULL_CHARACTER) from None
         yield
     finally:
         with contextlib.suppress(OSError, ValueError):  # there is a result

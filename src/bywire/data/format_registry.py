@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bywire.core.errors import FileError, quoted
 from bywire.core.registry import Kind, instances
+from bywire.core.scratch import NULL_CHARACTER
 from bywire.data.file_format import FileFormat
 
 _HEAD = 1024
@@ -95,7 +96,7 @@ def head_of(path: Path) -> bytes:
         with path.open("rb") as stream:
             return stream.read(_HEAD)
     except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        reason = error.strerror if isinstance(error, OSError) else str(error)
+        reason = error.strerror if isinstance(error, OSError) else NULL_CHARACTER
         raise FileError(
             f"{path} cannot be read ({reason}): check the path and its permissions"
         ) from None

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bywire.core.errors import FileError
+from bywire.core.scratch import NULL_CHARACTER
 
 LARGEST = 1_000_000
 """size of a file in bytes; a larger one is refused before it is parsed"""
@@ -61,7 +62,7 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
         with file.open("rb") as stream:
             data = stream.read(LARGEST + 1)
     except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        reason = error.strerror if isinstance(error, OSError) else str(error)
+        reason = error.strerror if isinstance(error, OSError) else NULL_CHARACTER
         hint = missing(file) if isinstance(error, FileNotFoundError) else _ADVICE
         raise FileError(f"cannot read {kind} {file}: {reason}: {hint}") from None
     if len(data) > LARGEST:

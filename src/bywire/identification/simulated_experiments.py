@@ -13,8 +13,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from bywire.bench.computation import functions_digest
 from bywire.core.copies import processes_with_brakes
 from bywire.core.errors import BywireError, ParameterError
+from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Progress
 from bywire.identification.identifiability import MisfitWarning
@@ -144,8 +146,13 @@ def _outcomes(
 
 def _key(method: Method, par: Any, options: Any, effort: Effort) -> str:
     values = "" if par is None else par.model_dump_json()
+    model = ASSEMBLIES.find(method.assembly) if method.assembly else None
     name = f"{method.name}{method.key}"
-    text = f"{name} {values} {options.model_dump_json()} {effort.starts} {effort.spread}"
+    computed = functions_digest(
+        (method.identify, method.synthetic, method.truth, model), "bywire.identification",
+        with_equations=True,
+    )  # fmt: skip
+    text = f"{name} {values} {options.model_dump_json()} {effort.starts} {effort.spread} {computed}"
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

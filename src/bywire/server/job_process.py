@@ -17,12 +17,12 @@ import sys
 import threading
 import time
 import traceback
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from bywire.core.errors import BywireError
+from bywire.core.heard_warnings import heard_warnings
 from bywire.core.interrupts import interrupt_heard, interrupts_noted
 from bywire.server.telling import begin_to_tell, tell
 
@@ -85,8 +85,7 @@ def _compute(order: Mapping[str, Any]) -> None:
     leave_out_descriptions()
     os.chdir(order["folder"])
     task, out = tasks()[order["task"]], Path(order["out"])
-    with warnings.catch_warnings(record=True) as caught, command_line():
-        warnings.simplefilter("always")
+    with heard_warnings() as caught, command_line():
         for path in order["systems"]:
             load_system(path)
         answer = task.compute(order["asked"], out, _Words())

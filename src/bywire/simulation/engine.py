@@ -20,7 +20,7 @@ from bywire.core.signals import Signal, signals_of
 from bywire.simulation.compiler import Compiler, find_compiler
 from bywire.simulation.kept_kernel import Identity, place_of
 from bywire.simulation.layout import Layout
-from bywire.simulation.native import Request, SingleKernel
+from bywire.simulation.native import Request, SingleKernel, text_digest
 from bywire.simulation.virtual_machine import VirtualMachine
 
 if TYPE_CHECKING:
@@ -83,10 +83,13 @@ class Prepared:
         self._par = par
         self._program: Program | None = None
         self._engines: dict[str, Engine] = {}
+        self._digest = ""
         self.place = place_of(model, structure_of(model, par))
         self._kept = None if self.place is None else self.place.kept()
         if self._kept is None:
             self._program = self._built()
+        else:
+            self._digest = self._kept.digest
 
     @property
     def program(self) -> Program:
@@ -113,10 +116,24 @@ class Prepared:
         kept = self._kept
         return self.program.contact_jacobians if kept is None else kept.contact_jacobians
 
+    @property
+    def digest(self) -> str:
+        """What tells the equations of this structure from any others: that of its kernel's C.
+
+        How the source is written does not matter: comments, names and files leave no trace in C.
+        """
+        with _LOCK:
+            if not self._digest:
+                from bywire.simulation.emit_single import emit_single
+                from bywire.simulation.stages import build_stages
+
+                self._digest = text_digest(emit_single(build_stages(self.program)))
+            return self._digest
+
     def keep_model(self) -> None:
         """Keep that the model is sound, unless that is kept, or will be with a kernel."""
         if self.place is not None and self._kept is None and not self._engines:
-            self.place.keep_model(self.program.contact_jacobians)
+            self.place.keep_model(self.program.contact_jacobians, self._digest)
 
     def engine(self, kind: str = "auto") -> Engine:
         """Return the engine for single runs.
@@ -170,10 +187,11 @@ class Prepared:
     def _kernel(self, compiler: Compiler) -> SingleKernel:
         kept = self._kept
         if kept is not None and kept.library is not None and kept.compiler == compiler.label:
-            return SingleKernel(kept.layout, kept.library, compiler)
+            return SingleKernel(kept.layout, kept.library, compiler, kept.digest)
         kernel = SingleKernel.of(self.program, compiler)
+        self._digest = kernel.digest
         if self.place is not None:
-            self.place.keep(kernel, self.program.contact_jacobians)
+            self.place.keep(kernel, self.program.contact_jacobians, kernel.digest)
         return kernel
 
 

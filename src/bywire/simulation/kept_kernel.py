@@ -56,12 +56,15 @@ class KeptKernel:
         Label of the compiler that made it.
     jacobians
         ``Program.contact_jacobians``, as CasADi writes a function down; empty in lanes.
+    digest
+        Of the kernel's C; empty in lanes.
     """
 
     layout: Layout
     library: Path | None
     compiler: str
     jacobians: str
+    digest: str
 
     @cached_property
     def contact_jacobians(self) -> Any:
@@ -99,19 +102,21 @@ class Place:
             if entry["state"] != self.state:
                 return None
             if not entry["library"]:
-                return KeptKernel(Layout({}, {}), None, "", entry["jacobians"])
+                return KeptKernel(Layout({}, {}), None, "", entry["jacobians"], entry["text"])
             library = self.file.with_name(entry["library"])
             entry_point = entry["entry"]
             if not (sha256(library) == entry["digest"] and is_intact(library, entry_point)):
                 return None
             load(library, entry_point)
             layout = Layout(entry["start"], entry["length"])
-            return KeptKernel(layout, library, entry["compiler"], entry["jacobians"])
+            return KeptKernel(
+                layout, library, entry["compiler"], entry["jacobians"], entry["text"]
+            )
         except (OSError, ValueError, KeyError, TypeError, CompilerError):
             return None
 
-    def keep(self, kernel: Keepable, contact_jacobians: Any = None) -> None:
-        """Keep a kernel, unless a file has changed since its model was loaded."""
+    def keep(self, kernel: Keepable, contact_jacobians: Any = None, digest: str = "") -> None:
+        """Keep a kernel with the digest of its C, unless a file has changed since it was loaded."""
         self._keep(contact_jacobians, {
             "start": kernel.layout.start,
             "length": kernel.layout.length,
@@ -119,11 +124,12 @@ class Place:
             "entry": kernel.ENTRY,
             "digest": sha256(kernel.library),
             "compiler": kernel.compiler.label,
+            "text": digest,
         })  # fmt: skip
 
-    def keep_model(self, contact_jacobians: Any) -> None:
-        """Keep that a model is sound, and what judges its contacts, without a kernel."""
-        self._keep(contact_jacobians, {"library": ""})
+    def keep_model(self, contact_jacobians: Any, digest: str) -> None:
+        """Keep that a model is sound, with its contacts' Jacobians and digest, but no kernel."""
+        self._keep(contact_jacobians, {"library": "", "text": digest})
 
     def _keep(self, contact_jacobians: Any, kernel: dict[str, Any]) -> None:
         if _running_state() != self.state:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import hashlib
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 
 CHUNK = 50_000
 """substeps after which a call of a kernel ends: tens of milliseconds"""
+
+_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.S)
 
 
 @dataclass(frozen=True)
@@ -117,14 +121,22 @@ def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
+def text_digest(text: str) -> str:
+    """Digest of a kernel's C: what it computes, without comments."""
+    return hashlib.sha256(_COMMENT.sub("", text).encode()).hexdigest()
+
+
 class SingleKernel:
     """Compiled kernel for one run."""
 
     ENTRY = "bw_run"
     """its function in the library"""
 
-    def __init__(self, layout: Layout, library: Path, compiler: Compiler) -> None:
+    def __init__(
+        self, layout: Layout, library: Path, compiler: Compiler, digest: str = ""
+    ) -> None:
         self.layout, self.library, self.compiler = layout, library, compiler
+        self.digest = digest
         self.label = f"compiled C, {compiler.label}"
         self._run = load(library, self.ENTRY)[self.ENTRY]
         self._run.restype = ctypes.c_int64
@@ -137,8 +149,9 @@ class SingleKernel:
         from bywire.simulation.stages import build_stages
 
         stages = build_stages(program)
-        _, library = load_library(emit_single(stages), SINGLE, compiler, cls.ENTRY)
-        return cls(layout_of(stages), library, compiler)
+        text = emit_single(stages)
+        _, library = load_library(text, SINGLE, compiler, cls.ENTRY)
+        return cls(layout_of(stages), library, compiler, text_digest(text))
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
         """Run frames begin..end: renews ``state`` and fills ``rows`` in place.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ from typing import Any
 from bywire.core.arguments import whole_number
 from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.errors import ParameterError
+from bywire.core.heard_warnings import heard_warnings
 from bywire.simulation.engine import CUDA
 from bywire.studies.chunk import Columns, PlacedChunk, computed_chunks
 from bywire.studies.cluster import Cluster
@@ -167,8 +167,7 @@ def _give(plan: StudyPlan) -> None:
 
 def _told(job: Callable[[], T]) -> tuple[T, list[Warning]]:
     """Return what a job gives, and what it warns of: here nobody would hear it."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with heard_warnings() as caught:
         value = job()
     return value, [each.message for each in caught if isinstance(each.message, Warning)]
 

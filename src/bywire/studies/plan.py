@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.core.catalog import PARAMETER_SETS
+from bywire.bench.computation import computation
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import Array
 from bywire.core.version import __version__
 from bywire.studies.correlation import correlation_factor
 from bywire.studies.distribution import Distribution
-from bywire.studies.identity import as_json, digest_of, source_digest
+from bywire.studies.identity import as_json, digest_of
 from bywire.studies.points import SAMPLED, Sampled, Spanned, spanned
 from bywire.studies.sensitivity_design import MORRIS, SENSITIVITY, SensitivityDesign
 from bywire.studies.sought_design import RARE, SOUGHT, WORST, SoughtDesign, library_version
@@ -238,6 +238,14 @@ class StudyPlan:
         return correlation_factor([v.name for v in self.varied], self.correlations)
 
     @property
+    def _choices(self) -> Iterator[dict[str, str]]:
+        """Choices that cases make, one at a time: each has equations of its own."""
+        for varied in self.varied:
+            for value in varied.distribution.singles:
+                if isinstance(value, str):
+                    yield {varied.name: value}
+
+    @property
     def digest(self) -> str:
         """What tells a study from another."""
         return digest_of(self.identity)
@@ -248,7 +256,7 @@ class StudyPlan:
         bench = self.bench
         said: dict[str, Any] = {
             "version": __version__,
-            "brake": source_digest(PARAMETER_SETS.owner(bench.parameters)),
+            "computed": computation(bench, self._choices),
             "experiment": bench.experiment,
             "system": bench.system,
             "parameters": bench.par.flat(),

@@ -23,10 +23,11 @@ import numpy as np
 
 from bywire.core.errors import unknown_name
 from bywire.core.typing import Array
+from bywire.core.undefined import EqualWhereUndefined
 
 
-@dataclass(frozen=True)
-class Kpi:
+@dataclass(frozen=True, eq=False)
+class Kpi(EqualWhereUndefined):
     """A key figure of a recording.
 
     Parameters
@@ -199,11 +200,10 @@ class KpiOfCases:
 
     def case(self, k: Any) -> Kpi:
         """Return the figure of one case."""
-        value = float(self.values[k])
-        known = math.nan if math.isnan(value) else value  # the NaN that is the same as itself
         return Kpi(
-            self.name, known, self.unit, self.definition, self.told(k), is_open=self.opened(k)
-        )
+            self.name, float(self.values[k]), self.unit, self.definition, self.told(k),
+            is_open=self.opened(k),
+        )  # fmt: skip
 
 
 class Data(Protocol):

@@ -1,0 +1,99 @@
+"""What a bench computes, and not how its source is written: by it studies tell what they hold."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from bywire.bench.bench import Bench
+from bywire.bench.kpis.in_c import source_of
+from bywire.bench.kpis.registry import FAMILIES, Family
+from bywire.bench.option_names import split_options
+from bywire.bench.stimuli.registry import STIMULI
+from bywire.core.brake import brakes
+from bywire.core.definitions import definitions_digest
+from bywire.core.errors import InputError
+from bywire.simulation.engine import prepare
+
+_ROOMS = (
+    "bywire.bench.experiments", "bywire.bench.faults.modes", "bywire.bench.generic_experiment",
+    "bywire.bench.kpis", "bywire.bench.stimuli", "bywire.control", "bywire.plant", "bywire.vehicle",
+)  # fmt: skip
+_C_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.S)
+
+
+def computation(
+    bench: Bench, choices: Iterable[Mapping[str, Any]] = (), beside: Iterable[Any] = ()
+) -> dict[str, Any]:
+    """Digests of the equations of a bench, and of what surrounds them: runs and key figures.
+
+    Names of files, comments, docstrings and the place of a definition do not matter.
+
+    Parameters
+    ----------
+    bench
+        What is tested.
+    choices
+        Parameters and options by dotted name that cases choose in place of the bench's own.
+    beside
+        Functions, and objects that hold some, that judge its runs too.
+    """
+    return {
+        "equations": sorted({each for b in (bench, *_chosen(bench, choices)) for each in _of(b)}),
+        "figures": functions_digest((*_functions(bench), *beside)),
+    }
+
+
+def functions_digest(
+    roots: Iterable[Any], *rooms: str, with_equations: bool = False
+) -> str:
+    """Digest of functions with all that they reach in brakes and in what brakes are made of.
+
+    Parameters
+    ----------
+    roots
+        Functions, and objects that hold some.
+    rooms
+        Further packages whose definitions count by their text.
+    with_equations
+        Whether those of models count too.
+    """
+    reached = (*_ROOMS, *rooms, *(brake.module for brake in brakes().values()))
+    return definitions_digest(roots, reached, _family, with_equations)
+
+
+def _chosen(bench: Bench, choices: Iterable[Mapping[str, Any]]) -> Iterator[Bench]:
+    for each in choices:
+        try:
+            yield bench.varied(*split_options(each))
+        except InputError:  # a choice that needs another one beside it: its case says so
+            continue
+
+
+def _of(bench: Bench) -> Iterator[str]:
+    """Yield what tells the equations of each run of a bench, and when its controllers run."""
+    for case in bench.cases():
+        tasks = [f"{task.name} {task.period:.12g} s" for task in case.model.tasks(case.par)]
+        yield ", ".join([prepare(case.model, case.par).digest, *tasks])
+
+
+def _functions(bench: Bench) -> Iterator[Any]:
+    chosen = bench.definition
+    yield from (chosen.cases, chosen.judge, chosen.finish, chosen.static, chosen.beside)
+    for stimulus in bench.chosen_stimuli.values():
+        yield STIMULI.find(stimulus.kind).function
+    for fault in bench.injections:
+        yield fault.mode.changes
+
+
+def _family(text: str) -> Iterator[Any]:
+    """Yield what a family of key figures computes, where a text is the name of one."""
+    family = FAMILIES.guess(text) if text.isidentifier() and text.islower() else None
+    if isinstance(family, Family):
+        yield family.select
+        yield family.setting_class
+        yield from family.measures.values()
+        if family.in_c is not None:
+            yield family.in_c
+            yield _C_COMMENT.sub("", source_of(family.path))

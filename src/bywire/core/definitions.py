@@ -1,0 +1,312 @@
+"""What functions compute, told from their text without its form: what identities are made of.
+
+A digest covers functions with all that they reach by name: other functions, classes and constants.
+It ignores comments, docstrings, annotations, imports, the order of definitions and the files in
+which they stand. It is the same in every version of Python. Reached is what stands in given rooms,
+which are packages. All else counts by its name.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import hashlib
+import linecache
+import sys
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from enum import Enum
+from importlib import import_module
+from importlib.util import resolve_name
+from types import CodeType, FunctionType, MethodType, ModuleType
+from typing import Any
+
+import numpy as np
+
+_FORMLESS = {"ctx", "type_comment", "annotation", "returns", "type_params", "kind"}
+"""fields of a syntax tree that compute nothing"""
+_MUTABLE = (dict, list, set)
+_SCALARS = (str, int, float, complex, bool, bytes, type(None), Enum)
+
+
+def definitions_digest(
+    roots: Iterable[Any], rooms: Collection[str],
+    named: Callable[[str], Iterable[Any]] = lambda _: (), with_equations: bool = False,
+) -> str:  # fmt: skip
+    """Digest of all that some objects compute with.
+
+    Parameters
+    ----------
+    roots
+        Functions, classes, and objects or collections that hold some.
+    rooms
+        Packages and modules whose definitions count by their text.
+    named
+        ``named(text)``: what a text in these definitions stands for, such as the entry of a
+        registry; nothing for most.
+    with_equations
+        Whether models and their elements count by their text too; else only how they rest, for
+        their kernels tell the equations.
+    """
+    found = _Reached(tuple(rooms), named, with_equations)
+    for root in roots:
+        found.visit(root)
+    return hashlib.sha256("\n".join(sorted(found.pieces)).encode()).hexdigest()
+
+
+class _Reached:
+    """Definitions that objects reach."""
+
+    def __init__(
+        self, rooms: tuple[str, ...], named: Callable[[str], Iterable[Any]], with_equations: bool
+    ) -> None:
+        self.pieces: set[str] = set()
+        self._rooms, self._named, self._with_equations = rooms, named, with_equations
+        self._seen: dict[int, Any] = {}  # alive, so that no address stands for two
+        self._sources: dict[str, _Source] = {}
+
+    def visit(self, value: Any, name: str = "") -> None:
+        """Take in an object; ``name``: what a definition calls it."""
+        if isinstance(value, _SCALARS):
+            self.pieces.add(f"{name} = {value!r}")
+            if isinstance(value, str):
+                self._visit_named(value)
+            return
+        if id(value) in self._seen:
+            return
+        self._seen[id(value)] = value
+        if isinstance(value, FunctionType):
+            self._visit_function(value)
+        elif isinstance(value, type):
+            self._visit_class(value)
+        elif isinstance(value, MethodType):
+            self.visit(value.__func__)
+            self.visit(value.__self__)
+        elif isinstance(value, functools.partial):
+            self.visit((value.func, value.args, value.keywords))
+        elif isinstance(value, Mapping):
+            for key, each in value.items():
+                self.visit(key)
+                self.visit(each, str(key))
+        elif isinstance(value, (tuple, list, set, frozenset)):
+            for each in value:
+                self.visit(each, name)
+        elif isinstance(value, np.ndarray):
+            self.pieces.add(f"{name} = {hashlib.sha256(value.tobytes()).hexdigest()}")
+        elif hasattr(value, "__wrapped__"):
+            self.visit(value.__wrapped__)
+        elif self._is_reached(type(value).__module__):
+            self.visit(type(value))
+            self.visit({k: v for k, v in _fields(value) if not k.startswith("__")})
+        else:
+            self.pieces.add(f"{name}: {type(value).__name__}")
+
+    def _visit_named(self, text: str) -> None:
+        for each in self._named(text):
+            self.visit(each)
+
+    def _is_reached(self, module: str | None) -> bool:
+        return any(f"{module}.".startswith(f"{room}.") for room in self._rooms)
+
+    def _visit_function(self, function: FunctionType) -> None:
+        if not self._is_reached(function.__module__):
+            self.pieces.add(function.__qualname__)
+            return
+        code = function.__code__
+        nodes = self._source(code.co_filename, function.__globals__).nodes_of(code)
+        if not nodes:  # it was made by a library, or from text that is gone
+            if not code.co_filename.startswith("<"):
+                self.pieces.add(f"{code.co_code.hex()} {code.co_names}")
+            return
+        for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
+            content = _content(cell)
+            if name != "__class__" and not isinstance(content, _MUTABLE):  # what runs put in there
+                self.visit(content, name)
+        for node in nodes:
+            self._visit_node(node, function.__globals__)
+
+    def _visit_class(self, kind: type) -> None:
+        if not self._is_reached(kind.__module__):
+            self.pieces.add(kind.__qualname__)
+            return
+        if _is_model(kind) and not self._with_equations:
+            self.pieces.add(kind.__name__)
+            self.visit(getattr(kind, "rest", None))
+            return
+        module = sys.modules.get(kind.__module__)
+        names = {} if module is None else vars(module)
+        node = self._source(names.get("__file__") or "", names).class_of(kind.__qualname__)
+        if node is not None:
+            self._visit_node(node, names)
+
+    def _source(self, file: str, names: Mapping[str, Any]) -> _Source:
+        if file not in self._sources:
+            self._sources[file] = _Source(file, names)
+        return self._sources[file]
+
+    def _visit_node(self, node: ast.AST, names: Mapping[str, Any]) -> None:
+        """Take in the text of a definition and what it names."""
+        self.pieces.add(_form(node))
+        known = {**names, **dict(self._imported(node, names))}
+        for each in _computing(node):
+            if isinstance(each, ast.Constant) and isinstance(each.value, str):
+                self._visit_named(each.value)
+            if isinstance(each, ast.Attribute):
+                holder = _module_named(each.value, known)
+                if holder is not None and self._is_reached(holder.__name__):
+                    self._visit_global(each.attr, vars(holder))
+            if isinstance(each, ast.Name):
+                self._visit_global(each.id, known)
+
+    def _visit_global(self, name: str, names: Mapping[str, Any]) -> None:
+        value = names.get(name)
+        if name not in names or name.startswith("__"):
+            return
+        if isinstance(value, _MUTABLE):
+            self._visit_assigned(name, names)
+        elif not isinstance(value, ModuleType):
+            self.visit(value, name)
+        elif self._with_equations and self._is_reached(value.__name__):  # an element of a model
+            self.visit([each for each in vars(value).values() if isinstance(each, FunctionType)])
+
+    def _visit_assigned(self, name: str, names: Mapping[str, Any]) -> None:
+        """Take in the text of a collection: runs may have changed what it holds since."""
+        source = self._source(names.get("__file__") or "", names)
+        for node in source.assignments_of(name):
+            self._visit_node(node, names)
+        for holder, known_as, original in self._imports(source.tree, names):
+            if known_as == name:
+                self._visit_global(original, vars(holder))
+
+    def _imported(self, node: ast.AST, names: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+        """Yield what a definition imports itself, from the rooms."""
+        for holder, known_as, name in self._imports(node, names):
+            module = sys.modules.get(f"{holder.__name__}.{name}")
+            yield known_as, getattr(holder, name, module)
+
+    def _imports(
+        self, node: ast.AST, names: Mapping[str, Any]
+    ) -> Iterator[tuple[ModuleType, str, str]]:
+        """Yield what is imported from the rooms: from where, the name here, and the name there."""
+        for each in ast.walk(node):
+            if isinstance(each, ast.ImportFrom):
+                package = str(names.get("__package__") or "")
+                place = "." * each.level + (each.module or "")
+                module = resolve_name(place, package) if each.level else place
+                if self._is_reached(module):
+                    for alias in each.names:
+                        yield import_module(module), alias.asname or alias.name, alias.name
+
+
+def _is_model(kind: type) -> bool:
+    return hasattr(kind, "balance") and hasattr(kind, "Memory")
+
+
+def _fields(value: Any) -> Iterator[tuple[str, Any]]:
+    names = [*getattr(value, "__dict__", {}), *getattr(type(value), "__slots__", ())]
+    for name in names:
+        if not isinstance(getattr(type(value), name, None), functools.cached_property):
+            yield name, getattr(value, name, None)
+
+
+def _content(cell: Any) -> Any:
+    try:
+        return cell.cell_contents
+    except ValueError:  # of a function that is not defined yet
+        return None
+
+
+def _module_named(node: ast.AST, names: Mapping[str, Any]) -> ModuleType | None:
+    """Return the module that an expression such as ``package.module`` names."""
+    if isinstance(node, ast.Name):
+        value = names.get(node.id)
+    elif isinstance(node, ast.Attribute):
+        value = getattr(_module_named(node.value, names), node.attr, None)
+    else:
+        value = None
+    return value if isinstance(value, ModuleType) else None
+
+
+def _computing(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield all of a tree that computes: no annotations and no docstrings."""
+    yield node
+    for name, value in ast.iter_fields(node):
+        for each in value if isinstance(value, list) else [value]:
+            if isinstance(each, ast.AST) and name not in _FORMLESS and not _is_silent(each):
+                yield from _computing(each)
+
+
+def _is_silent(node: ast.AST) -> bool:
+    """Return whether a statement computes nothing: a docstring, an import, a pass."""
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+        return isinstance(node.value.value, str)
+    return isinstance(node, (ast.Import, ast.ImportFrom, ast.Pass))
+
+
+def _form(value: Any) -> str:
+    """Return a syntax tree as text, of which every version of Python makes the same."""
+    if isinstance(value, list):
+        parts = (_form(each) for each in value if not _is_silent(each))
+        return f"[{','.join(parts)}]"
+    if isinstance(value, ast.JoinedStr):
+        return f"f({''.join(map(_form, value.values))})"  # its constants are split as one likes
+    if isinstance(value, ast.Constant):
+        return repr(value.value)
+    if not isinstance(value, ast.AST):
+        return repr(value)
+    fields = (
+        f"{name}={_form(each)}" for name, each in ast.iter_fields(value)
+        if name not in _FORMLESS and each is not None and each != []
+    )  # fmt: skip
+    return f"{type(value).__name__}({','.join(fields)})"
+
+
+class _Source:
+    """The syntax tree of a file as it is now, with its functions and classes."""
+
+    def __init__(self, file: str, names: Mapping[str, Any]) -> None:
+        if file.startswith("<"):  # typed into a notebook, for instance
+            linecache.lazycache(file, dict(names))
+        else:
+            linecache.checkcache(file)
+        try:
+            self.tree = ast.parse("".join(linecache.getlines(file)))
+        except SyntaxError:  # it was changed since it was loaded
+            self.tree = ast.Module([], [])
+
+    @functools.cached_property
+    def _functions(self) -> Mapping[tuple[str, int], tuple[ast.AST, ...]]:
+        """Functions by name and first line, decorators included."""
+        found: dict[tuple[str, int], tuple[ast.AST, ...]] = {}
+        for node in ast.walk(self.tree):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                line = min([node.lineno, *(each.lineno for each in node.decorator_list)])
+                key = (node.name, line)
+            elif isinstance(node, ast.Lambda):
+                key = ("<lambda>", node.lineno)
+            else:
+                continue
+            found[key] = (*found.get(key, ()), node)
+        return found
+
+    def nodes_of(self, code: CodeType) -> tuple[ast.AST, ...]:
+        """Return a function; lambdas of the same line are told apart by nobody."""
+        return self._functions.get((code.co_name, code.co_firstlineno), ())
+
+    def assignments_of(self, name: str) -> Iterator[ast.stmt]:
+        """Yield the statements of the file that say what a name is."""
+        for node in self.tree.body:
+            targets = node.targets if isinstance(node, ast.Assign) else [
+                getattr(node, "target", None)]  # fmt: skip
+            if any(isinstance(each, ast.Name) and each.id == name for each in targets):
+                yield node
+
+    def class_of(self, name: str) -> ast.ClassDef | None:
+        """Return a class by its qualified name; None where it is made by a function."""
+        body: list[ast.stmt] = self.tree.body
+        node = None
+        for part in name.split("."):
+            node = next((n for n in body if isinstance(n, ast.ClassDef) and n.name == part), None)
+            if node is None:
+                return None
+            body = node.body
+        return node
