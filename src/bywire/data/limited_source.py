@@ -66,7 +66,7 @@ class Child:
                 "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
                 "TMPDIR": self._folder, "TEMP": self._folder,
             },
-        )  # fmt: skip
+        )
         self.state: _State = "idle"
         self._is_late = False
         with contextlib.suppress(ImportError, AttributeError, OSError):
