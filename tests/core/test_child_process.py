@@ -92,9 +92,7 @@ def planted(tmp_path: Path, names: set[str], monkeypatch: pytest.MonkeyPatch) ->
         'experiment = "hard-braking"\nparameters = "dardanelli2010"\n'
         '[options]\nduration = "40 ms"\nsettle = "10 ms"\n'
     )
-    (folder / "study.toml").write_text(
-        'bench = "step.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n'
-    )
+    (folder / "study.toml").write_text('bench = "step.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n')
     monkeypatch.chdir(folder)
     for name in ("PATH", "LD_LIBRARY_PATH", "C_INCLUDE_PATH"):
         monkeypatch.setenv(name, os.pathsep.join(["", str(folder), os.environ.get(name, "/lib")]))
@@ -150,9 +148,7 @@ def test_a_served_folder_runs_nothing(planted: Path, monkeypatch: pytest.MonkeyP
 
 
 @posix
-def test_children_of_a_notebook_run_nothing(
-    planted: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_children_of_a_notebook_run_nothing(planted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A console and a notebook have the working folder on their path, as an empty entry."""
     monkeypatch.setattr(sys, "path", ["", *sys.path, str(planted)])
     monkeypatch.setenv("PYTHONPATH", "")

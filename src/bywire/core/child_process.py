@@ -23,10 +23,18 @@ from importlib.machinery import PathFinder
 from pathlib import Path
 
 _LISTS = (
-    "PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "DYLD_FALLBACK_LIBRARY_PATH", "COMPILER_PATH",
-    "LIBRARY_PATH", "CPATH", "C_INCLUDE_PATH", "CPLUS_INCLUDE_PATH", "HDF5_PLUGIN_PATH",
+    "PATH",
+    "LD_LIBRARY_PATH",
+    "DYLD_LIBRARY_PATH",
+    "DYLD_FALLBACK_LIBRARY_PATH",
+    "COMPILER_PATH",
+    "LIBRARY_PATH",
+    "CPATH",
+    "C_INCLUDE_PATH",
+    "CPLUS_INCLUDE_PATH",
+    "HDF5_PLUGIN_PATH",
     "PYTHONPATH",
-)  # fmt: skip
+)
 """environment variables that list folders with programs, libraries, headers and modules"""
 SAFE_PATH = "PYTHONSAFEPATH"
 """environment variable with which no interpreter looks for modules where it was started"""
@@ -136,9 +144,13 @@ def module_command(library: str, *arguments: str) -> tuple[str, ...] | None:
 
 
 def start_python(
-    module: str, *arguments: str, further: Mapping[str, str] | None = None,
-    untrusted: Sequence[str | Path] = (), stderr: int | None = None, bufsize: int = -1,
-) -> subprocess.Popen[bytes]:  # fmt: skip
+    module: str,
+    *arguments: str,
+    further: Mapping[str, str] | None = None,
+    untrusted: Sequence[str | Path] = (),
+    stderr: int | None = None,
+    bufsize: int = -1,
+) -> subprocess.Popen[bytes]:
     """Start a module of ours, which talks through its standard input and output.
 
     Ctrl-C does not reach it: whoever starts it ends it. It begins outside of the working folder.
@@ -156,10 +168,15 @@ def start_python(
     """
     path = os.pathsep.join(import_path(untrusted))
     return subprocess.Popen(
-        python_command("-m", module, *arguments), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        stderr=stderr, bufsize=bufsize, cwd=_ELSEWHERE, start_new_session=True,
+        python_command("-m", module, *arguments),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=stderr,
+        bufsize=bufsize,
+        cwd=_ELSEWHERE,
+        start_new_session=True,
         env={**environment(untrusted), "PYTHONPATH": path, **(further or {})},
-    )  # fmt: skip
+    )
 
 
 def run_program(command: Sequence[str], seconds: float) -> subprocess.CompletedProcess[str]:
@@ -173,6 +190,13 @@ def run_program(command: Sequence[str], seconds: float) -> subprocess.CompletedP
         When it takes longer.
     """
     return subprocess.run(
-        command, cwd=_ELSEWHERE, env=environment(), timeout=seconds, stdin=subprocess.DEVNULL,
-        capture_output=True, encoding="utf-8", errors="replace", check=False,
-    )  # fmt: skip
+        command,
+        cwd=_ELSEWHERE,
+        env=environment(),
+        timeout=seconds,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        encoding="utf-8",
+        errors="replace",
+        check=False,
+    )

@@ -67,7 +67,7 @@ class Child:
                 **one_thread_variables(),  # it forks: it has no threads
                 "TMPDIR": self._folder, "TEMP": self._folder,
             },
-        )  # fmt: skip
+        )
         self.state: _State = "idle"
         self._is_late = False
         with contextlib.suppress(ImportError, AttributeError, OSError):

@@ -166,7 +166,7 @@ class Jobs:
 
     def _folder(self, task: Task, asked: Mapping[str, Any]) -> Path:
         if task.is_kept:
-            return self._place.same_folder(task.stem(asked))
+            return self._place.same_folder(task.said_of(asked))
         return self._place.fresh_folder(_name(task, asked))
 
     def _run(self, job: Job) -> None:
