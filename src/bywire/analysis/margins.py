@@ -32,8 +32,6 @@ class LoopMargins:
     ----------
     gain
         Smallest factor above 1 by which the loop gain may grow; inf where none makes it unstable.
-    lower_gain
-        Largest factor below 1 to which the loop gain may fall; 0 where none makes it unstable.
     phase, crossover
         Smallest phase margin of all gain crossovers [degree], and the highest of these [Hz].
     delay
@@ -49,6 +47,8 @@ class LoopMargins:
         Whether the closed loop is stable.
     has_loop
         Whether anything is fed back: gains of 0, or a shut valve, leave no loop.
+    lower_gain
+        Largest factor below 1 to which the loop gain may fall; 0 where none makes it unstable.
     phase_at
         Gain crossover at which the phase margin is read [Hz].
     gain_at, lower_gain_at
@@ -58,7 +58,6 @@ class LoopMargins:
     """
 
     gain: float
-    lower_gain: float
     phase: float
     crossover: float
     delay: float
@@ -68,6 +67,7 @@ class LoopMargins:
     bandwidth: float
     stable: bool
     has_loop: bool = True
+    lower_gain: float = math.nan
     phase_at: float = math.nan
     gain_at: float = math.nan
     lower_gain_at: float = math.nan
@@ -89,8 +89,8 @@ class LoopMargins:
 NO_LOOP = "no loop: the loop gain is 0 at all frequencies"
 """what is said of gains of 0, or a shut valve"""
 UNSTABLE = LoopMargins(
-    gain=math.nan, lower_gain=math.nan, phase=math.nan, crossover=math.nan, delay=math.nan,
-    disk=math.nan, sensitivity=math.nan, complementary=math.nan, bandwidth=math.nan, stable=False,
+    gain=math.nan, phase=math.nan, crossover=math.nan, delay=math.nan, disk=math.nan,
+    sensitivity=math.nan, complementary=math.nan, bandwidth=math.nan, stable=False,
 )  # fmt: skip
 """what an unstable loop has: no margins"""
 
