@@ -33,8 +33,6 @@ class LoopMargins(EqualWhereUndefined):
     ----------
     gain
         Smallest factor above 1 by which the loop gain may grow; inf where none makes it unstable.
-    lower_gain
-        Largest factor below 1 to which the loop gain may fall; 0 where none makes it unstable.
     phase, crossover
         Smallest phase margin of all gain crossovers [degree], and the highest of these [Hz].
     delay
@@ -50,6 +48,8 @@ class LoopMargins(EqualWhereUndefined):
         Whether the closed loop is stable.
     has_loop
         Whether anything is fed back: gains of 0, or a shut valve, leave no loop.
+    lower_gain
+        Largest factor below 1 to which the loop gain may fall; 0 where none makes it unstable.
     phase_at
         Gain crossover at which the phase margin is read [Hz].
     gain_at, lower_gain_at
@@ -59,7 +59,6 @@ class LoopMargins(EqualWhereUndefined):
     """
 
     gain: float
-    lower_gain: float
     phase: float
     crossover: float
     delay: float
@@ -69,6 +68,7 @@ class LoopMargins(EqualWhereUndefined):
     bandwidth: float
     stable: bool
     has_loop: bool = True
+    lower_gain: float = math.nan
     phase_at: float = math.nan
     gain_at: float = math.nan
     lower_gain_at: float = math.nan
@@ -90,8 +90,8 @@ class LoopMargins(EqualWhereUndefined):
 NO_LOOP = "no loop: the loop gain is 0 at all frequencies"
 """what is said of gains of 0, or a shut valve"""
 UNSTABLE = LoopMargins(
-    gain=math.nan, lower_gain=math.nan, phase=math.nan, crossover=math.nan, delay=math.nan,
-    disk=math.nan, sensitivity=math.nan, complementary=math.nan, bandwidth=math.nan, stable=False,
+    gain=math.nan, phase=math.nan, crossover=math.nan, delay=math.nan, disk=math.nan,
+    sensitivity=math.nan, complementary=math.nan, bandwidth=math.nan, stable=False,
 )  # fmt: skip
 """what an unstable loop has: no margins"""
 

@@ -9,10 +9,12 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from bywire.analysis.linear.corners import CornerError
 from bywire.analysis.loop_curves import Family, loop_curve
 from bywire.analysis.margins import NO_LOOP, LoopMargins, figures_at, margins_of, worst
 from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase, loop_case, over_range
+from bywire.core.parameters import ParameterSet
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
     Banner,
@@ -209,8 +211,19 @@ def margins(
         return Margins(case, (margins_of(figures_at(case.loop, case.par, case.value)),))
     name, unit, values = over_range(over, case)
     cases = case.loop.varied(case.par, case.value, name, values)
-    each = tuple(margins_of(figures_at(case.loop, *point)) for point in cases)
+    each = tuple(
+        _margins_at(case, point, f"{name} = {amount(at, unit)}")
+        for point, at in zip(cases, values, strict=True)
+    )
     return Margins(case, each, name, unit, tuple(values))
+
+
+def _margins_at(case: LoopCase, point: tuple[ParameterSet, float], label: str) -> LoopMargins:
+    """Return the margins at one value of a range; an error says at which."""
+    try:
+        return margins_of(figures_at(case.loop, *point))
+    except CornerError as error:
+        raise CornerError(f"{label}: {error}") from None
 
 
 def margins_table(

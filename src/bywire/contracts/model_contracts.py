@@ -8,7 +8,7 @@ from bywire.contracts.model_units import has_its_units
 from bywire.contracts.rest import hides_no_friction, rests_exactly
 from bywire.contracts.run_derivatives import has_its_derivatives
 from bywire.contracts.run_energy import closes_its_energy
-from bywire.contracts.small_signal import is_its_linear_model
+from bywire.contracts.small_signal import is_its_linear_model, is_linear_beside_its_corners
 from bywire.contracts.stepping import (
     has_agreeing_engines,
     has_agreeing_lanes,
@@ -33,6 +33,7 @@ OF_A_MODEL: dict[str, Contract] = {
     "engines": has_agreeing_engines,
     "lanes": has_agreeing_lanes,
     "linear model": is_its_linear_model,
+    "linear model on corners": is_linear_beside_its_corners,
     "derivatives of a run": has_its_derivatives,
 }
 """what every model has to keep, where it starts with a parameter set"""

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from bywire.analysis.crossings import DROP
+from bywire.analysis.linear.corners import CornerError
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop
 from bywire.analysis.loop_figures import LoopFigures
@@ -166,6 +167,9 @@ def case_of(
     base = par.replace(changes)
 
     def build(gains: Mapping[str, float]) -> tuple[LinearModel, LinearModel]:
-        return loop.gain_and_closed(base.replace(gains), at)
+        try:
+            return loop.gain_and_closed(base.replace(gains), at)
+        except CornerError as error:
+            raise CornerError(error if label == NOMINAL else f"{label}: {error}") from None
 
     return LinearCase(label, build, changes, at)

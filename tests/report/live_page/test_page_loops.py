@@ -81,6 +81,20 @@ def test_where_a_contact_closes_there_is_no_loop(tmp_path):
         bywire.margins("pressure", overrides=reached)
 
 
+@needs_node
+def test_corners_and_loops_without_gain_are_said(tmp_path):
+    page = bywire.page(BENCHES["motorcycle"], tmp_path / "page.html")
+    at = LOOPS.find("pressure").at.default + 101325.0
+    gains = {f"ecu.pressure.{name}": 0.0 for name in ("k_p", "k_i", "k_d")}
+    cases = ({"pressure_sensor.p_high": at}, {"pressure_sensor.p_high": 1.1 * at}, gains)
+    answers = tried(page, tmp_path, *({"kind": "loops", "changes": each} for each in cases))
+    corner, usual, none = (each["answer"][0] for each in answers)
+    assert "corner of the model" in corner["reason"]
+    assert "bywire margins pressure" in corner["reason"]
+    assert usual["margins"]["hasLoop"]
+    assert none["margins"] == {"isStable": True, "hasLoop": False}
+
+
 def test_what_cannot_follow_parameters_is_left_out():
     loop, par = LOOPS.find("moment"), BENCHES["wedge"].par
 

@@ -8,12 +8,14 @@ operations on their corners are named, and a stated side is taken.
 
 from __future__ import annotations
 
+import linecache
 import operator
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, cast
@@ -149,14 +151,15 @@ class Linearization:
         Its numbers at a point.
     models
         The linear models at a point.
-    ticks
-        Whether controllers are part of it.
+    outputs, ticks
+        Whether outputs, and controllers, are part of it.
     """
 
     point: SmoothPoint
     free: NDArray[np.bool_]
     jacobians: Callable[[SmoothPoint], Jacobians]
     models: Callable[[SmoothPoint], tuple[LinearModel, ...]]
+    outputs: bool
     ticks: bool
 
 
@@ -166,20 +169,24 @@ class Kink:
 
     Parameters
     ----------
-    place
-        ``"FILE:LINE"``.
+    place, source
+        ``"FILE:LINE"``, and what is written there.
     excess
         What is tested: above the corner where it is positive.
     slope
         Of the excess by the free signals, in their usual magnitudes.
     corner
         Value of both arguments at the corner.
+    order
+        Number in the order in which operations with a corner are computed.
     """
 
     place: str
+    source: str
     excess: float
     slope: Array
     corner: float
+    order: int
 
     @property
     def side(self) -> str:
@@ -216,6 +223,54 @@ def _generic(count: int) -> Array:
     """Return two directions in which no corner lies by chance, shape (2, count)."""
     rng = np.random.default_rng(20)
     return np.asarray(rng.uniform(0.5, 1.0, (2, count)) * rng.choice([-1.0, 1.0], (2, count)))
+
+
+def kinks_at(
+    point: SmoothPoint, free: NDArray[np.bool_], usual: Array, *, outputs: bool, ticks: bool
+) -> list[Kink]:
+    """Return the operations with a corner that a point's free signals can move to it.
+
+    Parameters
+    ----------
+    point, free, outputs, ticks
+        As of `Linearization`.
+    usual
+        See `magnitudes`.
+
+    Returns
+    -------
+    list
+        In the order in which they are computed; none of equations that take no other numbers.
+    """
+    values = np.concatenate([point.state, point.memory, point.stimulus])
+    watch = _Watch()
+    pairs = zip(values, np.diag(usual)[:, free], strict=True)
+    numbers = [_Number(value, row, watch) for value, row in pairs]
+    try:
+        _evaluate(point, numbers, outputs, ticks)
+    except (TypeError, ValueError, ArithmeticError, AttributeError):
+        return []
+    return watch.kinks
+
+
+def _evaluate(point: SmoothPoint, numbers: list[Any], outputs: bool, ticks: bool) -> None:
+    """Evaluate everything that is linearized."""
+    model, par = point.model, point.par
+    n, m = point.state.size, point.memory.size
+    x = cast(Any, model.State)(*numbers[:n])
+    held = cast(Any, model.Memory)(*numbers[n : n + m])
+    stimulus = cast(Any, model.Stimulus)(*numbers[n + m :])
+    gaps = [d for group in model.gap(x, x, par) for d in group]
+    contact = tuple(sum(k * d for k, d in zip(row, gaps, strict=True)) for row in point.K)
+    equations(
+        model, par, (x, held), contact, point.directions, point.moving, outputs=outputs
+    )
+    for task in model.tasks(par) if ticks else ():
+        task.tick(x, held, stimulus, par)
+
+
+def _size(slope: Array) -> float:
+    return float(np.abs(slope).sum())
 
 
 def linear_models(of: Linearization) -> tuple[LinearModel, ...]:
@@ -306,7 +361,7 @@ class _Corner:
 
     def taken(self, sides: Sides) -> tuple[LinearModel, ...]:
         """Return the models on the stated sides; of corners that exclude each other, the first."""
-        rows: dict[tuple[str, int], tuple[Array, float]] = {}
+        rows: dict[tuple[str, int], tuple[Array, float, float]] = {}
         direction = self.generic[0]
         for _ in range(_TURNS):
             kinks = self.kinks(direction)
@@ -314,8 +369,8 @@ class _Corner:
             if not wrong:
                 break
             for each in kinks:
-                key = (each.place, int(np.abs(each.slope).argmax()))
-                rows[key] = (each.slope, 1.0 if sides.of(each.place) == ABOVE else -1.0)
+                sign = 1.0 if sides.of(each.place) == ABOVE else -1.0
+                rows[(each.place, each.order)] = (each.slope, sign, self.offset(each, direction))
             moved = _direction([*rows.values()], self.generic[0])
             if np.array_equal(moved, direction):
                 break
@@ -328,12 +383,23 @@ class _Corner:
 
     def kinks(self, direction: Array) -> list[Kink]:
         """Return the operations whose corner, crossed near a direction, changes the models."""
-        return [each for each in self.near(direction) if self.matters(each, direction)]
+        known: dict[bytes, bool] = {}
+        return [each for each in self.near(direction) if self._matters(each, direction, known)]
+
+    def _matters(self, kink: Kink, direction: Array, known: dict[bytes, bool]) -> bool:
+        """Return `matters`, which is one for all operations that test the same quantity."""
+        c = kink.slope / kink.slope[np.abs(kink.slope).argmax()]
+        key = c.round(9).tobytes()
+        if key not in known:
+            known[key] = self.matters(kink, direction)
+        return known[key]
 
     def matters(self, kink: Kink, direction: Array) -> bool:
         """Return whether the two sides of an operation's corner have different models."""
-        c = kink.slope / np.abs(kink.slope).max()
-        along = direction - c * (c @ direction) / (c @ c)
+        largest = np.abs(kink.slope).max()
+        c = kink.slope / largest
+        missing = c @ direction + self.offset(kink, direction) / largest
+        along = direction - c * missing / (c @ c)  # right on the corner
         one, other = along + _ACROSS * c, along - _ACROSS * c
         if not self.breaks(one, other):
             return False
@@ -346,29 +412,18 @@ class _Corner:
 
     def near(self, direction: Array) -> list[Kink]:
         """Return the operations with a corner near the point, as a displaced point shows them."""
-        point, free = self.moved(direction), self.of.free
-        shares = np.diag(magnitudes(self.of.point))[:, free]
-        values = np.concatenate([point.state, point.memory, point.stimulus])
-        watch = _Watch()
-        numbers = [_Number(v, row, watch) for v, row in zip(values, shares, strict=True)]
-        try:
-            self.run(point, numbers)
-        except (TypeError, ValueError, ArithmeticError, AttributeError):
-            return []  # equations that take no other numbers: what differs stays without a name
-        return watch.kinks
+        usual = magnitudes(self.of.point)
+        kinks = kinks_at(
+            self.moved(direction), self.of.free, usual,
+            outputs=self.of.outputs, ticks=self.of.ticks,
+        )
+        return [
+            each for each in kinks if abs(self.offset(each, direction)) <= _size(each.slope)
+        ]
 
-    def run(self, point: SmoothPoint, numbers: list[Any]) -> None:
-        """Evaluate everything that is linearized."""
-        model, par = point.model, point.par
-        n, m = point.state.size, point.memory.size
-        x = cast(Any, model.State)(*numbers[:n])
-        held = cast(Any, model.Memory)(*numbers[n : n + m])
-        stimulus = cast(Any, model.Stimulus)(*numbers[n + m :])
-        gaps = [d for group in model.gap(x, x, par) for d in group]
-        contact = tuple(sum(k * d for k, d in zip(row, gaps, strict=True)) for row in point.K)
-        equations(model, par, (x, held), contact, point.directions, point.moving)
-        for task in model.tasks(par) if self.of.ticks else ():
-            task.tick(x, held, stimulus, par)
+    def offset(self, kink: Kink, direction: Array) -> float:
+        """Return the excess at the operating point itself, over the reach."""
+        return kink.excess / REACH - float(kink.slope @ direction)
 
     def refusal(self, kinks: Sequence[Kink]) -> str:
         name = self.of.point.model.name
@@ -377,7 +432,10 @@ class _Corner:
                 f"{name}: the equations have no single finite slope at the operating point, and "
                 "no operation could be named: choose another point"
             )
-        places = "; ".join(f"{each.place} (corner at {each.corner:.6g}, SI)" for each in kinks)
+        places = "; ".join(
+            f"{each.place}, {quoted(each.source)} (corner at {each.corner:.6g}, SI)"
+            for each in kinks
+        )
         return (
             f"{name}: the operating point lies on a corner, and the linear models of its sides "
             f"differ: {places}. Choose another operating point, or take a side: "
@@ -385,22 +443,24 @@ class _Corner:
         )
 
 
-def _direction(rows: Sequence[tuple[Array, float]], generic: Array) -> Array:
+def _direction(rows: Sequence[tuple[Array, float, float]], generic: Array) -> Array:
     """Return a direction in which excesses have their signs; the first ones, where not all can."""
     from scipy.optimize import linprog
 
     n, kept = generic.size, np.zeros((0, generic.size))
-    best = generic
-    for slope, sign in rows:
-        tried = np.vstack([kept, sign * slope / np.abs(slope).sum()])
+    offsets, best = np.zeros(0), generic
+    for slope, sign, offset in rows:
+        tried = np.vstack([kept, sign * slope / _size(slope)])
+        beyond = np.append(offsets, sign * offset / _size(slope))
         limits = np.hstack([-tried, np.ones((len(tried), 1))])
         cost = np.zeros(n + 1)
         cost[-1] = -1.0
-        answer = linprog(cost, limits, np.zeros(len(tried)), bounds=[(-1.0, 1.0)] * (n + 1))
+        answer = linprog(cost, limits, beyond, bounds=[(-1.0, 1.0)] * (n + 1))
         least = -answer.fun if answer.success else 0.0
         if least > 1e-6:
             # A little of the generic one, so that no other corner is met by chance.
-            kept, best = tried, 0.6 * answer.x[:n] + 0.3 * min(least, 1.0) * generic
+            best = answer.x[:n] + 0.3 * min(least, 1.0) * generic
+            kept, offsets = tried, beyond
     return np.asarray(best)
 
 
@@ -438,30 +498,37 @@ def _felt(model: LinearModel) -> tuple[str, ...]:
 
 
 class _Watch:
-    """Operations near their corners, in the order in which they are computed."""
+    """Operations with a corner, in the order in which they are computed."""
 
     def __init__(self) -> None:
         self.kinks: list[Kink] = []
+        self.count = 0
 
     def see(self, excess: float, slope: Array, corner: float) -> None:
-        """Note an operation where its corner lies within reach."""
-        size = float(np.abs(slope).sum())
-        if size > 0.0 and abs(excess) <= 4.0 * REACH * size:
-            self.kinks.append(Kink(_place(), excess, slope, corner))
+        """Note an operation whose corner can be reached."""
+        self.count += 1
+        if np.isfinite(slope).all() and slope.any():
+            self.kinks.append(Kink(*_place(), excess, slope, corner, self.count))
 
 
-def _place() -> str:
-    """Return the line outside elementary functions that computes, as a user looks for it."""
+def _place() -> tuple[str, str]:
+    """Return the line outside elementary functions that computes, and what is written there."""
     frame = sys._getframe(2)
     while frame.f_back and frame.f_code.co_filename in (__file__, _OPS_FILE):
         frame = frame.f_back
-    path = Path(frame.f_code.co_filename)
+    name, line = frame.f_code.co_filename, frame.f_lineno
+    return f"{_shown_file(name)}:{line}", linecache.getline(name, line).strip()
+
+
+@lru_cache(maxsize=1024)
+def _shown_file(name: str) -> str:
+    path = Path(name)
     package = Path(bywire.__file__).parent.parent
     for folder in (Path.cwd(), package):
         if path.is_relative_to(folder) and "site-packages" not in path.relative_to(folder).parts:
             path = path.relative_to(folder)
             break
-    return f"{path.as_posix()}:{frame.f_lineno}"
+    return path.as_posix()
 
 
 class _Number:

@@ -89,6 +89,7 @@ def linearize(
             point, free,
             lambda at: jacobians(at, at.plant(), outputs, free),
             lambda at: (plant_model(at, inputs, outputs),),
+            outputs=bool(outputs),
             ticks=False,
         )
     )[0]  # fmt: skip

@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bywire.analysis.linear.corners import Linearization, linear_models
 from bywire.analysis.linear.linear_model import LinearModel
@@ -19,7 +20,7 @@ from bywire.analysis.linear.linearize import (
     require_outputs,
     smooth_point,
 )
-from bywire.analysis.linear.smooth_functions import SmoothPoint
+from bywire.analysis.linear.smooth_functions import SmoothPoint, smooth_functions
 from bywire.core.errors import ParameterError, StepError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
@@ -39,6 +40,10 @@ class SampledSystem:
         Exact model of the plant over a frame, driven by all fields of the Memory.
     names, ticks
         Tasks and their Jacobians, in the order in which they run.
+    reads
+        States that each task may read, whatever its gains.
+    takes
+        Fields of the Memory that the plant may take, likewise.
     every
         Frames per tick of each task.
     frame
@@ -48,6 +53,8 @@ class SampledSystem:
     plant: LinearModel
     names: tuple[str, ...]
     ticks: tuple[Jacobians, ...]
+    reads: tuple[frozenset[str], ...]
+    takes: frozenset[str]
     every: tuple[int, ...]
     frame: float
 
@@ -117,6 +124,9 @@ def sampled_models(
     at = smooth_point(model, par, point)
     states = [name for name in model.State._fields if name not in locked]
     free = free_signals(at, states, model.Memory._fields, inputs)
+    functions = smooth_functions(model, par)
+    reads = tuple(_named(model.State._fields, row) for row in functions.reads)
+    takes = _named(model.Memory._fields, functions.driven[1].any(axis=0))
     periods = {task.name: task.period for task in tasks}
     frame, every = frames_of([*periods.values()])
 
@@ -128,6 +138,8 @@ def sampled_models(
             plant=stepped(moving, frame, step) if step else moving.sampled(frame),
             names=tuple(periods),
             ticks=_ticks(at, inputs, kept),
+            reads=reads,
+            takes=takes,
             every=tuple(every),
             frame=frame,
         )
@@ -137,9 +149,14 @@ def sampled_models(
             at, free,
             lambda at: jacobians(at, at.plant(), outputs, free, at.ticks()),
             lambda at: build(system(at)),
+            outputs=bool(outputs),
             ticks=True,
         )
     )  # fmt: skip
+
+
+def _named(names: Sequence[str], chosen: NDArray[np.bool_]) -> frozenset[str]:
+    return frozenset(name for name, is_chosen in zip(names, chosen, strict=True) if is_chosen)
 
 
 def frames_of(periods: Sequence[float]) -> tuple[float, list[int]]:

@@ -9,6 +9,7 @@ from threading import Lock
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bywire.core.model import Model
 from bywire.core.ops import where
@@ -35,6 +36,10 @@ class SmoothFunctions:
         1 else; B and D by all of the Memory, C, D and y for all of the Output.
     ticks
         ``(x, m, u, p) -> (by x, by m, by u, renewed)``: each task's new memory and its Jacobians.
+    reads
+        Of each task, which states its new memory may depend on, whatever the parameters.
+    driven
+        Which states' rates may depend on which states, and on which fields of the Memory.
     model
         What they were made of: kept alive, for its parts tell structures apart by identity.
     """
@@ -42,6 +47,8 @@ class SmoothFunctions:
     contacts: Any
     plant: Any
     ticks: tuple[Any, ...]
+    reads: tuple[NDArray[np.bool_], ...]
+    driven: tuple[NDArray[np.bool_], NDArray[np.bool_]]
     model: Model
 
     @cached_property
@@ -92,28 +99,32 @@ def _build(model: Model, par: ParameterSet) -> SmoothFunctions:
     m = ca.SX.sym("m", len(model.Memory._fields))
     u = ca.SX.sym("u", len(model.Stimulus._fields))
     at, held = cast(Any, model.State)(*_split(x)), cast(Any, model.Memory)(*_split(m))
-    ticks = []
+    ticks, reads = [], []
     for k, task in enumerate(model.tasks(par)):
         stimulus = cast(Any, model.Stimulus)(*_split(u))
         renewed = ca.vertcat(*task.tick(at, held, stimulus, symbolic))
         parts = [ca.jacobian(renewed, by) for by in (x, m, u)]
+        reads.append(_pattern(parts[0]).any(axis=0))
         results = [ca.densify(each) for each in (*parts, renewed)]
         ticks.append(ca.Function(f"tick_{k}", [x, m, u, p], results))
     groups = [C for C in model.compliance(symbolic) if C]
     gap = _column([d for group in model.gap(at, at, symbolic) for d in group])
     matrices = [ca.SX(ca.vertcat(*(ca.horzcat(*row) for row in C))) for C in groups]
+    plant, driven = _plant(model, symbolic, (x, m, p), at, held, gap)
     return SmoothFunctions(
         contacts=ca.Function("contacts", [x, p], [*matrices, gap]),
-        plant=_plant(model, symbolic, (x, m, p), at, held, gap),
+        plant=plant,
         ticks=tuple(ticks),
+        reads=tuple(reads),
+        driven=driven,
         model=model,
     )
 
 
 def _plant(
     model: Model, par: ParameterSet, symbols: tuple[Any, Any, Any], x: Any, held: Any, gap: Any
-) -> Any:
-    """Return the function of rates and outputs and their Jacobians."""
+) -> tuple[Any, tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
+    """Return the function of rates and outputs and their Jacobians, and what rates depend on."""
     import casadi as ca
 
     K = ca.SX.sym("K", gap.shape[0], gap.shape[0])
@@ -122,9 +133,17 @@ def _plant(
     contact = tuple(_split(K @ gap))
     rates, outputs = equations(model, par, (x, held), contact, _split(s), _split(g))
     rate, y = _column(rates), _column(outputs)
-    parts = [ca.densify(ca.jacobian(a, b)) for a in (rate, y) for b in symbols[:2]]
-    results = [*parts, ca.densify(rate), ca.densify(y)]
-    return ca.Function("plant", [*symbols, K, s, g], results)
+    parts = [ca.jacobian(a, b) for a in (rate, y) for b in symbols[:2]]
+    results = [ca.densify(each) for each in (*parts, rate, y)]
+    function = ca.Function("plant", [*symbols, K, s, g], results)
+    return function, (_pattern(parts[0]), _pattern(parts[1]))
+
+
+def _pattern(matrix: Any) -> NDArray[np.bool_]:
+    """Return which entries of a symbolic matrix are there."""
+    pattern = np.zeros(matrix.shape, dtype=bool)
+    pattern[tuple(matrix.sparsity().get_triplet())] = True
+    return pattern
 
 
 def equations(
@@ -134,6 +153,8 @@ def equations(
     contact: tuple[Any, ...],
     directions: Sequence[Any],
     moving: Sequence[Any],
+    *,
+    outputs: bool = True,
 ) -> tuple[list[Any], list[Any]]:
     """Return rates and outputs of a model's smooth part, on numbers of any kind.
 
@@ -147,6 +168,8 @@ def equations(
         Forces of the contacts.
     directions, moving
         Of each friction: its direction, 0 where it is removed; 0 where its velocity is stuck.
+    outputs
+        Whether outputs are wanted; else there are none.
     """
     x, held = at
     force = dict(zip(x._fields, model.balance(x, x, held, par, contact), strict=True))
@@ -158,6 +181,8 @@ def equations(
         force[name] = moving[k] * (force[name] + reaction[k])
     mass = model.mass(x, par)
     rates = [force[name] / getattr(mass, name) for name in x._fields]
+    if not outputs:
+        return rates, []
     flow = zeros(cast(Any, model.Flow))
     return rates, list(model.output(x, held, par, contact, tuple(reaction), flow))
 

@@ -109,6 +109,7 @@ function cutOpen({ A, ticks }, { cut, held, every }) {
   const writes = ({ X, M }) => X[column].some((value) => value !== 0)
     || M[column].some((value, k) => value !== (k === column ? 1 : 0));
   const owners = ticks.flatMap((tick, k) => ((cut.isState ? reads : writes)(tick) ? [k] : []));
+  if (!owners.length) return { isNothing: true };
   if (owners.length !== 1 || every[owners[0]] !== every.reduce(leastCommon)) return null;
   ticks.forEach((tick, k) => {
     if (k !== owners[0]) return (now = after(now, tick));
@@ -143,6 +144,7 @@ function gainOf(found, loop) {
   if (loop.isAnalog) return analogGain(found, loop);
   const opened = cutOpen(found, loop);
   if (!opened) return null;
+  if (opened.isNothing) return effective([], [], [], loop.every.reduce(leastCommon) * loop.frame);
   const { states: n, held: m, every, frame } = loop, common = every.reduce(leastCommon);
   const W = zeros(n + m, n + m);
   found.A.forEach((row, i) => { W[i].set(row.map((value) => value * frame)); });
@@ -223,6 +225,7 @@ function responseAt({ A, B, C, period, isAnalog }, frequency) {
 
 /** Return the closed loop's growth in a sample, or as long: the root of a high power's size. */
 function growthOf({ A, B, C, period, isAnalog }) {
+  if (!A.length) return 0; // nothing is fed back
   const closed = A.map((row, i) => Float64Array.from(row, (value, j) => value - B[i] * C[j]));
   let X = isAnalog ? exponential(closed.map((row) => row.map((value) => value * period))) : closed;
   let total = 0, power = 1;
