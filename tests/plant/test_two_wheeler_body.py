@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
+import bywire
 from bywire.core.catalog import parameters
 from bywire.plant import two_wheeler_body as body
 from bywire.plant.two_wheeler_body import rear_load, rigid_rear_load
@@ -52,3 +55,29 @@ def test_a_given_force_loads_no_wheel_with_less_than_nothing(F: float) -> None:
     loads = body.loads(rear_load(F, 0.0, 1.0, PAR), 1.0, PAR)
     assert min(loads) >= 0.0
     assert sum(loads) == pytest.approx(WEIGHT)
+
+
+def test_a_rider_who_goes_over_the_handlebar_is_told_of() -> None:
+    """The center of gravity is above the front contact at arctan(l_f/h)."""
+    over = math.atan(PAR.l_f / PAR.h)
+    there = body.center(body.State(0.0, 0.0, 0.0, over, 0.0), PAR)
+    assert there.l_f == pytest.approx(0.0, abs=1e-12)
+    t = np.array([0.0, 0.1, 0.2])
+
+    def warned(pitch: float) -> list[str]:
+        phi = np.array([0.0, pitch, 0.0])
+        return body.watch(t, body.State(t, t, t, phi, t), PAR)
+
+    assert warned(over - 1e-6) == []
+    (text,) = warned(over + 0.1)
+    assert "goes over the handlebar" in text
+    assert "at t = 0.1 s (pitch up to 53.8 deg, limit 48.1 deg)" in text
+
+
+def test_a_stop_names_the_rider_thrown_and_the_lift_limit_that_did_not_follow() -> None:
+    changes = {"vehicle.body.h": "0.7 m", "options.v_0": "30 m/s", "options.duration": "2.5 s"}
+    result = bywire.run("straight-stop", changes, estimate_error=False)
+    derived, thrown = result.warnings
+    assert derived.startswith("ecu.front_lift.a_lim = 10.37")
+    assert "its formula gives 9.186" in derived
+    assert "goes over the handlebar" in thrown

@@ -21,9 +21,10 @@ from bywire.bench.requirements import check
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.bench.stimulus_sections import stimulus_of, stimulus_sections
 from bywire.bench.values import parsed
-from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.catalog import PARAMETER_SETS, outdated_values
 from bywire.core.errors import ModelError, ParameterError, place_of, quoted, unknown_name
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.units import shown
 from bywire.simulation.engine import engine_names
 from bywire.simulation.run import Run
 
@@ -165,6 +166,22 @@ class Bench:
         """Validated parameters, overrides applied."""
         base = PARAMETER_SETS.find(self.parameters).parameters()
         return base.replace(parsed(type(base), self.overrides, "parameter"))
+
+    @cached_property
+    def outdated(self) -> list[str]:
+        """Which derived values of the set no longer match what they were derived from."""
+        cited = PARAMETER_SETS.find(self.parameters).values
+        leaves = leaf_fields(type(self.par))
+        texts = []
+        for each in outdated_values(cited, self.par, self.overrides):
+            unit = leaves[each.name].unit.symbol
+            now, then = (shown(value, unit) for value in (each.now, each.formula))
+            texts.append(
+                f"{each.name} = {now} is derived ({each.where}) from {', '.join(each.changed)}, "
+                f"which was changed, and no longer matches: its formula gives {then}, so set it "
+                "too or leave it on purpose"
+            )
+        return texts
 
     @cached_property
     def chosen_options(self) -> ParameterSet:

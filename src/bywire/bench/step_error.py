@@ -17,15 +17,18 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.kpis.kpi import Kpi
-from bywire.core.errors import RunError, StepError
+from bywire.core.errors import RunError, StepError, WorkLimitError
 from bywire.core.typing import Array
 
 OTHER_STEPS = (0.5, 2.0)
 """other steps over that of the run"""
+MOST_WORK = 5.0
+"""work of a run in other steps, over that of the run, at which its estimate is abandoned"""
 NO_ESTIMATE = (StepError, RunError)
 """what runs in other steps may end with: no divisor of a sample time, or too coarse"""
 ROUNDING = 1e-11
 """rounding of many steps, over the largest value of a signal"""
+_STEPS = {0.5: "half the step", 2.0: "twice the step"}
 _REGULAR = 2.0**1.5  # least ratio of the differences to double and half steps at second order
 _SAME = 1e-10  # s, between a time and that of the row where it was read
 
@@ -47,6 +50,17 @@ def unestimated(failures: Mapping[float, Exception]) -> str:
     return (
         "how far the figures are off by the step is not known: the bench runs in neither half nor "
         f"double steps ({because})"
+    )
+
+
+def abandoned(failures: Mapping[float, Exception]) -> str:
+    """Return the note that the run in some other step was given up; empty where none was."""
+    steps = [_STEPS[f] for f, error in failures.items() if isinstance(error, WorkLimitError)]
+    if not steps:
+        return ""
+    return (
+        f"the error estimate from {' and '.join(steps)} was abandoned: it took more than "
+        f"{MOST_WORK:g} times the work of the run itself"
     )
 
 

@@ -78,6 +78,10 @@ class SolverError(RunError):
     """A trajectory that left the numbers or did not settle."""
 
 
+class WorkLimitError(RunError):
+    """A run that takes more work than it may."""
+
+
 class CompilerError(RunError):
     """A compiler that failed on a generated kernel."""
 

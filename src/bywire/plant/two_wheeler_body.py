@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Length, Unit
 from bywire.core.signals import Energy, Power, Role, Signal
+from bywire.core.typing import Array
+from bywire.core.validity import first, highest, row_by_row
 
 BodyMass = Annotated[float, Unit("kg", 250.0), Field(gt=0, allow_inf_nan=False)]
 BodyInertia = Annotated[float, Unit("kg*m**2", 35.0), Field(ge=0, allow_inf_nan=False)]
@@ -239,3 +242,17 @@ def pitch_power(x: State, u: Input, par: Parameters) -> Power:
 def power_loss(x: State, par: Parameters) -> Drag:
     """Return the power of the air drag, >= 0."""
     return drag(x, par) * x.v
+
+
+@row_by_row
+def watch(t: Array, x: State, par: Parameters) -> list[str]:
+    r"""Return whether the body falls over its front wheel.
+
+    At the pitch :math:`\arctan(l_f/h)` the center of gravity is above the front contact. Beyond,
+    gravity pitches the body further, whatever the brakes do.
+    """
+    limit = np.degrees(np.arctan2(par.l_f, par.h))
+    pitch = np.degrees(x.phi)
+    most = f" (pitch up to {highest(pitch):.3g} deg, limit {highest(limit):.3g} deg)"
+    text = "the rider goes over the handlebar: the center of gravity passes the front wheel"
+    return first(t, np.greater(pitch, limit), text, f"{most}, and what follows is no longer a stop")

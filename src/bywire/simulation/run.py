@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,7 +15,7 @@ from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_table
 from bywire.core.typing import Array
-from bywire.simulation.advance import Progress, advance_all
+from bywire.simulation.advance import Progress, advance_all, work_of
 from bywire.simulation.buffered_call import BufferedCall
 from bywire.simulation.changes import Change, energies, energy_of, pieces, put_in_signals
 from bywire.simulation.engine import Engine, prepare
@@ -43,6 +44,8 @@ class Run:
         Length of the run, substep and recording interval [s].
     changes
         Parameters that replace those before at some times, in order of time: see `Change`.
+    most_work
+        Work after which it fails, in substeps; see `Trajectory.work`.
     """
 
     model: Model
@@ -54,6 +57,7 @@ class Run:
     step: float = 20e-6
     record: float = 1e-3
     changes: tuple[Change, ...] = ()
+    most_work: float = math.inf
 
     def schedule(self) -> Schedule:
         """Return the integer plan of the run."""
@@ -82,6 +86,8 @@ class Trajectory:
         ``interrupted`` when the user stopped it (rows end there).
     unsettled, repeated
         Substeps that hit the cap, and that took more than one pass.
+    work
+        What it took, counted in ordinary substeps: the same on every machine.
     vector
         State vector at the end.
     """
@@ -93,6 +99,7 @@ class Trajectory:
     status: Status
     unsettled: int
     repeated: int
+    work: float
     engine: str
     vector: Array
 
@@ -161,6 +168,8 @@ def simulate(
         When steps and sample times do not divide each other.
     SolverError
         When the trajectory leaves the numbers.
+    WorkLimitError
+        When it takes more work than it may.
     ParameterError
         When the stimulus is not finite.
     UnknownNameError
@@ -178,7 +187,7 @@ def simulate(
         wanted = (*wanted, *put_in_signals(run.model.Output))
         values = np.column_stack((values, put_in))
     else:
-        finished = advance_all(chosen, request, vector, values, progress)
+        finished = advance_all(chosen, request, vector, values, progress, most=run.most_work)
     rows = schedule.rows if finished == schedule.frames else -(-finished // schedule.record_frames)
     counters = vector[chosen.layout.start["counters"] :]
     status: Status = "done" if finished == schedule.frames else "interrupted"
@@ -192,6 +201,7 @@ def simulate(
         status=status,
         unsettled=int(counters[0]),
         repeated=int(counters[1]),
+        work=float(work_of(schedule, chosen.layout, finished, vector)),
         engine=chosen.label,
         vector=vector,
     )
@@ -226,7 +236,8 @@ def _advanced_in_pieces(
             jump = energy_of(engine, here, vector, places) - energy_of(*before, vector, places)
             put_in[-(-begin // schedule.record_frames) :] += jump
         row = -(-begin // schedule.record_frames)
-        finished = advance_all(engine, here, vector, values[row:], progress, begin, last)
+        rows = values[row:]
+        finished = advance_all(engine, here, vector, rows, progress, begin, last, run.most_work)
         if finished < last:
             break
         before = engine, here

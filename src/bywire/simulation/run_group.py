@@ -19,7 +19,7 @@ from bywire.core.errors import ParameterError
 from bywire.core.interrupts import thread_pool
 from bywire.core.parameters import ParameterSet, leaf_table
 from bywire.core.typing import Array
-from bywire.simulation.advance import require_finite
+from bywire.simulation.advance import require_finite, require_work, work_of
 from bywire.simulation.case_kernels import CaseKernel, case_kernel, is_side_by_side
 from bywire.simulation.changes import energies, pieces, put_in_signals
 from bywire.simulation.engine import CUDA, are_alike, prepare
@@ -103,9 +103,8 @@ class RunGroup(Sequence[Trajectory]):
     def __getitem__(self, k: int | slice) -> Trajectory | tuple[Trajectory, ...]:
         if isinstance(k, slice):
             return tuple(self)[k]
-        unsettled, repeated = (
-            int(n) for n in self.vectors[self.kernel.layout.start["counters"] :, k][:2]
-        )
+        layout, schedule, vector = self.kernel.layout, self.runs[k].schedule(), self.vectors[:, k]
+        unsettled, repeated = (int(n) for n in vector[layout.start["counters"] :][:2])
         return Trajectory(
             run=self.runs[k],
             time=self.time,
@@ -114,8 +113,9 @@ class RunGroup(Sequence[Trajectory]):
             status="unsettled" if unsettled else "done",
             unsettled=unsettled,
             repeated=repeated,
+            work=float(work_of(schedule, layout, schedule.frames, vector)),
             engine=self.kernel.label,
-            vector=self.vectors[:, k].copy(),
+            vector=vector.copy(),
         )
 
 
@@ -156,6 +156,8 @@ def simulate_group(
         When a signal is unknown.
     SolverError
         When a trajectory leaves the numbers.
+    WorkLimitError
+        When a run takes more work than it may.
     DeviceError
         For ``cuda`` where there is no graphics processor, or no room on it.
     """
@@ -262,6 +264,7 @@ class _Carried:
             for begin, _, par in pieces(run.par, run.changes, schedule) if run.changes else ():
                 self._changes.setdefault(begin, []).append((lane, par))
         self._stimulus = _stimuli(group, schedule, width)
+        self._most = np.array([run.most_work for run in filled])
 
     def to_the_end(
         self, values: Array, edges: Sequence[int], skipped: int, watch: _Watch, ends: Ends | None
@@ -284,6 +287,7 @@ class _Carried:
                 self._kernel.layout, self._vector,
                 f"one of {self._count} runs left the numbers before t = {end * schedule.frame:g} s",
             )  # fmt: skip
+            require_work(work_of(schedule, self._kernel.layout, end, self._vector), self._most)
             watch.piece()
         return self._vector
 

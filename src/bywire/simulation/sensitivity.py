@@ -11,7 +11,7 @@ import numpy as np
 
 from bywire.core.errors import CompilerError, ParameterError, unknown_name
 from bywire.core.typing import Array
-from bywire.simulation.advance import require_finite
+from bywire.simulation.advance import require_finite, work_of
 from bywire.simulation.changes import require_unchanged
 from bywire.simulation.compiler import VECTOR, Compiler, find_compiler, load_library
 from bywire.simulation.emission import layout_of
@@ -205,6 +205,7 @@ def simulate_with_sensitivities(
         status="unsettled" if counters[0] else "done",
         unsettled=int(counters[0]),
         repeated=int(counters[1]),
+        work=float(work_of(schedule, kernel.layout, schedule.frames, vector)),
         engine=kernel.label,
         vector=vector,
     )

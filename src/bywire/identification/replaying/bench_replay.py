@@ -10,7 +10,7 @@ import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.recording import energy_doubts_of, energy_signals
-from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, unestimated
+from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, OTHER_STEPS, abandoned, unestimated
 from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
@@ -79,7 +79,8 @@ def replay(
     failures: dict[float, Exception] = {}
     for factor in OTHER_STEPS if estimate_error else ():
         try:
-            other = dataclasses.replace(measured.run, step=factor * measured.run.step)
+            step, most = factor * measured.run.step, MOST_WORK * modeled.work
+            other = dataclasses.replace(measured.run, step=step, most_work=most)
             others[factor] = _beside_all(measured, simulate(other, tuple(measured.compared)))
         except NO_ESTIMATE as error:
             failures[factor] = error
@@ -87,7 +88,8 @@ def replay(
         _driving(measured), _beside_all(measured, modeled), measured.run,
         (*measured.notes, *missed_samples(measured.data, measured.compared),
          *energy_doubts_of(measured.run, modeled),
-         *([unestimated(failures)] if failures and not others else [])),
+         *filter(None, [unestimated(failures) if failures and not others else
+                        abandoned(failures)])),
         others,
     )  # fmt: skip
 
