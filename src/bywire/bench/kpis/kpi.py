@@ -24,6 +24,8 @@ import numpy as np
 from bywire.core.errors import unknown_name
 from bywire.core.typing import Array
 
+_BOUND = 3.0  # of errors that do not converge: 95 % of the true ones lie within
+
 
 @dataclass(frozen=True)
 class Kpi:
@@ -46,6 +48,9 @@ class Kpi:
         how large it is, NaN where it was not estimated.
     is_open
         Whether it is not defined because the recording leaves open what it is.
+    converges
+        Whether runs in several steps show the order of the scheme; else ``error`` is no more than
+        a scale.
     """
 
     name: str
@@ -55,6 +60,12 @@ class Kpi:
     note: str = ""
     error: float = math.nan
     is_open: bool = False
+    converges: bool = True
+
+    @property
+    def bound(self) -> float:
+        """How far it may be off by the step, in ``unit``: three times the error of no order."""
+        return self.error if self.converges else _BOUND * self.error
 
 
 @dataclass(frozen=True)
