@@ -81,7 +81,7 @@ def test_a_change_smaller_than_the_steps_error_is_not_distinct(results, folders,
     with undrawn():
         near.write(tmp_path / "near")
     energies = [each.kpi("energy") for each in (results[0], near)]
-    assert 0.0 < abs(energies[1].value - energies[0].value) < sum(e.error for e in energies)
+    assert 0.0 < abs(energies[1].value - energies[0].value) < sum(e.bound for e in energies)
     pairs = (results[0], near), (folders[0], tmp_path / "near")
     for comparison in (bywire.compare(*pair) for pair in pairs):
         assert "not distinct" in next(
@@ -89,7 +89,7 @@ def test_a_change_smaller_than_the_steps_error_is_not_distinct(results, folders,
         )
         record = {each["name"]: each for each in comparison.as_object()["kpis"]}
         assert record["energy"]["distinct"] is False
-        assert record["energy"]["errors"] == [each.error for each in energies]
+        assert record["energy"]["errors"] == [each.bound for each in energies]
     far = {each.name: each.is_distinct for each in bywire.compare(*folders).figures}
     assert far["energy"]
     without = bywire.run("hard-braking", changed, estimate_error=False)

@@ -167,7 +167,10 @@ class Replay(Answer):
                     "name": fit.segment.name, "signal": fit.signal,
                     "start": fit.segment.start, "stop": fit.segment.stop,
                     "figures": {
-                        k.name: {"value": k.value, "unit": k.unit, "error": k.error}
+                        k.name: {
+                            "value": k.value, "unit": k.unit, "error": k.error,
+                            "converges": k.converges,
+                        }
                         for k in fit.kpis
                     },
                     "tolerances": [
@@ -212,9 +215,9 @@ def fit_table(fits: Sequence[SegmentFit]) -> Table:
 
 
 def _figure(kpi: Kpi) -> Cell:
-    if kpi.unit == "s" and math.isfinite(kpi.value) and not kpi.error > 0.0:
+    if kpi.unit == "s" and math.isfinite(kpi.value) and not kpi.bound > 0.0:
         return Cell(duration(kpi.value), value=kpi.value)
-    return Cell(measured_amount(kpi.value, kpi.unit, kpi.error, 3), value=kpi.value)
+    return Cell(measured_amount(kpi.value, kpi.unit, kpi.bound, 3), value=kpi.value)
 
 
 def _tracked(track: Track) -> dict[str, Any]:

@@ -42,6 +42,13 @@ if TYPE_CHECKING:
     from bywire.api.run_over import BenchRange
     from bywire.report.bench_figures import Shown
 
+_SCATTERED = (
+    "Errors \"up to\" belong to figures that do not converge: over double, single and half steps, "
+    "their differences do not shrink as the scheme's order 2 demands. Their errors are not known: "
+    "what is given bounds 95 % of such errors, by the scatter of the figure over all steps."
+)
+
+
 @dataclass(frozen=True)
 class BenchResult(Result, Answer):
     """What a bench gave, with recordings as xarray and key figures with their verdicts.
@@ -66,9 +73,10 @@ class BenchResult(Result, Answer):
                 f"{kpi.definition} ({kpi.note})" if kpi.note else kpi.definition,
                 verdicts[kpi.name].limit if kpi.name in verdicts else "",
                 verdicts[kpi.name].outcome if kpi.name in verdicts else "",
-                kpi.error,
+                kpi.bound,
                 stated_figure(stated[kpi.name], kpi.unit) if kpi.name in stated else "",
                 stated[kpi.name].where if kpi.name in stated else "",
+                kpi.converges,
             )
             for kpi in self.kpis
         ]  # fmt: skip
@@ -101,12 +109,15 @@ class BenchResult(Result, Answer):
             sections=lambda: [
                 outcome(self, self.rows, notes),
                 Section("Figures", [*self._figures(), *source_says(self)]),
-                Section("Key figures", [table]),
+                Section("Key figures", [table, *self._scatter()]),
                 *energy(self.ledgers()),
                 *schematic_section(self.bench),
                 how_it_was_made(self, self._step_errors()),
             ],
-            brief=[*([Listing(said)] if said else []), *([narrow] if self.kpis else [])],
+            brief=[
+                *([Listing(said)] if said else []), *([narrow] if self.kpis else []),
+                *self._scatter(),
+            ],
             data={**self._data(), "remarks": said},
             banner=self._banner(),
             attachments=[
@@ -118,6 +129,12 @@ class BenchResult(Result, Answer):
             is_paged=self.status != "interrupted",
             changes=bench_changes(bench),
         )  # fmt: skip
+
+    def _scatter(self) -> list[Paragraph]:
+        """Return what the errors of figures that do not converge are; nothing without any."""
+        if all(kpi.converges for kpi in self.kpis):
+            return []
+        return [Paragraph(_SCATTERED)]
 
     def _animations(self) -> list[Attachment]:
         if not self.animated or self.status == "interrupted":

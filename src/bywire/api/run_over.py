@@ -163,7 +163,7 @@ class BenchRange(Answer):
             for kpi in result.kpis:
                 by_name.setdefault(kpi.name, []).append(kpi)
         return {
-            name: are_distinct([kpi.value for kpi in each], [kpi.error for kpi in each])
+            name: are_distinct([kpi.value for kpi in each], [kpi.bound for kpi in each])
             for name, each in by_name.items()
         }
 
@@ -321,7 +321,7 @@ def _cell(name: str, result: Result) -> Cell:
     if name not in known:
         return Cell("-")
     kpi = known[name]
-    text = measured_amount(kpi.value, kpi.unit, kpi.error)
+    text = measured_amount(kpi.value, kpi.unit, kpi.bound)
     for verdict in result.verdicts:
         if verdict.kpi == name and not verdict.met:
             judged = "missed" if verdict.is_decided else "undecided"

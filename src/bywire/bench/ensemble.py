@@ -17,7 +17,7 @@ from bywire.bench.option_names import OPTION, split_options
 from bywire.bench.result import Result
 from bywire.bench.running import Progress, judged, recording_of, static_recordings
 from bywire.bench.side_by_side import rounds
-from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, OTHER_STEPS, abandoned, unestimated
+from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, abandoned, steps_of, unestimated
 from bywire.bench.varied_choices import choices_that_vary
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.leaf import Leaf
@@ -253,7 +253,7 @@ def run_benches(
     limits = [{label: MOST_WORK * each for label, each in done.items()} for done in work]
     others: list[dict[float, dict[str, xr.Dataset]]] = [{} for _ in benches]
     failures: list[dict[float, Exception]] = [{} for _ in benches]
-    for factor in OTHER_STEPS if estimate_error else ():
+    for factor in steps_of(benches[0].runs().values()) if estimate_error else ():
         with suppress(*NO_ESTIMATE):
             finer = [replace(bench, step=factor * bench.step) for bench in benches]
             computed = _recordings(finer, progress, engine, threads, limits=limits)

@@ -44,7 +44,7 @@ class Verdict(EqualWhereUndefined):
     note
         Why the KPI is not defined.
     error
-        Estimated error of the value, in ``unit``; NaN where it was not estimated.
+        How far the value may be off, in ``unit``; NaN where that was not estimated.
     is_decided
         Whether the recording shows what the value is, and this is further from the limit than it
         may be wrong.
@@ -96,11 +96,11 @@ def judge(requirements: Mapping[str, str], kpis: Sequence[Kpi]) -> tuple[Verdict
     for name, text in requirements.items():
         kpi = by_name[name]
         compare, bound = limit_of(name, text, kpi.unit)
-        is_close = abs(kpi.value - bound) <= kpi.error or math.isinf(kpi.error)
+        is_close = abs(kpi.value - bound) <= kpi.bound or math.isinf(kpi.bound)
         is_decided = not (is_close or kpi.is_open)
         met = is_decided and not math.isnan(kpi.value) and bool(_COMPARE[compare](kpi.value, bound))
         verdicts.append(
-            Verdict(name, text, kpi.value, kpi.unit, met, kpi.note, kpi.error, is_decided)
+            Verdict(name, text, kpi.value, kpi.unit, met, kpi.note, kpi.bound, is_decided)
         )
     return tuple(verdicts)
 

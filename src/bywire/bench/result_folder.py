@@ -94,6 +94,7 @@ def kpi_record(kpi: Kpi) -> dict[str, Any]:
     return {
         "value": kpi.value, "unit": kpi.unit, "note": kpi.note,
         "error": kpi.error, "error_estimated": not math.isnan(kpi.error),
+        "converges": kpi.converges, "open": kpi.is_open,
     }  # fmt: skip
 
 
@@ -141,7 +142,10 @@ def _kpi(name: str, record: Mapping[str, Any]) -> Kpi:
     if math.isnan(error) and record.get("error_estimated"):
         error = math.inf
     value, unit = _number(record["value"]), str(record["unit"])
-    return Kpi(name, value, unit, "", str(record.get("note", "")), error)
+    return Kpi(
+        name, value, unit, "", str(record.get("note", "")), error,
+        bool(record.get("open", False)), bool(record.get("converges", True)),
+    )  # fmt: skip
 
 
 def _verdict(record: Mapping[str, Any]) -> Verdict:

@@ -23,9 +23,9 @@ from bywire.bench.rows import Rows
 from bywire.bench.step_error import (
     MOST_WORK,
     NO_ESTIMATE,
-    OTHER_STEPS,
     abandoned,
     note_step_errors,
+    steps_of,
     unestimated,
     with_step_errors,
 )
@@ -55,11 +55,12 @@ def run(
     engine
         As of `Bench`; ``auto`` is what the bench says.
     estimate_error
-        Whether all runs are made again in half steps, and in double ones where these divide the
-        sample times: key figures and recorded signals then say how large their error from the
-        step is, and a requirement closer to its limit than that is undecided. It takes 2.5 times
-        as many substeps more. Steps in which a run fails are left out; where none is left, or one
-        takes five times the work of the run, the result warns of it.
+        Whether all runs are made again in half steps, in slightly shorter ones, and in double ones
+        where these divide the sample times: key figures and recorded signals then say how large
+        their error from the step is, and a requirement closer to its limit than they may be off is
+        undecided. It takes 3.6 times as many substeps more. Steps in which a run fails are left
+        out; where none is left, or one takes five times the work of the run, the result warns of
+        it.
 
     Raises
     ------
@@ -76,7 +77,7 @@ def run(
     try:
         _make_runs(bench, recordings, progress, engine, work)
         is_complete = True
-        for factor in OTHER_STEPS if estimate_error else ():
+        for factor in steps_of(bench.runs().values()) if estimate_error else ():
             try:
                 other = replace(bench, step=factor * bench.step)
                 made: dict[str, xr.Dataset] = {}

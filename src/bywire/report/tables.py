@@ -68,6 +68,8 @@ class KpiRow:
         How far the value may be off, in ``unit``; NaN where that was not estimated.
     stated, where
         What a source states of it, as text, and its place there; empty for nothing.
+    converges
+        Whether runs in several steps show an order; else ``error`` bounds what is not known.
     """
 
     name: str
@@ -79,6 +81,7 @@ class KpiRow:
     error: float = math.nan
     stated: str = ""
     where: str = ""
+    converges: bool = True
 
 
 @dataclass(frozen=True)
@@ -162,7 +165,7 @@ def kpi_table(rows: Iterable[KpiRow]) -> Table:
             (
                 Cell(clean(row.name)),
                 Cell(measured_amount(row.value, row.unit, row.error)),
-                *((Cell(error_text(row.value, row.unit, row.error)),) * estimated),
+                *((Cell(error_text(row.value, row.unit, row.error, row.converges)),) * estimated),
                 *((Cell(clean(row.limit) or "-"), OUTCOMES[row.outcome]) * limited),
                 *((Cell(clean(row.stated) or "-"),) * stated),
                 *((Cell(clean(row.where) or "-"),) * placed),

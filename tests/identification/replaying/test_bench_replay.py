@@ -93,8 +93,8 @@ def test_figures_know_their_error_from_the_step(ramp: xr.Dataset) -> None:
         assert figures[name].error > 0.0
         assert abs(figures[name].value - true[name]) <= 3.0 * figures[name].error
     rmse = figures["rmse"]
-    for limit, outcome in ((rmse.value + 0.5 * rmse.error, "undecided"),
-                           (rmse.value + 2.0 * rmse.error, "met")):  # fmt: skip
+    for limit, outcome in ((rmse.value + 0.5 * rmse.bound, "undecided"),
+                           (rmse.value + 2.0 * rmse.bound, "met")):  # fmt: skip
         (verdict,) = judge_fit({"rmse": f"<= {limit!r} Pa"}, "p_mc", [rmse])
         assert verdict.outcome == outcome
     plain = bywire.replay(

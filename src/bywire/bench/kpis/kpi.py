@@ -25,6 +25,8 @@ from bywire.core.errors import unknown_name
 from bywire.core.typing import Array
 from bywire.core.undefined import EqualWhereUndefined
 
+_BOUND = 3.0  # of errors that do not converge: 95 % of the true ones lie within
+
 
 @dataclass(frozen=True, eq=False)
 class Kpi(EqualWhereUndefined):
@@ -47,6 +49,9 @@ class Kpi(EqualWhereUndefined):
         how large it is, NaN where it was not estimated.
     is_open
         Whether it is not defined because the recording leaves open what it is.
+    converges
+        Whether runs in several steps show the order of the scheme; else ``error`` is no more than
+        a scale.
     """
 
     name: str
@@ -56,6 +61,12 @@ class Kpi(EqualWhereUndefined):
     note: str = ""
     error: float = math.nan
     is_open: bool = False
+    converges: bool = True
+
+    @property
+    def bound(self) -> float:
+        """How far it may be off by the step, in ``unit``: three times the error of no order."""
+        return self.error if self.converges else _BOUND * self.error
 
 
 @dataclass(frozen=True)

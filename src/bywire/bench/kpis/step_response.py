@@ -160,11 +160,11 @@ class StepResponse:
     def still(self) -> Why:
         """Where the response never leaves its first level by more than 5 % of the step height."""
         height = np.abs(np.asarray(self.end) - np.asarray(self.start))
-        way = np.asarray(np.max(np.abs(self.y - self.y[..., :1]), axis=-1))
+        way, unit = np.asarray(np.max(np.abs(self.y - self.y[..., :1]), axis=-1)), self.unit
         return Why(
             way <= _DEAD * height,
             lambda c: f"the response does not move: {_at(way, c):.3g} of a step of "
-            f"{_at(height, c):.3g} {self.unit} at most",
+            f"{_at(height, c):.3g} {unit} at most",
             is_open=True,
         )
 

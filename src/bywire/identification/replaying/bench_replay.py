@@ -10,7 +10,7 @@ import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.recording import energy_doubts_of, energy_signals
-from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, OTHER_STEPS, abandoned, unestimated
+from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, abandoned, steps_of, unestimated
 from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
@@ -61,7 +61,7 @@ def replay(
     bench, data, inputs, outputs, case
         See ``bywire.identification.replaying.measured_run``.
     estimate_error
-        Whether the model runs in half and double steps too; see `bywire.bench.running.run`.
+        Whether the model runs in other steps too; see `bywire.bench.running.run`.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def replay(
     modeled = simulate(measured.run, tuple(wanted))
     others: dict[float, Mapping[str, xr.Dataset]] = {}
     failures: dict[float, Exception] = {}
-    for factor in OTHER_STEPS if estimate_error else ():
+    for factor in steps_of([measured.run]) if estimate_error else ():
         try:
             step, most = factor * measured.run.step, MOST_WORK * modeled.work
             other = dataclasses.replace(measured.run, step=step, most_work=most)
