@@ -201,3 +201,16 @@ def test_half_steps_that_fail_are_said_to() -> None:
     with pytest.warns(MisfitWarning, match="is not known: left the numbers"):
         fit = slope_of(0.0, off=1.0)
     assert fit.step_errors is None
+
+
+@pytest.mark.parametrize("share", [-0.4, 0.6])
+def test_intervals_hold_where_neighbors_cancel_out_or_add_up(share: float) -> None:
+    """The mean of 400 readings, of whose noise a share comes again in the next one: closed form."""
+    count, n, size = 200, 400, 1.0
+    random = np.random.default_rng(11)
+    deviations = []
+    for _ in range(count):
+        e = random.normal(0.0, size, n + 1)
+        deviations.append(np.sqrt(uncertainty(np.ones((n, 1)), e[1:] + share * e[:-1]).covariance))
+    true = size * (1.0 + share) / np.sqrt(n)
+    assert float(np.mean(deviations)) == pytest.approx(true, rel=0.15)
