@@ -85,6 +85,7 @@ def test_identify_takes_columns_and_noise(bywire: Bywire, rig: Path) -> None:
     done = bywire("identify", "output-error", rig, "--bench", "axis.toml", *named, "--unknown",
                   "k", "--starts", 1, "--holdout", "other.csv", "--json")  # fmt: skip
     assert done.object["parameters"]["k"] == pytest.approx(9e3, rel=1e-9)
+    assert "warning" not in done.err  # the record is the model's own
     assert done.object["figures"]["x.noise"]["value"] == pytest.approx(1e-6)
 
 
