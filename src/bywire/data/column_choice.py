@@ -336,6 +336,7 @@ def _column(file: Path, source: Source, name: str, key: str, number: int = 0) ->
         name = order[number - 1]
     title = split_title(name)[0]
     column = columns.get(name) or columns.get(title)
+    column = column or next((c for c in columns.values() if c.path == name), None)
     if column is not None:
         return column
     reason = source.left_out.get(name) or source.left_out.get(title)

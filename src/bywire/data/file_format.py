@@ -41,6 +41,8 @@ class Column:
         Description, where the file gives one.
     meanings
         What its numbers 0, 1, ... stand for, blank between them, where the file says so.
+    path
+        Where it lies in the file, as in ``ScopeData.signals(1).values``: another name of it.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Column:
     clock: str | None = None
     label: str = ""
     meanings: str = ""
+    path: str = ""
 
 
 class Source(Protocol):
@@ -161,6 +164,8 @@ class FileFormat:
         What a library calls a row, and the number of its first one.
     also_reads
         Endings of files that are read and never written.
+    opening
+        Seconds of a processor that a library may take to open a file.
     """
 
     name: str
@@ -173,6 +178,7 @@ class FileFormat:
     libraries: tuple[str, ...] = ()
     counts: tuple[str, int] = ("row", 0)
     also_reads: tuple[str, ...] = ()
+    opening: float = 10.0
 
 
 def library(name: str, what: str, extra: str = "measurements") -> ModuleType:

@@ -29,7 +29,7 @@ from bywire.core.blas import one_thread_variables
 from bywire.core.child_process import start_python
 from bywire.core.errors import FileError
 from bywire.core.extras import how_to_install
-from bywire.core.machine_memory import machine_memory
+from bywire.core.machine_memory import address_space, machine_memory
 from bywire.core.scratch import process_folder
 from bywire.data.file_format import Column, FileFormat, Progress
 from bywire.data.reading_child import NUMBERS, fill, receive, send
@@ -69,7 +69,7 @@ class Child:
             },
         )
         self.state: _State = "idle"
-        self._is_late = False
+        self.is_late = False
         with contextlib.suppress(ImportError, AttributeError, OSError):
             import fcntl
 
@@ -100,10 +100,10 @@ class Child:
     def reason(self) -> str:
         """Return why it ended."""
         status = self._process.wait()
-        return "" if self._is_late else _ending(status)
+        return "" if self.is_late else _ending(status)
 
     def _end_late(self) -> None:
-        self._is_late = True
+        self.is_late = True
         self._kill()
 
     def _kill(self) -> None:
@@ -143,11 +143,12 @@ class LimitedSource:
     ) -> None:
         self._path, self._kind, self._child = path, kind, child
         self._memory, self._seconds = memory, seconds
-        self._request = next(_numbers)
+        self._request, self._is_open = next(_numbers), False
         answer = self._answer({
             "path": str(path), "folder": os.getcwd(), "memory": memory, "seconds": seconds,
-            "request": self._request,
+            "opening": min(seconds, kind.opening), "request": self._request,
         })  # fmt: skip
+        self._is_open = True
         columns = [Column(*fields) for fields in answer["columns"]]
         self.columns: Mapping[str, Column] = {column.name: column for column in columns}
         self.left_out: Mapping[str, str] = answer["left_out"]
@@ -203,8 +204,12 @@ class LimitedSource:
         if "column" not in answer and _IS_LINUX:
             self._child.state = "open" if {"columns", "end"} & set(answer) else "idle"
         if "error" in answer:
+            if (limit := address_space()) and answer.get("is_short_of_memory"):
+                raise self._too_small(limit)
             raise FileError(answer["error"])
         if "memory" in answer:
+            if limit := address_space():
+                raise self._too_small(limit)
             raise FileError(
                 f"{self._path} takes more than {self._memory / 2**30:.3g} GiB of memory to read: "
                 "it is damaged or was made to exhaust it; where it is sound, choose fewer signals, "
@@ -216,15 +221,26 @@ class LimitedSource:
 
     def _ended(self, reason: str) -> FileError:
         if not reason:
+            is_quick = not (self._is_open or self._child.is_late)
+            most = min(self._seconds, self._kind.opening) if is_quick else self._seconds
             return FileError(
-                f"{self._path}: reading it took longer than {self._seconds:g} s without getting "
-                "further: it is damaged or was made to take so long; where it is sound, copy it to "
-                "a local disk or choose fewer signals"
+                f"{self._path}: {'reading' if self._is_open else 'opening'} it took longer than "
+                f"{most:g} s without getting further: it is damaged or was made to take so long; "
+                "where it is sound, copy it to a local disk or choose fewer signals"
             )
+        if limit := address_space():
+            return self._too_small(limit)
         return FileError(
             f"{self._path}: the library that reads {self._kind.title} broke down on it ({reason}): "
             f"it is damaged, or takes more than {self._memory / 2**30:.3g} GiB of memory: copy or "
             "export it again"
+        )
+
+    def _too_small(self, limit: int) -> FileError:
+        return FileError(
+            f"{self._path}: the address space of this process is limited to {limit / 2**30:.3g} GiB"
+            f" (ulimit -v), and reading {self._kind.title} failed within it: raise the limit, as by "
+            "ulimit -v unlimited, or choose fewer signals"
         )
 
     def _torn(self, name: str, size: int, declared: int) -> FileError:

@@ -132,7 +132,7 @@ def columns_of(
             unit = unit or "s"
         elif part.is_row and not unit:
             clock, unit = _of_row(found, name, part, is_increasing, remarks)
-        columns[shown] = Column(shown, unit, part.length, clock, label)
+        columns[shown] = Column(shown, unit, part.length, clock, label, path=name)
         parts[shown] = part
     names = {id(part): shown for shown, part in parts.items()}
     for shown, column in columns.items():

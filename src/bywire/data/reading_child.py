@@ -4,7 +4,8 @@ Libraries believe what a file says of itself: a damaged one, or one that was mad
 crash, run without an end, or ask for all memory. Here that ends a child, and nothing else.
 
 Both ways messages go as a length, a JSON object, and for a piece of a column its numbers as they
-lie in memory: nothing is unpickled. The reader asks ``{path, folder, memory, seconds}``; the answer
+lie in memory: nothing is unpickled. The reader asks ``{path, folder, memory, seconds,
+opening}``; the answer
 is ``{columns, left_out, remarks, notes}``. It asks for ``{names}`` as often as it likes, and ends
 with none; the answers are pieces ``{column, begin, count, kind}`` and ``{end, remarks}``. ``{error}`` and ``{memory}`` end
 it early.
@@ -78,23 +79,25 @@ def main(module: str, is_forking: bool) -> None:
         for name in kind.libraries:
             importlib.import_module(name)
         missing = ""
-    except ImportError as error:
-        missing = str(error)
+    except (ImportError, MemoryError, OSError) as error:
+        missing = str(error) or "out of memory"
     while (request := receive(requests)) is not None:
         if missing:
             what = f"{request['path']}: the library that reads {kind.title} does not load"
-            send(answers, {"error": f"{what} ({missing}): install it again"})
+            send(answers, {"error": f"{what} ({missing}): install it again", "is_short_of_memory": True})
         elif not is_forking:
             _serve(kind, request, requests, answers)
             return
         else:
             child = os.fork()
             if not child:
+                status = 1
                 try:
                     _limit(request["memory"])
                     _serve(kind, request, requests, answers)
+                    status = 0
                 finally:
-                    os._exit(0)
+                    os._exit(status)
             status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
             if status:
                 send(answers, {"ended": status, "request": request["request"]})
@@ -107,7 +110,7 @@ def _serve(
     path = Path(request["path"])
     try:
         os.chdir(request["folder"])
-        _allow(request["seconds"])
+        _allow(request["opening"])
         with kind.open(path, ReadOptions()) as opened:
             source = cast(PieceSource, opened)
             columns = source.columns
@@ -138,7 +141,10 @@ def _serve(
         if getattr(error, "errno", None) == errno.ENOSPC:
             what = f"{path} cannot be read: the library's temporary files have no room"
             hint = "make room where they go, or set TMPDIR to another folder"
-        send(answers, {"error": f"{what}: {hint}"})
+        is_short = getattr(error, "errno", None) == errno.ENOMEM or any(
+            word in reason.lower() for word in ("memory", "allocat", "malloc", "mmap")
+        )
+        send(answers, {"error": f"{what}: {hint}", "is_short_of_memory": is_short})
 
 
 def _limit(memory: int) -> None:
@@ -147,9 +153,12 @@ def _limit(memory: int) -> None:
 
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     most = pages * resource.getpagesize() + memory
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (memory, memory))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    for kind, wanted in (
+        (resource.RLIMIT_AS, most), (resource.RLIMIT_FSIZE, memory), (resource.RLIMIT_CORE, 0)
+    ):  # fmt: skip
+        inherited = [limit for limit in resource.getrlimit(kind) if limit != resource.RLIM_INFINITY]
+        allowed = min([wanted, *inherited])  # an inherited limit cannot be raised
+        resource.setrlimit(kind, (allowed, allowed))
 
 
 def _allow(seconds: float) -> None:

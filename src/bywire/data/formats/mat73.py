@@ -6,6 +6,7 @@ import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from io import FileIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -128,7 +129,7 @@ class Mat73Source:
         array = self._arrays[self._parts[column.name].array]
         unit = column.unit or _attribute(array, "units") or _attribute(array, "unit")
         label = column.label or _attribute(array, "long_name")
-        return Column(column.name, unit, column.length, column.clock, label)
+        return replace(column, unit=unit, label=label)
 
     def _shape(self, array: Any) -> tuple[int, ...]:
         """Return the shape in MATLAB, which counts the other way round."""

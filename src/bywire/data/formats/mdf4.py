@@ -350,4 +350,5 @@ FORMAT = FileFormat(
     "mdf4", "an MDF file", (".mf4", ".mdf", ".dat"),
     lambda head: head[:3] == b"MDF" or head[:7] == b"UnFinMF", _open, _write,
     has_many_axes=True, libraries=("asammdf",), counts=("record", 0),
+    opening=60.0,  # of thousands of channels it reads every description
 )  # fmt: skip
