@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import re
 import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from bywire.core.errors import FileError, ParameterError, UnknownNameError
 from bywire.server.address import HERE, NAMES
+from bywire.server.handler import Handler
 from bywire.server.place import safe_name
 from bywire.server.routes import addresses
 from bywire.server.serving import opened
@@ -210,3 +213,13 @@ def test_a_port_and_a_folder_that_do_not_do(visit, tmp_path):
         with pytest.raises(error, match=text), opened(**{"folder": tmp_path, "port": 0, **given}):
             pass
     assert list(Path(tmp_path).iterdir()) == []
+
+
+def test_a_client_that_is_gone_before_the_end_of_an_answer_is_no_error():
+    """What the system says of it, ENOTCONN, is no ConnectionError of Python's."""
+
+    class Gone:
+        def shutdown(self, how):
+            raise OSError(errno.ENOTCONN, "Transport endpoint is not connected")
+
+    Handler._linger(SimpleNamespace(connection=Gone()))

@@ -150,11 +150,12 @@ class Handler(BaseHTTPRequestHandler):
     def _linger(self) -> None:
         """Take what still comes of a body: who is cut off while sending never reads the answer."""
         until = time.monotonic() + _LINGER
-        self.connection.shutdown(socket.SHUT_WR)
-        while (left := until - time.monotonic()) > 0.0:
-            self.connection.settimeout(left)
-            if not self.connection.recv(1 << 16):
-                return
+        with contextlib.suppress(OSError):  # the other side is gone, or sends no more
+            self.connection.shutdown(socket.SHUT_WR)
+            while (left := until - time.monotonic()) > 0.0:
+                self.connection.settimeout(left)
+                if not self.connection.recv(1 << 16):
+                    return
 
     def send_error(
         self, code: int, message: str | None = None, explain: str | None = None
