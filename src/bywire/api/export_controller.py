@@ -15,7 +15,7 @@ from bywire.core.arguments import whole_number
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import unknown_name
 from bywire.core.scratch import scratch_folder
-from bywire.export.controller.c_text import PRECISIONS
+from bywire.export.controller.c_text import PRECISIONS, checked_name
 from bywire.export.controller.files import files
 from bywire.export.controller.program import program
 from bywire.export.controller.vectors import vectors as test_vectors
@@ -115,6 +115,7 @@ def export_controller(
     vectors: int = VECTORS,
     check: bool = False,
     dbc: bool = False,
+    name: str = "",
 ) -> ControllerExport:
     """Write the ECU of a bench's model as readable C99, with all that is needed to try it.
 
@@ -135,6 +136,9 @@ def export_controller(
         on the vectors, compared bit by bit, and measured.
     dbc
         Whether the memory is described as signals of a CAN bus, with the C that fills messages.
+    name
+        What files and symbols begin with, an identifier of C; the model's name by default. ECUs of
+        different names link into one program.
 
     Returns
     -------
@@ -143,6 +147,8 @@ def export_controller(
 
     Raises
     ------
+    ParameterError
+        When the name is no identifier of C.
     ModelError
         With file, line and operation of what cannot be translated.
     FileError
@@ -153,9 +159,11 @@ def export_controller(
     if precision not in PRECISIONS:
         raise unknown_name("precision", precision, PRECISIONS)
     whole_number("vectors", vectors, 1, 100_000)
+    if name:
+        checked_name(name)
     chosen = bench if isinstance(bench, Bench) else read(bench, {})
     case = replace(chosen, faults=()).cases()[0]
-    made = program(case.model, case.par, precision)
+    made = program(case.model, case.par, precision, name)
     cited = PARAMETER_SETS.find(chosen.parameters).values
     every = test_vectors(made, case.memory, vectors)
     texts = files(made, case.memory, cited, every, bus=dbc)

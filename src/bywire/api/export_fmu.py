@@ -73,8 +73,8 @@ class ExportedFmu(Answer):
         table = TableBlock(self._table())
         steps = Paragraph(_EXCHANGED if unit.faces.kind == "model-exchange" else (
             f"internal step {shown(schedule.step, 's')}, communication steps are multiples of "
-            f"{shown(schedule.frame, 's')}; time 0 is {shown(unit.made.case.settle, 's')} before "
-            "time zero of the bench"
+            f"{shown(schedule.frame, 's')}; the start time is {shown(unit.made.case.settle, 's')} "
+            "before time zero of the bench"
         ))  # fmt: skip
         written = f"written: {self.path}"
         return Document(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import typing
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar
+
+from annotated_types import Ge, Gt, Le, Lt
 
 from bywire.core.errors import ModelError, place_of
 
@@ -74,6 +77,20 @@ class Signal:
     role: Role | None = None
 
 
+@dataclass(frozen=True)
+class Limited:
+    """Limit of a command, beside the Signal of a field of the memory.
+
+    Parameters
+    ----------
+    by
+        Dotted name of the parameter that the command's magnitude never exceeds; or the name of the
+        stimulus that the command never exceeds.
+    """
+
+    by: str
+
+
 Power = Annotated[float, Signal("W", "power")]
 Energy = Annotated[float, Signal("J", "energy")]
 Torque = Annotated[float, Signal("N*m", "torque", 0.01)]
@@ -112,6 +129,43 @@ def signal_in(annotation: Any) -> Signal | None:
     """Return the Signal of an annotation; None where it has none."""
     notes = getattr(annotation, "__metadata__", ())
     return next((note for note in notes if isinstance(note, Signal)), None)
+
+
+@cache
+def ranges_of(tuple_type: type[NamedTuple]) -> dict[str, tuple[float, float]]:
+    """Return the admissible range of the signals that declare one, both ends included.
+
+    A field declares it beside its Signal: ``Annotated[float, Signal(...), Ge(0), Le(1)]``.
+    """
+    found: dict[str, tuple[float, float]] = {}
+    for name, hint in typing.get_type_hints(tuple_type, include_extras=True).items():
+        low, high = -math.inf, math.inf
+        for note in getattr(hint, "__metadata__", ()):
+            if isinstance(note, Ge):
+                low = max(low, _number(note.ge))
+            elif isinstance(note, Gt):
+                low = max(low, math.nextafter(_number(note.gt), math.inf))
+            elif isinstance(note, Le):
+                high = min(high, _number(note.le))
+            elif isinstance(note, Lt):
+                high = min(high, math.nextafter(_number(note.lt), -math.inf))
+        if (low, high) != (-math.inf, math.inf):
+            found[name] = (low, high)
+    return found
+
+
+@cache
+def limits_of(tuple_type: type[NamedTuple]) -> dict[str, Limited]:
+    """Return what limits the commands among the signals of a NamedTuple class."""
+    hints = typing.get_type_hints(tuple_type, include_extras=True)
+    return {
+        name: note for name, hint in hints.items()
+        for note in getattr(hint, "__metadata__", ()) if isinstance(note, Limited)
+    }  # fmt: skip
+
+
+def _number(end: Any) -> float:
+    return float(end)
 
 
 def without_noise(stimuli: Iterable[str]) -> list[str]:

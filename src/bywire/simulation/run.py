@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_table
+from bywire.core.signals import ranges_of, signals_of
 from bywire.core.typing import Array
+from bywire.core.units import shown
 from bywire.simulation.advance import Progress, advance_all, work_of
 from bywire.simulation.buffered_call import BufferedCall
 from bywire.simulation.changes import Change, energies, energy_of, pieces, put_in_signals
@@ -279,7 +281,7 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
     Raises
     ------
     ParameterError
-        When one of them is not finite.
+        When one of them is not finite, or outside the range of its signal.
     """
     rows = np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64)
     is_finite = np.isfinite(rows)
@@ -289,7 +291,25 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
             f"the stimulus {run.model.Stimulus._fields[signal]} is {rows[row, signal]} at "
             f"t = {schedule.stimulus_times[row]:g} s: it must be finite all through the run"
         )
+    for signal, low, high in stimulus_ranges(run.model):
+        outside = (rows[:, signal] < low) | (rows[:, signal] > high)
+        if outside.any():
+            row = int(np.argmax(outside))
+            name = run.model.Stimulus._fields[signal]
+            unit = signals_of(run.model.Stimulus)[name].unit
+            ends = [f">= {shown(low, unit)}"] * (low > -np.inf)
+            ends += [f"<= {shown(high, unit)}"] * (high < np.inf)
+            raise ParameterError(
+                f"the stimulus {name} is {shown(rows[row, signal], unit)} at "
+                f"t = {schedule.stimulus_times[row]:g} s: it must be {' and '.join(ends)}"
+            )
     return rows
+
+
+def stimulus_ranges(model: Model) -> list[tuple[int, float, float]]:
+    """Return index and range of the stimuli that declare one: controllers take no others."""
+    fields = model.Stimulus._fields
+    return [(fields.index(n), *ends) for n, ends in ranges_of(model.Stimulus).items()]
 
 
 def put_into(rows: Array, run: Run, t: Array) -> None:

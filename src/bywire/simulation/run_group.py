@@ -31,6 +31,7 @@ from bywire.simulation.run import (
     put_into,
     sampled_stimulus,
     selected,
+    stimulus_ranges,
 )
 from bywire.simulation.schedule import Schedule
 
@@ -236,7 +237,11 @@ def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
     for lane, run in enumerate(group):
         put_into(signals[lane].T, run, t)
     signals[len(group) :] = signals[len(group) - 1]
-    if not np.isfinite(signals).all():
+    is_usual = np.isfinite(signals).all() and all(
+        (signals[:, k] >= low).all() and (signals[:, k] <= high).all()
+        for k, low, high in stimulus_ranges(group[0].model)
+    )
+    if not is_usual:
         for run in group:
             sampled_stimulus(run, schedule)  # says which and when
     is_shared = all(np.array_equal(signals[0], other) for other in signals[1:])

@@ -11,6 +11,7 @@ import hashlib
 import json
 import zlib
 from collections.abc import Mapping, Sequence
+from functools import cache
 from html import escape
 from importlib.resources import files
 from string import Template
@@ -27,8 +28,9 @@ from bywire.bench.requirements import limit_of
 from bywire.bench.result import Result
 from bywire.bench.stated import StatedLevel, StatedRange, stated_figures, stated_for
 from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.errors import InputError
 from bywire.core.quantities import display_unit
-from bywire.core.units import convert
+from bywire.core.units import convert, parse
 from bywire.core.version import __version__
 from bywire.export.exported import Exported
 from bywire.export.wasm.module import module_files
@@ -51,6 +53,35 @@ if TYPE_CHECKING:
 _SCRIPTS = ("values.js", "controls.js", "curves.js", "bode.js", "bench.js")
 _WORKER = ("unpack.js", "figures.js", "loops.js", "margins.js", "worker.js")
 _NAME = "run"  # of the module, inside the page
+# SI unit, exponents of kg, m, s, A, K, rad, and what people write for it.
+_UNITS = (
+    ("1", (0, 0, 0, 0, 0, 0), "%"),
+    ("m", (0, 1, 0, 0, 0, 0), "m km dm cm mm um µm nm inch"),
+    ("s", (0, 0, 1, 0, 0, 0), "s ms us µs min h"),
+    ("A", (0, 0, 0, 1, 0, 0), "A kA mA uA µA"),
+    ("V", (1, 2, -3, -1, 0, 0), "V kV mV uV µV"),
+    ("ohm", (1, 2, -3, -2, 0, 0), "ohm Ohm Ω mohm mΩ uohm µΩ kohm kΩ Mohm MΩ"),
+    ("W", (1, 2, -3, 0, 0, 0), "W kW mW MW"),
+    ("J", (1, 2, -2, 0, 0, 0), "J kJ mJ MJ"),
+    ("N", (1, 1, -2, 0, 0, 0), "N kN mN MN"),
+    ("N*m", (1, 2, -2, 0, 0, 0), "Nm kNm mNm"),
+    ("Pa", (1, -1, -2, 0, 0, 0), "Pa hPa kPa MPa GPa bar mbar psi"),
+    ("kg", (1, 0, 0, 0, 0, 0), "kg g mg"),
+    ("delta_degC", (0, 0, 0, 0, 1, 0), "K mK"),
+    ("Hz", (0, 0, -1, 0, 0, 0), "Hz kHz MHz mHz"),
+    ("rad", (0, 0, 0, 0, 0, 1), "rad mrad deg ° rev"),
+    ("rad/s", (0, 0, -1, 0, 0, 1), "rpm"),
+    ("m**3", (0, 3, 0, 0, 0, 0), "l L ml mL"),
+    ("H", (1, 2, -2, -2, 0, 0), "H mH uH µH"),
+    ("V*s", (1, 2, -2, -1, 0, 0), "Wb"),
+    ("A*s", (0, 0, 1, 1, 0, 0), "C"),
+)
+"""units of which a field takes products; `bywire.core.units` says which of them it reads"""
+_SHIFTED = {
+    **dict.fromkeys(("degC", "°C"), (1.0, 273.15)),
+    **dict.fromkeys(("degF", "°F"), (5 / 9, 459.67 * 5 / 9)),
+}
+"""temperatures in K: size and zero"""
 
 
 def page_text(
@@ -123,6 +154,7 @@ def _data(
         used.add(each["name"])
         each |= {**_shown(each["unit"]), "kind": "", "where": ""}
         each["shownUnit"] = unit_text(display_unit(each["unit"]))
+        each |= _read_as(each["unit"])
         if row := origins.get(each["name"]):
             each |= {"kind": row.kind, "where": row.where}
     chosen = chosen or first_sliders(bench, [name for name in read if name in used])
@@ -134,6 +166,7 @@ def _data(
         "text": bench_text(bench),
         "judged": _judged(made, result, sorted(follow.judging & used)),
         "held": sorted(follow.driving),
+        "units": _known_units(),
     }
 
 
@@ -228,6 +261,38 @@ def _shown(symbol: str) -> Mapping[str, float]:
     unit = display_unit(symbol)
     offset = float(convert(0.0, symbol, unit))
     return {"factor": float(convert(1.0, symbol, unit)) - offset, "offset": offset}
+
+
+@cache
+def _known_units() -> list[tuple[str, float, tuple[int, ...]]]:
+    """Return the units that a field takes, of which it takes products: name, size, exponents."""
+    return [
+        (name, size, powers)
+        for symbol, powers, names in _UNITS
+        for name in names.split()
+        for size in [_value(f"1 {name}", symbol)]
+        if size is not None
+    ]
+
+
+@cache
+def _read_as(symbol: str) -> dict[str, Any]:
+    """Return how a field of an SI unit reads others: temperatures, and whether radians matter."""
+    shifted = {
+        unit: scale for unit, scale in _SHIFTED.items()
+        if symbol == "K" and _value(f"0 {unit}", symbol) is not None
+    }  # fmt: skip
+    known = "" if symbol == "1" else f"{symbol.replace('delta_degC', 'K')}*"
+    is_turning = _value(f"1 {known}rad", symbol) is None
+    return ({"shifted": shifted} if shifted else {}) | ({"turns": True} if is_turning else {})
+
+
+def _value(text: str, symbol: str) -> float | None:
+    """Return a quantity in SI; None where it is none of this unit."""
+    try:
+        return parse(text, symbol, "a unit")
+    except InputError:
+        return None
 
 
 def _summary(made: Exported) -> str:

@@ -11,7 +11,7 @@ const plus = (X, Y) => X.map((row, i) => row.map((value, j) => value + Y[i][j]))
 const beside = (X, Y) => X.map((row, i) => Float64Array.of(...row, ...Y[i]));
 
 function times(X, Y) {
-  const product = zeros(X.length, Y[0].length);
+  const product = zeros(X.length, Y.length ? Y[0].length : 0);
   X.forEach((row, i) => row.forEach((value, k) => {
     if (value !== 0) for (let j = 0; j < Y[k].length; ++j) product[i][j] += value * Y[k][j];
   }));
@@ -43,7 +43,7 @@ const scaled = (X, scale) => X.map((row, i) => row.map((value, j) => value * sca
 /** Return the exponential: halved until it is small, by its series, and squared again. */
 function exponential(X) {
   const scale = scales(X), balanced = scaled(X, scale);
-  const size = Math.max(...balanced.map((row) => row.reduce((sum, value) => sum + Math.abs(value), 0)));
+  const size = Math.max(0, ...balanced.map((row) => row.reduce((sum, value) => sum + Math.abs(value), 0)));
   const halvings = Math.max(0, Math.ceil(Math.log2(size)) + 2);
   const small = balanced.map((row) => row.map((value) => value * 2 ** -halvings));
   let sum = eye(X.length);
@@ -230,7 +230,7 @@ function growthOf({ A, B, C, period, isAnalog }) {
   let X = isAnalog ? exponential(closed.map((row) => row.map((value) => value * period))) : closed;
   let total = 0, power = 1;
   for (let k = 0; k < 40; ++k) {
-    const size = Math.max(...X.map((row) => row.reduce((sum, value) => sum + Math.abs(value), 0)));
+    const size = Math.max(0, ...X.map((row) => row.reduce((sum, value) => sum + Math.abs(value), 0)));
     if (size === 0) return 0;
     total += Math.log(size) / power;
     X = X.map((row) => row.map((value) => value / size));
