@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import parse_qsl, unquote, urlsplit
 
+from bywire.core.clean_text import shortened
 from bywire.core.errors import BywireError, quoted
 from bywire.core.version import __version__
 from bywire.server import guard
@@ -120,6 +121,7 @@ class Handler(BaseHTTPRequestHandler):
         return _Body(self)
 
     def _refused(self, status: int, text: str, field: str = "") -> Reply:
+        text = shortened(text)
         if self.path.startswith("/api/"):
             body = json.dumps({"error": text, **({"field": field} if field else {})}).encode()
             return Reply(body, "application/json", status, REFUSAL)
