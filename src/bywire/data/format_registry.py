@@ -19,7 +19,7 @@ _NOT_READ = (
     (b"TDEX", "a TDX file of DIAdem", "export it as CSV or MDF 4 with DIAdem"),
     (b"|CF,", "a FAMOS file of imc", "export it as CSV or MDF 4 with FAMOS"),
     (b"\xd0\xcf\x11\xe0", "an Excel workbook (.xls)", "save its sheet as 'CSV UTF-8'"),
-    (b"PK\x03\x04", "a ZIP archive, as .xlsx and .ods are", "save a sheet as 'CSV UTF-8', or unpack it"),
+    (b"PK\x03\x04", "a ZIP archive, as .xlsx and .ods are", "save its sheet as 'CSV UTF-8'"),
     (b"\x1f\x8b", "packed by gzip", "unpack it first"),
     (b"7z\xbc\xaf", "packed by 7-Zip", "unpack it first"),
     (b"#ROSBAG", "a bag of ROS", "export its topics as CSV"),

@@ -204,9 +204,8 @@ class LimitedSource:
         if "column" not in answer and _IS_LINUX:
             self._child.state = "open" if {"columns", "end"} & set(answer) else "idle"
         if "error" in answer:
-            if (limit := address_space()) and answer.get("is_short_of_memory"):
-                raise self._too_small(limit)
-            raise FileError(answer["error"])
+            limit = address_space() if answer.get("is_of_library") else 0
+            raise FileError(answer["error"] + (_limited_to(limit) if limit else ""))
         if "memory" in answer:
             if limit := address_space():
                 raise self._too_small(limit)
@@ -238,9 +237,8 @@ class LimitedSource:
 
     def _too_small(self, limit: int) -> FileError:
         return FileError(
-            f"{self._path}: the address space of this process is limited to {limit / 2**30:.3g} GiB"
-            f" (ulimit -v), and reading {self._kind.title} failed within it: raise the limit, as by "
-            "ulimit -v unlimited, or choose fewer signals"
+            f"{self._path}: reading {self._kind.title} ran out of memory"
+            + _limited_to(limit)
         )
 
     def _torn(self, name: str, size: int, declared: int) -> FileError:
@@ -248,6 +246,13 @@ class LimitedSource:
             f"{self._path} is damaged: {name!r} has {declared} numbers as it says, and {size} were "
             "read: copy it again, or export it again from where it was made"
         )
+
+
+def _limited_to(limit: int) -> str:
+    return (
+        f"; the address space of this process is limited to {limit / 2**30:.3g} GiB (ulimit -v): "
+        "where the file is sound, raise that limit, as by ulimit -v unlimited"
+    )
 
 
 def _ending(status: int) -> str:

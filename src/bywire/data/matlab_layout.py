@@ -129,7 +129,7 @@ def columns_of(
             brief = _short(recorded[name])
             shown = brief if brief and short[brief] == 1 and brief not in found.parts else name
         elif name in {each.clock for each in recorded.values()} or name == "tout":
-            unit = unit or "s"
+            unit = unit or found.texts.get(f"{name.removesuffix('.Data')}.Unit", "").strip() or "s"
         elif part.is_row and not unit:
             clock, unit = _of_row(found, name, part, is_increasing, remarks)
         columns[shown] = Column(shown, unit, part.length, clock, label, path=name)

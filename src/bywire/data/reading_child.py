@@ -4,11 +4,10 @@ Libraries believe what a file says of itself: a damaged one, or one that was mad
 crash, run without an end, or ask for all memory. Here that ends a child, and nothing else.
 
 Both ways messages go as a length, a JSON object, and for a piece of a column its numbers as they
-lie in memory: nothing is unpickled. The reader asks ``{path, folder, memory, seconds,
-opening}``; the answer
-is ``{columns, left_out, remarks, notes}``. It asks for ``{names}`` as often as it likes, and ends
-with none; the answers are pieces ``{column, begin, count, kind}`` and ``{end, remarks}``. ``{error}`` and ``{memory}`` end
-it early.
+lie in memory: nothing is unpickled. The reader asks ``{path, folder, memory, seconds, opening}``;
+the answer is ``{columns, left_out, remarks, notes}``. It asks for ``{names}`` as often as it likes,
+and ends with none; the answers are pieces ``{column, begin, count, kind}`` and ``{end, remarks}``.
+``{error}`` and ``{memory}`` end it early.
 
 On Linux the process imports the library once and forks for each file, so that a file costs
 milliseconds, starts from a sound state and has its own limits. Elsewhere it reads one file.
@@ -84,7 +83,8 @@ def main(module: str, is_forking: bool) -> None:
     while (request := receive(requests)) is not None:
         if missing:
             what = f"{request['path']}: the library that reads {kind.title} does not load"
-            send(answers, {"error": f"{what} ({missing}): install it again", "is_short_of_memory": True})
+            text = f"{what} ({missing}): install it again"
+            send(answers, {"error": text, "is_of_library": True})
         elif not is_forking:
             _serve(kind, request, requests, answers)
             return
@@ -141,10 +141,7 @@ def _serve(
         if getattr(error, "errno", None) == errno.ENOSPC:
             what = f"{path} cannot be read: the library's temporary files have no room"
             hint = "make room where they go, or set TMPDIR to another folder"
-        is_short = getattr(error, "errno", None) == errno.ENOMEM or any(
-            word in reason.lower() for word in ("memory", "allocat", "malloc", "mmap")
-        )
-        send(answers, {"error": f"{what}: {hint}", "is_short_of_memory": is_short})
+        send(answers, {"error": f"{what}: {hint}", "is_of_library": True})
 
 
 def _limit(memory: int) -> None:

@@ -21,11 +21,12 @@ SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
 HEAD = 1 << 18
 """bytes that are looked at; a header must end before"""
 
-MARKS = frozenset(
-    "- -- --- nan -nan nan(ind) -nan(ind) 1.#qnan 1.#ind -1.#ind 1.#inf -1.#inf na n/a n.a. #n/a"
-    " #na #num! #value! #div/0! null inf +inf -inf infinity +infinity -infinity ∞ +∞ -∞ ovld ol o.l"
-    " overload overrange missing invalid sna".split()
-) | {""}  # fmt: skip
+_MARKS = (
+    "- -- --- nan -nan nan(ind) -nan(ind) 1.#qnan 1.#ind -1.#ind 1.#inf -1.#inf na n/a n.a. #n/a "
+    "#na #num! #value! #div/0! null inf +inf -inf infinity +infinity -infinity ∞ +∞ -∞ ovld ol o.l "
+    "overload overrange missing invalid sna"
+)
+MARKS = frozenset(("", *_MARKS.split()))
 """cells of what was not measured, in small letters"""
 
 COMMENTS = ("#", "%", "//", "!")

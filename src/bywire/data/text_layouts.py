@@ -84,8 +84,8 @@ def _lvm(head: Head) -> Dialect:
             raise FileError(f"{head.path}: it has no X columns, and its Delta_X is {step:g}")
         raster = (_number(head, entries, "X0", 0.0), step)
     mark = _first(entries, "Decimal_Separator")
-    kinds = (TEXT if title == "Comment" else kind
-             for title, kind in zip((*titles, *[""] * width), dialect.kinds, strict=False))  # fmt: skip
+    named = zip((*titles, *[""] * width), dialect.kinds, strict=False)
+    kinds = (TEXT if title == "Comment" else kind for title, kind in named)
     return replace(
         dialect, kinds=tuple(kinds), clocks=clocks, raster=raster, is_ragged=True,
         decimal=head.options.decimal or (mark if mark in (".", ",") else dialect.decimal),

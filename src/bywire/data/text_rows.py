@@ -196,7 +196,8 @@ def require_whole_end(path: Path, block: bytes, last_line: int, dialect: Dialect
     if dialect.kinds and dialect.kinds[-1] not in (NUMBER, DIGITS):
         return
     separator, mark = dialect.separator.encode(), dialect.decimal.encode()
-    cells = [line.rstrip().rpartition(separator)[2].strip() for line in block.rsplit(b"\n", _LAST)[1:]]
+    lines = block.rsplit(b"\n", _LAST)[1:]
+    cells = [line.rstrip().rpartition(separator)[2].strip() for line in lines]
     if len(cells) <= _FEWEST:
         return
     decimals = [len(cell.partition(mark)[2]) for cell in cells]

@@ -31,7 +31,15 @@ from bywire.data.text_dialect import (
 from bywire.data.text_encoding import blocks_of, is_text
 from bywire.data.text_layouts import layout_of
 from bywire.data.text_rows import LOOKED_AT, Seen, require_whole_end, strict_columns
-from bywire.data.time_stamps import CLOCK, DAY, DIGITS, MOMENT, nanoseconds, of_digits, over_midnight
+from bywire.data.time_stamps import (
+    CLOCK,
+    DAY,
+    DIGITS,
+    MOMENT,
+    nanoseconds,
+    of_digits,
+    over_midnight,
+)
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -74,7 +74,7 @@ class Mdf4Source:
             of_group = (
                 "its group holds no records" if not length
                 else "its group has no instants" if master not in names
-                else "the instants of its group are no times" if not _is_time(group.channels[master])
+                else "its group counts no time" if not _is_time(group.channels[master])
                 else ""
             )  # fmt: skip
             self.left_out |= {
@@ -89,7 +89,8 @@ class Mdf4Source:
                 unit = (
                     "s" if c == master else channel.unit or getattr(channel.conversion, "unit", "")
                 )
-                unit = "1" if not unit and _has_texts(channel) and not _is_quantity(channel) else unit
+                if not unit and _has_texts(channel) and not _is_quantity(channel):
+                    unit = "1"
                 clock = None if c == master else names[master]
                 self._places[name] = (g, c)
                 columns[name] = Column(name, (unit or "").strip(), length, clock, "")
@@ -201,12 +202,12 @@ def _is_time(master: Any) -> bool:
 
 def _why_not(channel: Any, parts: Any) -> str:
     """Return why a channel is not read; nothing where it holds numbers."""
-    if channel.channel_type not in (_VALUE, _MASTER, _VIRTUAL_MASTER, _VIRTUAL):
-        return "it holds no samples of its own"
     if parts:
         return "it is an array or a structure"
     if channel.data_type not in _NUMBERS:
         return "it holds text or bytes"
+    if channel.channel_type not in (_VALUE, _MASTER, _VIRTUAL_MASTER, _VIRTUAL):
+        return "it holds no samples of its own"
     if _has_formula(channel.conversion):
         return "a formula converts it, and nothing that stands in a file is evaluated"
     return ""
