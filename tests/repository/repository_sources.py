@@ -15,7 +15,7 @@ PACKAGE = ROOT / "src" / "bywire"
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 MODULES = sorted(PACKAGE.rglob("*.py"))
 _HOLDS_STATEMENTS = (ast.stmt, ast.ExceptHandler, ast.match_case)
-FOLDERS = (".git", ".venv", "results", "dist", "build", "node_modules")
+FOLDERS = (".git", ".venv", ".venv-newest", "results", "dist", "build", "node_modules")
 
 
 def label(path: Path) -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 import runpy
+import sys
 
 import pytest
-from repository_sources import PROJECT, ROOT
+from repository_sources import PACKAGE, PROJECT, ROOT
 
 TASKS = runpy.run_path(str(ROOT / "tasks.py"))
 MARKERS = [text.split(":")[0] for text in PROJECT["tool"]["pytest"]["ini_options"]["markers"]]
@@ -56,6 +57,31 @@ def test_what_failed_runs_again_with_rewritten_assertions() -> None:
     assert "--assert=plain" in TASKS["CHECKS"][title]
     assert "--assert=plain" not in again
     assert "--last-failed" in again
+
+
+def test_the_newest_python_runs_tests_that_are_there_of_every_room() -> None:
+    paths = [ROOT / name for name in TASKS["NEWEST_TESTS"]]
+    assert all(path.exists() for path in paths)
+    rooms = {path.relative_to(ROOT / "tests").parts[0] for path in paths}
+    assert {path.name for path in PACKAGE.iterdir() if path.is_dir()} - rooms <= {
+        "__pycache__", "authoring", "brakes", "control", "export", "template",
+    }  # declared in the others' tests, or minutes long
+
+
+@pytest.mark.parametrize("works", [True, False])
+def test_a_python_that_does_not_run_is_not_the_newest(tmp_path, monkeypatch, works) -> None:
+    """The newest that pyproject.toml names, and newer than the one that asks."""
+    newest = max(int(c[-2:]) for c in PROJECT["project"]["classifiers"] if "Python :: 3." in c)
+    python = tmp_path / f"python3.{newest}"
+    python.write_text(f"#!/bin/sh\necho 3.{newest}.9\n" if works else "#!/bin/sh\nexit 127\n")
+    python.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr(sys, "version_info", (3, newest - 1))
+    found = TASKS["newest_python"]()
+    assert found == ((f"3.{newest}.9", str(python)) if works else None)
+    monkeypatch.setattr(sys, "version_info", (3, newest))
+    assert TASKS["newest_python"]() is None
 
 
 def test_every_published_study_can_be_made_again() -> None:

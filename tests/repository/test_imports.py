@@ -1,0 +1,33 @@
+"""Every module compiles and can be imported first, without a warning of its own."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import warnings
+
+from repository_sources import ROOT
+
+SOURCE = ROOT / "src"
+LINES = """
+import importlib, sys, warnings
+warnings.filterwarnings("error", module=r"bywire\\b")
+for name in sys.argv[1:]:
+    importlib.import_module(name)
+"""
+
+
+def test_every_module_compiles_and_is_imported_without_a_warning() -> None:
+    names = []
+    for path in sorted(SOURCE.rglob("*.py")):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # of escapes, comparisons: newer Pythons warn of more
+            compile(path.read_text(encoding="utf-8"), str(path), "exec")
+        parts = path.relative_to(SOURCE).with_suffix("").parts
+        if not {"project", "__main__"} & set(parts):  # a template; what runs a command
+            names.append(".".join(parts).removesuffix(".__init__"))
+    assert len(names) > 500
+    done = subprocess.run(
+        [sys.executable, "-c", LINES, *names], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
