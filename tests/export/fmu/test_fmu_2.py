@@ -136,6 +136,20 @@ def test_a_value_that_is_refused_leaves_it_usable(
     client.begin().follow(1e-3, 0, 3)
 
 
+def test_an_input_outside_its_declared_range_is_refused(
+    wedge: ExportedFmu, capfd: pytest.CaptureFixture[str]
+) -> None:
+    client = Client(wedge.path, wedge.path.with_suffix("")).begin()
+    for value in (2.0, -0.5, float("nan")):
+        with pytest.raises(FMICallException):
+            client["power_off"] = value
+    assert "power_off = 2 is not admissible: it must be >= 0 and <= 1" in capfd.readouterr().out
+    client["power_off"] = 1.0
+    client.follow(1e-3, 0, 2)
+    (described,) = (v for v in client.description.modelVariables if v.name == "power_off")
+    assert (float(described.min), float(described.max)) == (0.0, 1.0)
+
+
 def test_fixed_parameters_stay_and_those_of_the_ecu_alone_are_tuned(
     client: Client, capfd: pytest.CaptureFixture[str]
 ) -> None:

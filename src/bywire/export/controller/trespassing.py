@@ -177,9 +177,9 @@ def _wild(program: Program, vectors: Vectors) -> list[str]:
         "            ? 0 : 1;"
         for each in step.kept
     ]
-    for each in step.commands:
-        place, limit = f"memory.{c_name(each.field)}", each.limit.text
-        if each.is_input:
+    for command in step.commands:
+        place, limit = f"memory.{c_name(command.field)}", command.limit.text
+        if command.is_input:
             limit = limit.replace("u->", "u.", 1)
             lines.append(
                 f"        wrong += ((memory.{step.status} != 0u) || ({place} <= {limit})) ? 0 : 1;"

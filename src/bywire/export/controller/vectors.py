@@ -173,14 +173,16 @@ def _at_borders(
 
 def _inside(values: Any, number: Callable[[float], Any]) -> Any:
     """Return signals within their admissible ranges, which a step asks for."""
+    cls: Any = type(values)
     return values._replace(**{
         name: number(min(max(getattr(values, name), low), high))
-        for name, (low, high) in ranges_of(type(values)).items()
+        for name, (low, high) in ranges_of(cls).items()
     })  # fmt: skip
 
 
 def _is_accepted(values: Any) -> bool:
-    ranges = ranges_of(type(values)).items()
+    cls: Any = type(values)
+    ranges = ranges_of(cls).items()
     return all(abs(each) < LARGEST for each in values) and all(
         low <= getattr(values, name) <= high for name, (low, high) in ranges
     )

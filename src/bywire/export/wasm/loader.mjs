@@ -45,6 +45,11 @@ function rowsOf(description, given, count, interval) {
     }
   });
   if (!areFinite(rows)) throw new RangeError("the stimulus must be finite");
+  description.stimulus.forEach(({ name, low, high }, k) => {
+    for (let at = k; at < rows.length; at += names.length)
+      if (rows[at] < (low ?? -Infinity) || rows[at] > (high ?? Infinity))
+        throw new RangeError(`${name} = ${rows[at]} is outside its range, ${low ?? "-∞"} to ${high ?? "∞"}`);
+  });
   return rows;
 }
 

@@ -14,7 +14,7 @@ import numpy as np
 from bywire.core.child_process import run_program
 from bywire.core.errors import CompilerError
 from bywire.core.scratch import process_folder, scratch_folder
-from bywire.core.signals import Signal, signals_of
+from bywire.core.signals import Signal, ranges_of, signals_of
 from bywire.export.exported import Exported
 from bywire.export.initial_values import start_nodes
 from bywire.export.interface import Interface, interface
@@ -127,12 +127,15 @@ def _stimuli(made: Exported) -> list[dict[str, Any]]:
     """Return what drives the bench, as steps: values that hold from their times on, no noise."""
     rows = sampled_stimulus(made.run, made.schedule)
     times = made.schedule.stimulus_times
-    told = []
+    ranges = ranges_of(made.run.model.Stimulus)
+    told: list[dict[str, Any]] = []
     for k, (name, signal) in enumerate(signals_of(made.run.model.Stimulus).items()):
         values = np.zeros(len(rows)) if name.startswith("noise_") else rows[:, k]
         changes = np.flatnonzero(np.diff(values, prepend=0.0))
         steps = [[float(times[at]), float(values[at])] for at in changes]
-        told.append({**_signal(name, signal), "steps": steps})
+        ends = zip(("low", "high"), ranges.get(name, ()), strict=False)
+        known = {end: value for end, value in ends if np.isfinite(value)}
+        told.append({**_signal(name, signal), **known, "steps": steps})
     return told
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import math
 import zlib
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -77,6 +78,9 @@ _UNITS = (
     ("A*s", (0, 0, 1, 1, 0, 0), "C"),
 )
 """units of which a field takes products; `bywire.core.units` says which of them it reads"""
+_SIZES = {"deg": math.pi / 180, "°": math.pi / 180, "rev": 2 * math.pi, "rpm": math.pi / 30,
+          "psi": 6894.757293168361}  # fmt: skip
+"""sizes to the last digit, of which a quantity that is read has 15"""
 _SHIFTED = {
     **dict.fromkeys(("degC", "°C"), (1.0, 273.15)),
     **dict.fromkeys(("degF", "°F"), (5 / 9, 459.67 * 5 / 9)),
@@ -267,7 +271,7 @@ def _shown(symbol: str) -> Mapping[str, float]:
 def _known_units() -> list[tuple[str, float, tuple[int, ...]]]:
     """Return the units that a field takes, of which it takes products: name, size, exponents."""
     return [
-        (name, size, powers)
+        (name, _SIZES.get(name, size), powers)
         for symbol, powers, names in _UNITS
         for name in names.split()
         for size in [_value(f"1 {name}", symbol)]
