@@ -308,6 +308,7 @@ def run_over(
             f"over {over!r}: write NAME=LOW:HIGH:COUNT, for instance motor.R_m=0.2ohm:0.6ohm:9"
         )
     leaf = varied_leaf(bench, name)
+    bench.require_effect(name)
     values = spread(text, leaf.unit.symbol, name)
     if len({*values}) < 2:
         raise ParameterError(f"over {over!r}: name two different values at least")

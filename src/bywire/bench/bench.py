@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bywire.bench.bench_source import usual_set
+from bywire.bench.effects import are_alike, refuse_without_effect, switches_of
 from bywire.bench.experiment import Case, Cases, Experiment, as_run
 from bywire.bench.experiment_choice import experiment_of
 from bywire.bench.extent import check_seed, checked_interval, checked_step
@@ -22,11 +23,20 @@ from bywire.bench.stimuli.registry import Stimulus
 from bywire.bench.stimulus_sections import stimulus_of, stimulus_sections
 from bywire.bench.values import parsed
 from bywire.core.catalog import PARAMETER_SETS, outdated_values
-from bywire.core.errors import ModelError, ParameterError, place_of, quoted, unknown_name
+from bywire.core.errors import (
+    InputError,
+    ModelError,
+    ParameterError,
+    place_of,
+    quoted,
+    unknown_name,
+)
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.units import shown
 from bywire.simulation.engine import engine_names
 from bywire.simulation.run import Run
+
+_SHARE = 1e-3  # of a value, by which it is moved to see what follows it
 
 
 @dataclass(frozen=True)
@@ -104,6 +114,7 @@ class Bench:
             raise unknown_name("engine", self.engine, engine_names())
         object.__setattr__(self, "parameters", self.parameters or usual_set(self.experiment))
         known = PARAMETER_SETS.find(self.parameters)
+        written = tuple(self.overrides)
         object.__setattr__(self, "overrides", settled(known.parameters(), self.overrides))
         if self.assembly == known.assembly:
             object.__setattr__(self, "assembly", "")
@@ -122,9 +133,9 @@ class Bench:
         self._check_names()
         check(self.requirements, chosen.kpis_with(self.chosen_options))
         if chosen.preview is None:
-            self.cases()
+            self._require_effects(written, self.cases(), chosen.cases)
         else:
-            self._made(chosen.preview)
+            self._require_effects(written, self._made(chosen.preview), chosen.preview)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a copy is made of: not what follows from it."""
@@ -142,6 +153,51 @@ class Bench:
         for name in further:
             if name not in known:
                 raise unknown_name(f"stimulus beside {chosen.name}", name, known)
+
+    def _require_effects(
+        self, names: Sequence[str], cases: Sequence[Case], make: Cases
+    ) -> None:
+        """Refuse parameters that a choice switches off: they would be listed and do nothing.
+
+        ``names``: those that are written out; a pattern may match some that have no effect.
+        """
+        base = PARAMETER_SETS.find(self.parameters).parameters()
+        for name in filter(self.overrides.__contains__, names):
+            value, before = self.par.value(name), base.value(name)
+            if value == before or isinstance(value, (str, bool)):
+                continue
+            switches = switches_of(name, cases)
+            if switches and not self._is_used(name, before, cases, make):
+                refuse_without_effect(name, value, switches, self.par)
+
+    def _is_used(self, name: str, other: Any, cases: Sequence[Case], make: Cases) -> bool:
+        """Return whether the experiment asks for a parameter: with another value, it is another."""
+        try:
+            par, following = self.par.replace({name: other}), self.definition.following
+            if following is not None and following(par) != following(self.par):
+                return True
+            others = self.cases_with(par, self.chosen_options, make)
+            made = tuple(case.aligned(self.step, self.record) for case in others)
+        except InputError:
+            return True
+        return not are_alike(cases, made)
+
+    def require_effect(self, name: str) -> None:
+        """Refuse a parameter that is to vary and that a choice switches off.
+
+        Raises
+        ------
+        ParameterError
+            With what switches it on.
+        """
+        if name not in self.par.leaves():
+            return
+        make = self.definition.preview or self.definition.cases
+        cases, value = self._previewed, self.par.value(name)
+        switches = switches_of(name, cases)
+        moved = value + _SHARE * (abs(value) or 1.0)
+        if switches and not self._is_used(name, moved, cases, make):
+            refuse_without_effect(name, value, switches, self.par)
 
     def _check_names(self) -> None:
         """Refuse options that stand among the parameters, the likeliest mistake of all."""
@@ -310,7 +366,17 @@ class Bench:
 
     def with_overrides(self, overrides: Mapping[str, Any]) -> Bench:
         """Return this bench with further parameters changed; shares are of what it has."""
-        return replace(self, overrides={**self.overrides, **settled(self.par, overrides)})
+        changes = settled(self.par, overrides)
+        matched = changes.keys() - overrides.keys()
+        silent = {name for name in matched if switches_of(name, self._previewed)}
+        kept = {name: value for name, value in changes.items() if name not in silent}
+        return replace(self, overrides={**self.overrides, **(kept or changes)})
+
+    @property
+    def _previewed(self) -> tuple[Case, ...]:
+        """The runs, without what has to run before them."""
+        preview = self.definition.preview
+        return self.cases() if preview is None else self._made(preview)
 
 
 def _check_driven(case: Case, experiment: Experiment) -> None:
