@@ -91,7 +91,7 @@ def test_list_is_complete(bywire):
     found = json.loads(out)
     titles = {
         "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "loops",
-        "plants",
+        "plants", "elements",
         "studies", "lives", "methods", "stimuli", "faults", "campaigns", "residuals", "kpis",
     }  # fmt: skip
     assert set(found) == titles | {"kpis_of_experiments"}

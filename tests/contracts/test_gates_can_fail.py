@@ -159,6 +159,7 @@ def test_gate_refuses(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     refused = mistake.gate(wrong)
     assert not refused.holds
     assert mistake.said in refused.text
+    assert "; {" not in refused.text  # choices and values are said in words
 
 
 def _loaded(name: str, source: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:

@@ -86,6 +86,14 @@ MISTAKES = {
 }  # fmt: skip
 
 
+FAULTS = """
+from bywire.authoring import Channel, Channels
+from {package}.model import {model}
+
+CHANNELS = Channels({model}.name, (Channel("angle", "angle sensor", "rad", "{signal}"),))
+"""
+
+
 @contextmanager
 def seeded(folder: Path, name: str, mistake: Mistake | None = None) -> Iterator[Any]:
     """Yield the trial of a template's brake with a mistake; nobody knows it afterwards."""

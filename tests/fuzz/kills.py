@@ -26,6 +26,18 @@ WRITERS = {
     "linearize": ["linearize", "motorcycle-plant", "--out", "{out}"],
     "new": ["new", "{name}"],
     "stability": ["study", "stability", "--out", "{out}"],
+    "design": ["design", "current", "--out", "{out}"],
+    "life": ["life", "wedge-pads", "--set", "wear.mechanism=none", "--out", "{out}"],
+    "faults": ["faults", "{folder}/campaign.toml", "--out", "{out}"],
+    "tolerances": ["study", "run", "{folder}/study.toml", "--out", "{out}"],
+    "resume": ["study", "resume", "{out}"],
+    "reproduce": ["reproduce", "roberts2003", "--out", "{out}"],
+    "replay": ["replay", "{folder}/measured.csv", "--bench", "hard-braking",
+               "--input", "p_set=p_mc", "--out", "{out}"],
+    "agreement": ["agreement", "current", "--frequencies", "100 Hz, 200 Hz", "--out", "{out}"],
+    "compare": ["compare", "hard-braking", "release", "--set", "options.duration=40 ms",
+                "--out", "{out}"],
+    "check": ["check", "adc", "--out", "{out}"],
 }  # fmt: skip
 _LONGEST = 120.0
 _FORKED = 0.9  # of the commands

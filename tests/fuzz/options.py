@@ -1,4 +1,4 @@
-"""Every option and argument of every command with a value that is too long, too large or too small."""
+"""Every option and argument of every command, with a value that is too long, large or small."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from bywire.analysis.reduction.error import ReductionError
 from bywire.analysis.reduction.reduce import TOLERANCE, Reduced, reduce
 from bywire.bench.values import number
 from bywire.core.errors import ParameterError, quoted
-from bywire.core.pairs import DIGITS, whole_number
+from bywire.core.pairs import DIGITS, read_count
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 from bywire.report.document import Attachment, Flat, Paragraph, TableBlock
@@ -98,7 +98,7 @@ def reduced(model: LinearModel, text: str, band: float | None = None) -> Reduced
         When the band has a wrong unit.
     """
     if _is_number(text):
-        order = whole_number(text)
+        order = read_count(text)
         if not order:
             raise ParameterError(
                 f"--reduce {quoted(text)}: an order is a whole number >= 1 of at most "

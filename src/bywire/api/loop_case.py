@@ -14,7 +14,7 @@ from bywire.analysis.loop import LOOPS, Loop, Quantity
 from bywire.api.parameter_choice import parameters_for
 from bywire.bench.values import number
 from bywire.core.errors import ParameterError, quoted, unknown_name
-from bywire.core.pairs import whole_number
+from bywire.core.pairs import read_count
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
 
@@ -132,7 +132,7 @@ def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> lis
     parts = [part.strip() for part in text.split(":")]
     if len(parts) == 1:
         return [number(part.strip(), unit, name) for part in text.split(",")]
-    count = whole_number(parts[2]) if len(parts) == 3 else None
+    count = read_count(parts[2]) if len(parts) == 3 else None
     if count is None or not 2 <= count <= _MOST:
         raise ParameterError(
             f"{name} = {quoted(text)}: write LOW:HIGH:COUNT with 2 to {_MOST} values, or "

@@ -61,12 +61,12 @@ def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
     return values
 
 
-def whole_number(text: str) -> int | None:
+def read_count(text: str) -> int | None:
     """Return the whole number >= 0 that a text is, of at most `DIGITS` digits; None for another.
 
     Examples
     --------
-    >>> whole_number(" 12 "), whole_number("1.5"), whole_number("9" * 400)
+    >>> read_count(" 12 "), read_count("1.5"), read_count("9" * 400)
     (12, None, None)
     """
     digits = text.strip()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import typing
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 
@@ -68,6 +68,10 @@ class Signal:
         Name of the signal whose set point this is, for figures; empty for none.
     role
         What it is in the books, of an energy or of a power whose integral is one.
+    low, high
+        Ends of its admissible range, in that unit: a gauge pressure is not below the vacuum, an
+        opening not negative. `bywire.check` tries nothing beyond. ``Ge(0)`` behind the Signal of
+        an annotation says the same.
     """
 
     unit: str
@@ -75,6 +79,12 @@ class Signal:
     nominal: float = 1.0
     set_point_of: str = ""
     role: Role | None = None
+    low: float = -math.inf
+    high: float = math.inf
+
+    def within(self, value: float) -> float:
+        """Return a value, or the end of the range that is nearest to it."""
+        return min(max(value, self.low), self.high)
 
 
 @dataclass(frozen=True)
@@ -96,7 +106,7 @@ Energy = Annotated[float, Signal("J", "energy")]
 Torque = Annotated[float, Signal("N*m", "torque", 0.01)]
 Speed = Annotated[float, Signal("rad/s", "shaft speed", 10.0)]
 Angle = Annotated[float, Signal("rad", "shaft angle", 20.0)]
-Pressure = Annotated[float, Signal("Pa", "pressure", 2e6)]
+Pressure = Annotated[float, Signal("Pa", "pressure", 2e6, low=-101_325.0)]
 EnthalpyDensity = Annotated[float, Signal("J/m**3", "flow energy per volume", 2e6)]
 PressureEnergy = Annotated[float, Signal("Pa**2", "integral of pressure", 4e12)]
 FluidCompliance = Annotated[float, Signal("m**3/Pa", "compliance", 1e-15)]
@@ -126,9 +136,17 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
 
 
 def signal_in(annotation: Any) -> Signal | None:
-    """Return the Signal of an annotation; None where it has none."""
+    """Return the Signal of an annotation, with the bounds that stand behind it; None for none."""
     notes = getattr(annotation, "__metadata__", ())
-    return next((note for note in notes if isinstance(note, Signal)), None)
+    signal = next((note for note in notes if isinstance(note, Signal)), None)
+    for note in notes if signal is not None else ():
+        if isinstance(note, (Gt, Ge)):
+            low: Any = note.gt if isinstance(note, Gt) else note.ge
+            signal = replace(signal, low=float(low))
+        elif isinstance(note, (Lt, Le)):
+            high: Any = note.lt if isinstance(note, Lt) else note.le
+            signal = replace(signal, high=float(high))
+    return signal
 
 
 @cache

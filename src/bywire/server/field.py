@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from bywire.bench.bench_text import PATHS
 from bywire.core.errors import ParameterError, quoted, unknown_name
-from bywire.core.pairs import changes, named, whole_number
+from bywire.core.pairs import changes, named, read_count
 from bywire.server.contents import Contents
 from bywire.server.place import Place, require_inside
 
@@ -117,7 +117,7 @@ class Field:
     def _whole(self, text: str) -> int | None:
         if not text:
             return self.default
-        number = whole_number(text)
+        number = read_count(text)
         if number is None or number < self.least:
             raise ParameterError(
                 f"{self.label} = {quoted(text)}: a whole number from {self.least} on is wanted"

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from bywire.core.brake import loaded_files
-from bywire.core.pairs import whole_number
+from bywire.core.pairs import read_count
 from bywire.server.job_group import interrupt, kill, started
 from bywire.server.place import Place
 from bywire.server.refusal import RefusedError
@@ -139,7 +139,7 @@ class Jobs:
             With status 404 where there is none.
         """
         with self._lock:
-            job = self._jobs.get(whole_number(number) or 0)
+            job = self._jobs.get(read_count(number) or 0)
         if job is None:
             raise RefusedError(404, f"there is no job {number[:20]!r}: see the list of jobs")
         return job

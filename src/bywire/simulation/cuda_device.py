@@ -13,7 +13,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from bywire.core.errors import DeviceError, ParameterError, quoted
-from bywire.core.pairs import whole_number
+from bywire.core.pairs import read_count
 from bywire.simulation.cuda_compiler import OTHERWISE, bindings, cuda_binary
 from bywire.simulation.native import pointer
 
@@ -190,7 +190,7 @@ def find_device() -> CudaDevice:
             f"lists one, {OTHERWISE}"
         )
     wanted = os.environ.get(VARIABLE, "0")
-    number = whole_number(wanted)
+    number = read_count(wanted)
     if number is None or number >= count:
         raise ParameterError(
             f"{VARIABLE} = {quoted(wanted)} names no graphics processor: there "
