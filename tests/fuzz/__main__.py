@@ -31,7 +31,7 @@ if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bywire.data import limited_source
-from fuzz import failing, inputs, kills, sound, study_kills
+from fuzz import failing, inputs, kills, layouts, sound, study_kills
 from fuzz.judge import Verdict, judged, judged_alone
 
 
@@ -91,7 +91,7 @@ def campaign(rng: Random, folder: Path) -> Verdict:
 
 KINDS: dict[str, Callable[[Random, Path], Verdict]] = {
     "bench": bench, "command": command, "extreme": extreme, "measurement": measurement,
-    "faulty": faulty, "campaign": campaign,
+    "faulty": faulty, "campaign": campaign, "layout": layouts.case,
 }  # fmt: skip
 
 
@@ -164,7 +164,7 @@ def main() -> int:
         parser.add_argument(f"--{kind}", type=int, default=0)
     asked = parser.parse_args()
     warnings.simplefilter("ignore")
-    limited_source.SECONDS = 5.0
+    limited_source.SECONDS = 20.0
     wrong: list[str] = []
     for kind in asked.kind or KINDS:
         wrong += tried(kind, asked.seed, asked.first, asked.cases, asked.seconds)[0]

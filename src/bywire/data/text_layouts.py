@@ -143,7 +143,8 @@ def _vbox_unit(name: str, description: str) -> str:
 
 def _sections(head: Head) -> Iterator[tuple[str, list[tuple[int, str]]]]:
     """Yield the sections before the data with their lines."""
-    title, lines = "", []
+    title = ""
+    lines: list[tuple[int, str]] = []
     for k in range(len(head.lines)):
         text = head.plain(k).strip()
         if text.startswith("[") and text.endswith("]"):

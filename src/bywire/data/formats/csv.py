@@ -113,7 +113,7 @@ class TextSource:
         self._remark()
         numbers = dict(zip(plain, columns, strict=False))
         if raster is not None:
-            numbers[RASTER] = raster[0] + raster[1] * np.arange(columns[0].size)
+            numbers[RASTER] = raster[0] + raster[1] * np.arange(columns[0].size, dtype=np.float64)
         return {name: numbers[name] for name in names}
 
     def place(self, name: str, row: int) -> str:
