@@ -162,9 +162,17 @@ class Head:
         decimal = "." if separator == "," else self.options.decimal
         marks = frozenset(mark for mark in self.options.missing if mark)
         dialect = Dialect(
-            separator, decimal, tuple(titles), tuple(units), width, at + 1, self.start(at), rows,
-            encoding=self.encoding, marks=marks,
-        )  # fmt: skip
+            separator,
+            decimal,
+            tuple(titles),
+            tuple(units),
+            width,
+            at + 1,
+            self.start(at),
+            rows,
+            encoding=self.encoding,
+            marks=marks,
+        )
         return replace(dialect, kinds=_kinds(dialect))
 
 
