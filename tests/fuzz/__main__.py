@@ -32,7 +32,7 @@ if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bywire.data import limited_source
-from fuzz import failing, inputs, kills, options, plans, sound, study_kills
+from fuzz import failing, inputs, kills, layouts, options, plans, sound, study_kills
 from fuzz.judge import Verdict, judged, judged_alone
 
 
@@ -115,6 +115,7 @@ def option(rng: Random, folder: Path) -> Verdict:
 KINDS: dict[str, Callable[[Random, Path], Verdict]] = {
     "bench": bench, "command": command, "extreme": extreme, "measurement": measurement,
     "faulty": faulty, "campaign": campaign, "study": study, "life": life, "option": option,
+    "layout": layouts.case,
 }  # fmt: skip
 
 
@@ -187,7 +188,7 @@ def main() -> int:
         parser.add_argument(f"--{kind}", type=int, default=0)
     asked = parser.parse_args()
     warnings.simplefilter("ignore")
-    limited_source.SECONDS = 5.0
+    limited_source.SECONDS = 20.0
     wrong: list[str] = []
     for kind in asked.kind or KINDS:
         wrong += tried(kind, asked.seed, asked.first, asked.cases, asked.seconds)[0]

@@ -28,13 +28,13 @@ SECONDS = 0.5
 def test_nothing_goes_wrong_with_generated_input(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if kind == "measurement":
+    if kind in ("measurement", "layout"):
         for name in ("h5py", "asammdf", "pyarrow"):
             pytest.importorskip(name)
     monkeypatch.setattr(limited_source, "SECONDS", 20.0)
     wrong, through = tried(kind, SEED, 0, 40, SECONDS)
     assert wrong == []
-    if kind in ("bench", "command"):
+    if kind in ("bench", "command", "layout"):
         assert through > 0.7  # what is to be admissible is carried through, but for contradictions
 
 

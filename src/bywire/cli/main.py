@@ -189,8 +189,10 @@ def _explained(error: BaseException) -> int:
         limit = address_space()
         why = (
             f"the address space of this process is limited to {limit / 2**30:.3g} GiB (ulimit -v): "
-            "raise that limit" if limit else "free some, or ask for less at a time"
-        )  # fmt: skip
+            "raise that limit"
+            if limit
+            else "free some, or ask for less at a time"
+        )
         message(f"error: out of memory: {why}")
         return FAILED
     if isinstance(error, OSError):

@@ -261,7 +261,7 @@ class Scale:
     @property
     def factor(self) -> float:
         """What one of it is in SI, as a difference."""
-        return float(self.ratio) * math.pi**self.turns
+        return float(self.ratio) * math.pow(math.pi, self.turns)
 
     @property
     def symbol(self) -> str:

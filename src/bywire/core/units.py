@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar, cast
 
 from bywire.core.clean_text import clean
 from bywire.core.errors import ParameterError, UnitError, quoted
@@ -232,14 +232,18 @@ def convert(value: F, symbol: str, unit: str) -> F:
     if before.powers[:-1] != after.powers[:-1]:
         raise UnitError(f"{symbol} cannot be converted to {unit}")
     ratio, turns = before.ratio / after.ratio, before.turns - after.turns
-    number = value + before.zero / before.factor if before.zero else value  # type: ignore[operator]
+    number: Any = value
+    if before.zero:
+        number = number + before.zero / before.factor
     if turns:
-        number = number * (float(ratio) * math.pi**turns)  # type: ignore[operator]
+        number = number * (float(ratio) * math.pow(math.pi, turns))
     elif ratio.numerator == 1:
-        number = number / ratio.denominator  # type: ignore[operator]
+        number = number / ratio.denominator
     else:
-        number = number * float(ratio)  # type: ignore[operator]
-    return number - after.zero / after.factor if after.zero else number  # type: ignore[operator,return-value]
+        number = number * float(ratio)
+    if after.zero:
+        number = number - after.zero / after.factor
+    return cast(F, number)
 
 
 def difference_unit(symbol: str) -> str:

@@ -105,9 +105,10 @@ def format_to_write(path: Path, name: str = "") -> FileFormat:
 def _of_ending(path: Path, *, to_read: bool = False) -> list[FileFormat]:
     ending = path.suffix.lower()
     return [
-        kind for kind in FORMATS.all().values()
+        kind
+        for kind in FORMATS.all().values()
         if ending in kind.endings or (to_read and ending in kind.also_reads)
-    ]  # fmt: skip
+    ]
 
 
 def _names() -> str:

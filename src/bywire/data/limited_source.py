@@ -144,10 +144,16 @@ class LimitedSource:
         self._path, self._kind, self._child = path, kind, child
         self._memory, self._seconds = memory, seconds
         self._request, self._is_open = next(_numbers), False
-        answer = self._answer({
-            "path": str(path), "folder": os.getcwd(), "memory": memory, "seconds": seconds,
-            "opening": min(seconds, kind.opening), "request": self._request,
-        })  # fmt: skip
+        answer = self._answer(
+            {
+                "path": str(path),
+                "folder": os.getcwd(),
+                "memory": memory,
+                "seconds": seconds,
+                "opening": min(seconds, kind.opening),
+                "request": self._request,
+            }
+        )
         self._is_open = True
         columns = [Column(*fields) for fields in answer["columns"]]
         self.columns: Mapping[str, Column] = {column.name: column for column in columns}
@@ -237,8 +243,7 @@ class LimitedSource:
 
     def _too_small(self, limit: int) -> FileError:
         return FileError(
-            f"{self._path}: reading {self._kind.title} ran out of memory"
-            + _limited_to(limit)
+            f"{self._path}: reading {self._kind.title} ran out of memory" + _limited_to(limit)
         )
 
     def _torn(self, name: str, size: int, declared: int) -> FileError:
@@ -266,9 +271,7 @@ def _ending(status: int) -> str:
 
 
 @contextmanager
-def limited(
-    path: Path, kind: FileFormat, seconds: float | None = None
-) -> Iterator[LimitedSource]:
+def limited(path: Path, kind: FileFormat, seconds: float | None = None) -> Iterator[LimitedSource]:
     """Open a file in a child process.
 
     Raises

@@ -23,14 +23,31 @@ from bywire.data.text_encoding import ENCODINGS
 from bywire.data.toml_file import read_toml
 
 _KEYS = (
-    "format", "time", "rate", "start", "signals", "decimal", "skip_lines", "titles", "encoding",
+    "format",
+    "time",
+    "rate",
+    "start",
+    "signals",
+    "decimal",
+    "skip_lines",
+    "titles",
+    "encoding",
     "missing",
-)  # fmt: skip
+)
 _TIME_KEYS = ("column", "unit", "rate", "start")
 _SIGNAL_KEYS = (
-    "column", "unit", "scale", "sign", "offset", "delay", "limits", "label", "time", "rate",
+    "column",
+    "unit",
+    "scale",
+    "sign",
+    "offset",
+    "delay",
+    "limits",
+    "label",
+    "time",
+    "rate",
     "missing",
-)  # fmt: skip
+)
 
 
 def mapping_from(content: Mapping[str, Any]) -> MeasurementMapping:
@@ -75,8 +92,13 @@ def _titles(content: Mapping[str, Any]) -> bool | None:
 
 def _encoding(content: Mapping[str, Any]) -> str:
     name = _text(content, "encoding", "").lower()
-    encoding = {"utf8": "utf-8", "utf16": "utf-16", "latin1": "latin-1", "ansi": "cp1252",
-                "iso-8859-1": "latin-1"}.get(name, name.replace("windows-", "cp"))  # fmt: skip
+    encoding = {
+        "utf8": "utf-8",
+        "utf16": "utf-16",
+        "latin1": "latin-1",
+        "ansi": "cp1252",
+        "iso-8859-1": "latin-1",
+    }.get(name, name.replace("windows-", "cp"))
     if encoding and encoding not in ENCODINGS:
         raise unknown_of_few("encoding", encoding, ENCODINGS)
     return encoding

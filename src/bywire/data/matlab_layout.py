@@ -163,8 +163,14 @@ def _recorded(found: Found) -> Iterator[tuple[str, _Recorded]]:
             unit = found.texts.get(f"{match['signal']}.Unit", "").strip()
         elif match := _SERIES.fullmatch(name):
             title, unit = match["scope"], ""
-            clock = next((f"{match['scope']}.{t}" for t in ("Time", "time")
-                          if f"{match['scope']}.{t}" in found.parts), "")  # fmt: skip
+            clock = next(
+                (
+                    f"{match['scope']}.{t}"
+                    for t in ("Time", "time")
+                    if f"{match['scope']}.{t}" in found.parts
+                ),
+                "",
+            )
         else:
             continue
         if clock in found.parts:
@@ -173,7 +179,7 @@ def _recorded(found: Found) -> Iterator[tuple[str, _Recorded]]:
 
 def _short(recorded: _Recorded) -> str:
     """Return the last part of a signal's name, behind the blocks that hold it."""
-    brief = recorded.name.rpartition("/")[2].strip().strip("\"")
+    brief = recorded.name.rpartition("/")[2].strip().strip('"')
     return brief + recorded.suffix if brief else ""
 
 

@@ -107,9 +107,13 @@ def read_with_notes(
 
 
 def dataset_of(
-    file: Path, source: Source, meaning: MeasurementMapping, signals: Sequence[str] | None,
-    progress: Progress, largest: int,
-) -> tuple[xr.Dataset, tuple[str, ...]]:  # fmt: skip
+    file: Path,
+    source: Source,
+    meaning: MeasurementMapping,
+    signals: Sequence[str] | None,
+    progress: Progress,
+    largest: int,
+) -> tuple[xr.Dataset, tuple[str, ...]]:
     """Read signals of an open measurement file, as `read_with_notes` does."""
     chosen = choose(file, source, meaning, signals)
     names = {c.column for c in chosen} | {c.clock.column for c in chosen if c.clock.column}

@@ -151,8 +151,10 @@ def _limit(memory: int) -> None:
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     most = pages * resource.getpagesize() + memory
     for kind, wanted in (
-        (resource.RLIMIT_AS, most), (resource.RLIMIT_FSIZE, memory), (resource.RLIMIT_CORE, 0)
-    ):  # fmt: skip
+        (resource.RLIMIT_AS, most),
+        (resource.RLIMIT_FSIZE, memory),
+        (resource.RLIMIT_CORE, 0),
+    ):
         inherited = [limit for limit in resource.getrlimit(kind) if limit != resource.RLIM_INFINITY]
         allowed = min([wanted, *inherited])  # an inherited limit cannot be raised
         resource.setrlimit(kind, (allowed, allowed))

@@ -162,9 +162,17 @@ class Head:
         decimal = "." if separator == "," else self.options.decimal
         marks = frozenset(mark for mark in self.options.missing if mark)
         dialect = Dialect(
-            separator, decimal, tuple(titles), tuple(units), width, at + 1, self.start(at), rows,
-            encoding=self.encoding, marks=marks,
-        )  # fmt: skip
+            separator,
+            decimal,
+            tuple(titles),
+            tuple(units),
+            width,
+            at + 1,
+            self.start(at),
+            rows,
+            encoding=self.encoding,
+            marks=marks,
+        )
         return replace(dialect, kinds=_kinds(dialect))
 
 
@@ -338,7 +346,9 @@ def _from_numbers(
             f"the columns have no titles, since line {above[-1] + 1} has other cells than the rows "
             "below it: they are called 1, 2, ..."
         )
-    mixed = (k for k in above if len(rows[k]) == len(row) and _has_number(rows[k]))
+    # Between words of a sentence stand blanks too: there, a row begins with its number.
+    first_ones = 1 if separator == " " else None
+    mixed = (k for k in above if len(rows[k]) == len(row) and _has_number(rows[k][:first_ones]))
     if any(k < start or k == start != begin for k in mixed):
         return None, begin
     dialect = head.table(separator, titles, units, first, len(row))
@@ -422,6 +432,8 @@ def _kinds(dialect: Dialect) -> tuple[str, ...]:
     """Return what the cells of each column are, by the first rows."""
     columns: list[list[str]] = [[] for _ in range(dialect.width)]
     for line in dialect.rows:
+        if _is_comment(line):
+            continue
         try:
             cells = cells_of(line, dialect.separator)
         except csv.Error:

@@ -9,14 +9,31 @@ from pathlib import Path
 from bywire.core.errors import FileError
 
 ENCODINGS = (
-    "utf-8", "utf-16", "utf-16-le", "utf-16-be", "cp1252", "latin-1", "iso-8859-15", "cp1250",
-    "cp1251", "cp437", "cp850", "mac-roman", "shift_jis", "gbk", "euc-kr", "big5",
-)  # fmt: skip
+    "utf-8",
+    "utf-16",
+    "utf-16-le",
+    "utf-16-be",
+    "cp1252",
+    "latin-1",
+    "iso-8859-15",
+    "cp1250",
+    "cp1251",
+    "cp437",
+    "cp850",
+    "mac-roman",
+    "shift_jis",
+    "gbk",
+    "euc-kr",
+    "big5",
+)
 """encodings of text files that a mapping may name"""
 
 _BLOCK = 1 << 22  # bytes that are read at a time
-_MARKS = {codecs.BOM_UTF8: "utf-8", codecs.BOM_UTF16_LE: "utf-16-le",
-          codecs.BOM_UTF16_BE: "utf-16-be"}  # fmt: skip
+_MARKS = {
+    codecs.BOM_UTF8: "utf-8",
+    codecs.BOM_UTF16_LE: "utf-16-le",
+    codecs.BOM_UTF16_BE: "utf-16-be",
+}
 _SHARE = 0.4  # of null bytes among every other one: text in two bytes for each character
 
 

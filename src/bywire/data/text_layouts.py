@@ -16,9 +16,16 @@ VBOX_MARK = "[column names]"
 
 _LVM_SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";", "Space": " "}
 _VBOX_UNITS = {
-    "sats": "1", "satellites": "1", "lat": "arcmin", "latitude": "arcmin", "long": "arcmin",
-    "longitude": "arcmin", "velocity": "km/h", "heading": "deg", "height": "m",
-}  # fmt: skip
+    "sats": "1",
+    "satellites": "1",
+    "lat": "arcmin",
+    "latitude": "arcmin",
+    "long": "arcmin",
+    "longitude": "arcmin",
+    "velocity": "km/h",
+    "heading": "deg",
+    "height": "m",
+}
 """units of the columns that every VBOX writes, by the manufacturer's description of its files"""
 
 
@@ -87,9 +94,13 @@ def _lvm(head: Head) -> Dialect:
     named = zip((*titles, *[""] * width), dialect.kinds, strict=False)
     kinds = (TEXT if title == "Comment" else kind for title, kind in named)
     return replace(
-        dialect, kinds=tuple(kinds), clocks=clocks, raster=raster, is_ragged=True,
+        dialect,
+        kinds=tuple(kinds),
+        clocks=clocks,
+        raster=raster,
+        is_ragged=True,
         decimal=head.options.decimal or (mark if mark in (".", ",") else dialect.decimal),
-    )  # fmt: skip
+    )
 
 
 def _first(entries: dict[str, list[str]], name: str) -> str:
@@ -113,8 +124,9 @@ def _number(head: Head, entries: dict[str, list[str]], name: str, default: float
 def _vbox(head: Head) -> Dialect:
     sections = dict(_sections(head))
     names = [word for _, line in sections.get("[column names]", []) for word in line.split()]
-    begin = next((k for k in range(len(head.lines))
-                  if head.lines[k].strip().casefold() == "[data]"), None)  # fmt: skip
+    begin = next(
+        (k for k in range(len(head.lines)) if head.lines[k].strip().casefold() == "[data]"), None
+    )
     if begin is None or not names:
         raise FileError(f"{head.path}: it is a file of a VBOX without column names or [data]")
     at = begin + 1
@@ -126,8 +138,10 @@ def _vbox(head: Head) -> Dialect:
     if channels:
         units[-len(channels) :] = channels[: len(units)]
     dialect = head.table(" ", names, units, at, len(names))
-    kinds = [DIGITS if name.casefold() == "time" else kind
-             for name, kind in zip(names, dialect.kinds, strict=True)]  # fmt: skip
+    kinds = [
+        DIGITS if name.casefold() == "time" else kind
+        for name, kind in zip(names, dialect.kinds, strict=True)
+    ]
     return replace(dialect, kinds=tuple(kinds), decimal=dialect.decimal or ".")
 
 
@@ -143,7 +157,8 @@ def _vbox_unit(name: str, description: str) -> str:
 
 def _sections(head: Head) -> Iterator[tuple[str, list[tuple[int, str]]]]:
     """Yield the sections before the data with their lines."""
-    title, lines = "", []
+    title = ""
+    lines: list[tuple[int, str]] = []
     for k in range(len(head.lines)):
         text = head.plain(k).strip()
         if text.startswith("[") and text.endswith("]"):

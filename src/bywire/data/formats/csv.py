@@ -113,7 +113,7 @@ class TextSource:
         self._remark()
         numbers = dict(zip(plain, columns, strict=False))
         if raster is not None:
-            numbers[RASTER] = raster[0] + raster[1] * np.arange(columns[0].size)
+            numbers[RASTER] = raster[0] + raster[1] * np.arange(columns[0].size, dtype=np.float64)
         return {name: numbers[name] for name in names}
 
     def place(self, name: str, row: int) -> str:
@@ -128,9 +128,7 @@ class TextSource:
                     return f"line {line}"
         return f"row {row + 1}"
 
-    def _columns(
-        self, indices: Sequence[int], progress: Progress
-    ) -> list[NDArray[np.float64]]:
+    def _columns(self, indices: Sequence[int], progress: Progress) -> list[NDArray[np.float64]]:
         """Return columns as they are written, block by block."""
         dialect = with_mark(self._path, self._dialect, indices)
         size = self._path.stat().st_size
@@ -201,8 +199,9 @@ def _names(dialect: Dialect) -> list[str]:
     names: list[str] = []
     for k in range(dialect.width):
         title = dialect.titles[k] if k < len(dialect.titles) else ""
-        names.append(f"{title}@{k + 1}" if title and dialect.titles.count(title) > 1
-                     else title or str(k + 1))  # fmt: skip
+        names.append(
+            f"{title}@{k + 1}" if title and dialect.titles.count(title) > 1 else title or str(k + 1)
+        )
     taken = Counter(names)
     names = [f"{name}@{k}" if taken[name] > 1 else name for k, name in enumerate(names, 1)]
     while len(names) > len(dialect.titles) > 0 and not _holds_cells(dialect, len(names) - 1):
@@ -265,13 +264,17 @@ def _fast(
         options = {}  # rounds right by default, and warns of the option
     try:
         frame = pd.read_csv(
-            io.BytesIO(block), header=None, decimal=dialect.decimal,
+            io.BytesIO(block),
+            header=None,
+            decimal=dialect.decimal,
             sep=r"\s+" if dialect.separator == " " else dialect.separator,
-            usecols=sorted(set(indices)), keep_default_na=False,
+            usecols=sorted(set(indices)),
+            keep_default_na=False,
             dtype={k: np.dtype(object) if k in stamps else np.float64 for k in set(indices)},
             na_values={k: ["", "nan", "NaN"] for k in set(indices) - set(stamps)},
-            engine="c", **options,
-        )  # fmt: skip
+            engine="c",
+            **options,
+        )
     except (ValueError, OverflowError):  # the strict reader finds the cell, and says it better
         return None
     columns = []
@@ -329,9 +332,16 @@ def _with_marks(
     if is_split or _width(block, dialect) <= max(indices) or b'"' in block or b"_" in block:
         return None
     frame = pd.read_csv(
-        io.BytesIO(block), header=None, sep=dialect.separator, usecols=sorted(set(indices)),
-        dtype=object, keep_default_na=False, na_filter=False, engine="c", encoding_errors="replace",
-    )  # fmt: skip
+        io.BytesIO(block),
+        header=None,
+        sep=dialect.separator,
+        usecols=sorted(set(indices)),
+        dtype=object,
+        keep_default_na=False,
+        na_filter=False,
+        engine="c",
+        encoding_errors="replace",
+    )
     if len(frame) != block.count(b"\n") + (not block.endswith(b"\n")):
         return None
     found, columns = Seen(), []
@@ -405,9 +415,14 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
 
 
 FORMAT = FileFormat(
-    "csv", "a text table", (".csv", ".txt"), is_text, _open, _write,
+    "csv",
+    "a text table",
+    (".csv", ".txt"),
+    is_text,
+    _open,
+    _write,
     also_reads=(".lvm", ".vbo", ".asc", ".prn"),
-)  # fmt: skip
+)
 
 
 _GROWTH = 1.25

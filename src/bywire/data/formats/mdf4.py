@@ -67,20 +67,19 @@ class Mdf4Source:
                 c: channel.name if uses[channel.name] == 1 else f"{channel.name}@{g}"
                 for c, channel in enumerate(group.channels)
             }
-            reasons = {
-                c: _why_not(group.channels[c], group.channel_dependencies[c]) for c in every
-            }
+            reasons = {c: _why_not(group.channels[c], group.channel_dependencies[c]) for c in every}
             names = {c: name for c, name in every.items() if not reasons[c]}
             of_group = (
-                "its group holds no records" if not length
-                else "its group has no instants" if master not in names
-                else "its group counts no time" if not _is_time(group.channels[master])
+                "its group holds no records"
+                if not length
+                else "its group has no instants"
+                if master not in names
+                else "its group counts no time"
+                if not _is_time(group.channels[master])
                 else ""
-            )  # fmt: skip
+            )
             self.left_out |= {
-                name: of_group or reasons[c]
-                for c, name in every.items()
-                if of_group or reasons[c]
+                name: of_group or reasons[c] for c, name in every.items() if of_group or reasons[c]
             }
             if of_group:
                 continue
@@ -116,9 +115,7 @@ class Mdf4Source:
             signal = None if index == master else signals[index]
             numbers = instants if signal is None else signal.samples
             if numbers.ndim != 1 or numbers.dtype.kind not in "iufb":
-                raise FileError(
-                    f"{self._path}: channel {name!r} holds no numbers: leave it out"
-                )
+                raise FileError(f"{self._path}: channel {name!r} holds no numbers: leave it out")
             channel = self._channel(group, index)
             if signal is not None and _has_codes(channel):
                 numbers = self._without_codes(name, channel, numbers)
@@ -151,9 +148,7 @@ class Mdf4Source:
             )
         return dict(zip(indices, signals, strict=True))
 
-    def _without_codes(
-        self, name: str, channel: Any, raw: NDArray[Any]
-    ) -> NDArray[np.float64]:
+    def _without_codes(self, name: str, channel: Any, raw: NDArray[Any]) -> NDArray[np.float64]:
         """Return numbers with NaN where the file has a text for them, unless these are states."""
         texts: dict[str, NDArray[np.bool_]] = {}
         numbers = _converted(channel.conversion, raw, texts)
@@ -285,9 +280,12 @@ def _entries(conversion: Any, kind: int, raw: NDArray[Any]) -> Iterator[NDArray[
 
 
 def _fill(
-    block: Any, where: NDArray[np.bool_], raw: NDArray[Any], numbers: NDArray[np.float64],
+    block: Any,
+    where: NDArray[np.bool_],
+    raw: NDArray[Any],
+    numbers: NDArray[np.float64],
     texts: dict[str, NDArray[np.bool_]],
-) -> None:  # fmt: skip
+) -> None:
     """Convert the numbers of one entry, or note where its text stands for them."""
     if not block or not where.any():
         return
@@ -348,8 +346,14 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
 
 
 FORMAT = FileFormat(
-    "mdf4", "an MDF file", (".mf4", ".mdf", ".dat"),
-    lambda head: head[:3] == b"MDF" or head[:7] == b"UnFinMF", _open, _write,
-    has_many_axes=True, libraries=("asammdf",), counts=("record", 0),
+    "mdf4",
+    "an MDF file",
+    (".mf4", ".mdf", ".dat"),
+    lambda head: head[:3] == b"MDF" or head[:7] == b"UnFinMF",
+    _open,
+    _write,
+    has_many_axes=True,
+    libraries=("asammdf",),
+    counts=("record", 0),
     opening=60.0,  # of thousands of channels it reads every description
-)  # fmt: skip
+)
