@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import sys
 import threading
@@ -46,9 +47,28 @@ def _thread_count() -> int:
     return len(os.listdir("/proc/self/task"))
 
 
-# A new process begins as ``python -c``: a module in the working folder would run in place of one of
-# Python's own.
-_SAFE_PATH = "PYTHONSAFEPATH"
+# A new process, and the one of Python's that tidies up behind it, begin as ``python -c``: a module
+# in the working folder would run in place of one of Python's own. The other one complains on
+# standard error of what a killed command could not tidy up itself.
+_ENVIRONMENT = {
+    "PYTHONSAFEPATH": "1",
+    "PYTHONWARNINGS": "ignore:resource_tracker:UserWarning",
+}  # fmt: skip
+
+
+@contextmanager
+def _safe_environment() -> Iterator[None]:
+    """Have Python processes that start in this block begin safely, and in silence."""
+    before = {name: os.environ.get(name) for name in _ENVIRONMENT}
+    os.environ.update(_ENVIRONMENT)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
 
 
 class _WithoutMain(SpawnProcess):
@@ -64,16 +84,11 @@ class _WithoutMain(SpawnProcess):
         nameless = ModuleType("__main__")
         vars(nameless).update(vars(main), __spec__=None, __file__=None)
         sys.modules["__main__"] = nameless
-        path = os.environ.get(_SAFE_PATH)
-        os.environ[_SAFE_PATH] = "1"
         try:
-            super().start()
+            with _safe_environment():
+                super().start()
         finally:
             sys.modules["__main__"] = main
-            if path is None:
-                del os.environ[_SAFE_PATH]
-            else:
-                os.environ[_SAFE_PATH] = path
 
 
 class _Anew(SpawnContext):
@@ -100,10 +115,12 @@ def processes(
         Whether they are copies of this process, which begin with all that it has loaded and
         computed; others load what they need anew.
     """
-    pool = ProcessPoolExecutor(
-        count, get_context("fork") if is_copied else _Anew(), initializer=_begin,
-        initargs=(prepare, *arguments),
-    )  # fmt: skip
+    with nullcontext() if is_copied else _safe_environment():
+        pool = ProcessPoolExecutor(
+            count, get_context("fork") if is_copied else _Anew(), initializer=_begin,
+            initargs=(prepare, *arguments) if is_copied else
+            (_prepare, pickle.dumps((prepare, arguments))),
+        )  # fmt: skip
     workers: list[BaseProcess] = []
     is_over = threading.Event()
     watch = threading.Thread(target=_break_off, args=(pool, workers, is_over), daemon=True)
@@ -116,10 +133,11 @@ def processes(
         yield pool
     finally:  # at once, also after Ctrl-C: nobody waits for what they are at
         is_over.set()
-        for process in workers:
-            process.terminate()
-        pool.shutdown(wait=is_copied, cancel_futures=True)  # its threads, for the next copies
-        if is_copied and watch.ident is not None:
+        _end(pool)
+        # With its threads: the next copies must find none, and Python's own end would meet them
+        # while they close what it writes to.
+        pool.shutdown(wait=True, cancel_futures=True)
+        if watch.ident is not None:
             watch.join()
 
 
@@ -169,10 +187,19 @@ def _break_off(
     """
     wait([process.sentinel for process in workers])
     if not is_over.is_set():
-        for process in workers:
-            process.kill()
-        last_end: Connection = vars(pool._result_queue)["_writer"]
-        last_end.close()  # so that what waits for the rest learns that there is none
+        _end(pool)
+
+
+def _end(pool: ProcessPoolExecutor) -> None:
+    """End the processes of a pool, and have its thread learn that no more answers come."""
+    workers = [*(pool._processes or {}).values()]
+    for process in workers:
+        process.kill()
+    left = [process.sentinel for process in workers]
+    while left:
+        left = [each for each in left if each not in wait(left)]
+    last_end: Connection = vars(pool._result_queue)["_writer"]
+    last_end.close()
 
 
 @contextmanager
@@ -194,6 +221,12 @@ def _begin(prepare: Callable[..., object], *arguments: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     keep_one_thread()
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    prepare(*arguments)
+
+
+def _prepare(prepared: bytes) -> None:
+    """Prepare a process that loads all anew: only now, when it ends with its parent."""
+    prepare, arguments = pickle.loads(prepared)
     prepare(*arguments)
 
 
