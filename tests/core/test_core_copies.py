@@ -105,8 +105,57 @@ def test_copies_do_not_hear_an_interrupt_that_their_maker_hears():
         signal.signal(signal.SIGINT, before)
         _told.clear()
     assert time.monotonic() - begin < 10.0
-    assert copy.exitcode == -signal.SIGTERM
+    assert copy.exitcode == -signal.SIGKILL
     assert heard == [signal.SIGINT]
+
+
+LOADING = """
+import os, signal, sys
+from bywire.core.copies import processes
+
+class Slow:
+    def __reduce__(self):
+        import time
+        return time.sleep, (60.0,)
+
+with processes(2, print, Slow(), is_copied=False) as pool:
+    from multiprocessing import active_children
+    print(*[each.pid for each in active_children()], flush=True)
+    if sys.argv[1] == "loaded":
+        import time
+        time.sleep(3.0)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.parametrize("when", ["starting", "loaded"])
+def test_processes_that_still_load_end_when_their_maker_is_killed(when):
+    """In silence: Python's own process that tidies up behind them has nothing to complain of."""
+    done = subprocess.run(
+        [sys.executable, "-c", LOADING, when], capture_output=True, text=True, check=False,
+        timeout=50,
+    )  # fmt: skip
+    begun = [int(text) for text in done.stdout.split()]
+    assert len(begun) == 2
+    assert not any(map(_is_there, begun))  # they held the pipes until they ended
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize("name", ["multiprocessing", "pickle", "signal", "numpy"])
+def test_no_module_of_the_working_folder_runs_in_a_new_process(tmp_path, name):
+    (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'planted')!r}, 'w')\n")
+    program = tmp_path / "elsewhere" / "program.py"
+    program.parent.mkdir()
+    program.write_text(
+        "from bywire.core.copies import processes\n"
+        "with processes(1, list, is_copied=False) as pool:\n"
+        "    print(pool.submit(abs, -1).result())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, program], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (done.stdout, done.stderr) == ("1\n", "")
+    assert not (tmp_path / "planted").exists()
 
 
 def test_copies_end_when_their_maker_is_killed(tmp_path):

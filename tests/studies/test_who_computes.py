@@ -52,7 +52,7 @@ def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(
     until = time.monotonic() + 10.0  # the pool's own thread may wait for them too
     while any(each.exitcode is None for each in workers) and time.monotonic() < until:
         time.sleep(0.01)
-    assert {each.exitcode for each in workers} == {-signal.SIGTERM}
+    assert {each.exitcode for each in workers} == {-signal.SIGKILL}
 
 
 # A process of tests has threads; commands that are copied have none.

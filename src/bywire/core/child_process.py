@@ -82,10 +82,17 @@ def safe_start() -> Iterator[None]:
     """Have interpreters that are started within the block not look in the working folder.
 
     For `multiprocessing`, which starts workers, a server that forks, and a tracker of resources by
-    ``python -c``. Workers then take the path of this process.
+    ``python -c``. Workers then take the path of this process. The tracker would complain on
+    standard error of what a killed command could not tidy up itself.
     """
-    before = {name: os.environ.get(name) for name in (SAFE_PATH, "PYTHONPATH")}
-    os.environ.update({SAFE_PATH: "1", "PYTHONPATH": os.pathsep.join(import_path())})
+    quiet = "ignore:resource_tracker:UserWarning"
+    further = {
+        SAFE_PATH: "1",
+        "PYTHONPATH": os.pathsep.join(import_path()),
+        "PYTHONWARNINGS": ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), quiet))),
+    }
+    before = {name: os.environ.get(name) for name in further}
+    os.environ.update(further)
     try:
         yield
     finally:

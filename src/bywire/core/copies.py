@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import sys
 import threading
@@ -91,10 +92,12 @@ def processes(
         Whether they are copies of this process, which begin with all that it has loaded and
         computed; others load what they need anew.
     """
-    pool = ProcessPoolExecutor(
-        count, get_context("fork") if is_copied else _Anew(), initializer=_begin,
-        initargs=(prepare, *arguments),
-    )  # fmt: skip
+    with nullcontext() if is_copied else safe_start():
+        pool = ProcessPoolExecutor(
+            count, get_context("fork") if is_copied else _Anew(), initializer=_begin,
+            initargs=(prepare, *arguments) if is_copied else
+            (_prepare, pickle.dumps((prepare, arguments))),
+        )  # fmt: skip
     workers: list[BaseProcess] = []
     is_over = threading.Event()
     watch = threading.Thread(target=_break_off, args=(pool, workers, is_over), daemon=True)
@@ -107,10 +110,11 @@ def processes(
         yield pool
     finally:  # at once, also after Ctrl-C: nobody waits for what they are at
         is_over.set()
-        for process in workers:
-            process.terminate()
-        pool.shutdown(wait=is_copied, cancel_futures=True)  # its threads, for the next copies
-        if is_copied and watch.ident is not None:
+        _end(pool)
+        # With its threads: the next copies must find none, and Python's own end would meet them
+        # while they close what it writes to.
+        pool.shutdown(wait=True, cancel_futures=True)
+        if watch.ident is not None:
             watch.join()
 
 
@@ -160,10 +164,19 @@ def _break_off(
     """
     wait([process.sentinel for process in workers])
     if not is_over.is_set():
-        for process in workers:
-            process.kill()
-        last_end: Connection = vars(pool._result_queue)["_writer"]
-        last_end.close()  # so that what waits for the rest learns that there is none
+        _end(pool)
+
+
+def _end(pool: ProcessPoolExecutor) -> None:
+    """End the processes of a pool, and have its thread learn that no more answers come."""
+    workers = [*(pool._processes or {}).values()]
+    for process in workers:
+        process.kill()
+    left = [process.sentinel for process in workers]
+    while left:
+        left = [each for each in left if each not in wait(left)]
+    last_end: Connection = vars(pool._result_queue)["_writer"]
+    last_end.close()
 
 
 @contextmanager
@@ -185,6 +198,12 @@ def _begin(prepare: Callable[..., object], *arguments: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     keep_one_thread()
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    prepare(*arguments)
+
+
+def _prepare(prepared: bytes) -> None:
+    """Prepare a process that loads all anew: only now, when it ends with its parent."""
+    prepare, arguments = pickle.loads(prepared)
     prepare(*arguments)
 
 
