@@ -72,6 +72,20 @@ def test_any_values_give_what_the_bench_gives(pages, name, tmp_path):
 
 
 @needs_node
+def test_figures_of_a_brake_that_does_not_move_are_open_in_a_page_too(pages, tmp_path):
+    stuck = {"seal.T_pr": 5.0}
+    (answer,) = tried(pages["motorcycle"], tmp_path, {"kind": "run", "changes": stuck})
+    given = answer["answer"]["figures"]
+    result = run_once(BENCHES["motorcycle"].with_overrides(stuck))
+    for kpi in result.kpis:
+        assert given[kpi.name]["open"] == kpi.is_open, kpi.name
+    assert given["overshoot"]["open"]
+    assert "does not move" in given["overshoot"]["reason"]
+    (verdict,) = result.verdicts
+    assert verdict.outcome == "undecided"
+
+
+@needs_node
 def test_links_and_files_hold_what_was_moved(pages, tmp_path):
     page, changes = pages["motorcycle"], {"motor.R_m": 0.1 + 0.2, "seal.T_pr": 1.0 / 3e3}
     link, file = tried(
