@@ -15,7 +15,7 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of, zeros
 from bywire.core.typing import Array
-from bywire.simulation.run import Run
+from bywire.simulation.run import Run, stimulus_ranges
 
 STEP = 20e-6
 """substep [s] of the runs, or the next smaller one that divides the sample times"""
@@ -61,7 +61,7 @@ class Start:
         return self.period
 
     def run(self, share: float, duration: float = DURATION, record: float = 0.0) -> Run:
-        """Return a run in which every signal of the stimulus swings once.
+        """Return a run in which every signal of the stimulus swings once, within its range.
 
         Parameters
         ----------
@@ -76,7 +76,10 @@ class Start:
 
         def stimulus(t: Array) -> Array:
             wave = np.where(t < ACTIVE, np.sin(2.0 * np.pi / ACTIVE * t), 0.0)
-            return np.asarray(base + share * wave[:, None] * reach)
+            rows = np.asarray(base + share * wave[:, None] * reach)
+            for signal, low, high in stimulus_ranges(self.model):
+                rows[:, signal] = np.clip(rows[:, signal], low, high)
+            return rows
 
         return Run(
             self.model, self.par, self.state, self.memory, stimulus, duration, self.step,
