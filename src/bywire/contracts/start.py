@@ -61,7 +61,7 @@ class Start:
         return self.period
 
     def run(self, share: float, duration: float = DURATION, record: float = 0.0) -> Run:
-        """Return a run in which every signal of the stimulus swings once.
+        """Return a run in which every signal of the stimulus swings once, within its range.
 
         Parameters
         ----------

@@ -137,39 +137,46 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
 
 def signal_in(annotation: Any) -> Signal | None:
     """Return the Signal of an annotation, with the bounds that stand behind it; None for none."""
-    notes = getattr(annotation, "__metadata__", ())
-    signal = next((note for note in notes if isinstance(note, Signal)), None)
-    for note in notes if signal is not None else ():
-        if isinstance(note, (Gt, Ge)):
-            low: Any = note.gt if isinstance(note, Gt) else note.ge
-            signal = replace(signal, low=float(low))
-        elif isinstance(note, (Lt, Le)):
-            high: Any = note.lt if isinstance(note, Lt) else note.le
-            signal = replace(signal, high=float(high))
-    return signal
+    signal = next((n for n in _notes(annotation) if isinstance(n, Signal)), None)
+    if signal is None:
+        return None
+    low, high = _ends(annotation)
+    ends = max(low, signal.low), min(high, signal.high)
+    if ends == (signal.low, signal.high):
+        return signal
+    return replace(signal, low=ends[0], high=ends[1])
 
 
 @cache
 def ranges_of(tuple_type: type[NamedTuple]) -> dict[str, tuple[float, float]]:
-    """Return the admissible range of the signals that declare one, both ends included.
+    """Return the ranges that are declared beside a Signal, both ends included.
 
-    A field declares it beside its Signal: ``Annotated[float, Signal(...), Ge(0), Le(1)]``.
+    Controllers and runs take nothing beyond them.
+    ``Annotated[float, Signal(...), Ge(0), Le(1)]`` declares one. What a unit alone says, such as
+    that no gauge pressure is below the vacuum, is not part of it.
     """
-    found: dict[str, tuple[float, float]] = {}
-    for name, hint in typing.get_type_hints(tuple_type, include_extras=True).items():
-        low, high = -math.inf, math.inf
-        for note in getattr(hint, "__metadata__", ()):
-            if isinstance(note, Ge):
-                low = max(low, _number(note.ge))
-            elif isinstance(note, Gt):
-                low = max(low, math.nextafter(_number(note.gt), math.inf))
-            elif isinstance(note, Le):
-                high = min(high, _number(note.le))
-            elif isinstance(note, Lt):
-                high = min(high, math.nextafter(_number(note.lt), -math.inf))
-        if (low, high) != (-math.inf, math.inf):
-            found[name] = (low, high)
-    return found
+    hints = typing.get_type_hints(tuple_type, include_extras=True)
+    ends = {name: _ends(hint) for name, hint in hints.items()}
+    return {name: each for name, each in ends.items() if each != (-math.inf, math.inf)}
+
+
+def _notes(annotation: Any) -> tuple[Any, ...]:
+    return getattr(annotation, "__metadata__", ())
+
+
+def _ends(annotation: Any) -> tuple[float, float]:
+    """Return the bounds that stand in an annotation, both included."""
+    low, high = -math.inf, math.inf
+    for note in _notes(annotation):
+        if isinstance(note, Ge):
+            low = max(low, _number(note.ge))
+        elif isinstance(note, Gt):
+            low = max(low, math.nextafter(_number(note.gt), math.inf))
+        elif isinstance(note, Le):
+            high = min(high, _number(note.le))
+        elif isinstance(note, Lt):
+            high = min(high, math.nextafter(_number(note.lt), -math.inf))
+    return low, high
 
 
 @cache

@@ -199,6 +199,11 @@ def test_values_with_units_are_taken_and_an_invalid_field_marks_the_results(tab)
     assert (still["said"], still["isOld"]) == (refused["said"], True)
     mended = typed(tab, "motor.R_m", "0.4")
     assert (mended["said"], mended["isOld"], mended["hasNote"]) == ("", False, False)
+    typed(tab, "motor.R_m", "none")
+    tab.page.locator("#reset").click()
+    tab.page.wait_for_function(READY)
+    assert tab.page.evaluate(STATE)["said"] == ""
+    assert tab.page.locator("[aria-invalid=true]").count() == 0
     assert not tab.noise
 
 

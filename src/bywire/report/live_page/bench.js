@@ -26,6 +26,7 @@ function outdate(isLate = false) {
   const isInvalid = [...faults.keys()].some((where) => where.startsWith("field "));
   place("shown").classList.toggle("stale", isInvalid || isLate);
   place("stale").hidden = !(isInvalid && run);
+  place("reset").disabled = !isInvalid && Object.keys(changes()).length === 0;
 }
 
 /** Take away the results where there are none of these values. */
@@ -48,7 +49,7 @@ function describe() {
       return `${name} = ${digits(shownOf(value, parameter))} ${parameter.shownUnit}`.trim();
     }).join(", ")}`
     : "as in the bench";
-  place("reset").disabled = count === 0;
+  outdate();
   clearTimeout(moved);
   moved = setTimeout(address, REST); // browsers refuse more than some ten of these a second
 }
@@ -157,7 +158,7 @@ place("keep").addEventListener("click", () => {
   plots.draw(run, kept, values);
 });
 place("reset").addEventListener("click", () => {
-  for (const { name, start } of parameters) if (values[name] !== start) rows.get(name).show((values[name] = start));
+  for (const { name, start } of parameters) rows.get(name).show((values[name] = start)); // invalid fields too
   faults.clear();
   complain("");
   describe();
