@@ -117,7 +117,11 @@ TWO_SIDED = {
     "unstable plant, held": ([20 * TURN], [1, -10 * TURN], 1e-3, 0.5, 15.9207),
     "unstable plant": ([20 * TURN], [1, -10 * TURN], 0.0, 0.5, math.inf),
     "two integrators and two zeros, held": (
-        [40, 480, 1440], [1, 0, 0, 0], 1e-3, 0.0754446, 50.0001
+        [40, 480, 1440],
+        [1, 0, 0, 0],
+        1e-3,
+        0.0754446,
+        50.0001,
     ),
     "two integrators and two zeros": ([40, 480, 1440], [1, 0, 0, 0], 0.0, 0.075, math.inf),
     "three lags": ([4], [1, 3, 3, 1], 0.0, 0.0, 2.0),

@@ -199,12 +199,15 @@ WITHOUT_GAIN = tuple(
 @pytest.mark.parametrize(
     ("command", "rest"),
     [
-        ("margins", ()), ("linearize", ()), ("agreement", ()), ("frequency-response", ()),
+        ("margins", ()),
+        ("linearize", ()),
+        ("agreement", ()),
+        ("frequency-response", ()),
         ("design", ("--require", "bandwidth >= 1 Hz", "--linear-only")),
         ("margins", ("--over", "at=20 bar, 10 bar")),
         ("linearize", ("--locus", "motor.R_m=0.2 ohm:0.4 ohm:2")),
     ],
-)  # fmt: skip
+)
 def test_every_linear_model_names_the_operation_on_its_corner(bywire, command, rest):
     outcome = bywire(command, "pressure", *SENSOR_ON_ITS_CORNER, *rest)
     refused(outcome, "plant/pressure_sensor.py:", "return ops.clip(", "--side above")
@@ -236,8 +239,16 @@ def test_a_loop_without_gain_is_reported_as_none(bywire, tmp_path):
     over = ("--over", "ecu.pressure.k_p=0 A/Pa:1e-5 A/Pa:2")
     ranged = bywire("margins", "pressure", *WITHOUT_GAIN, *over, "--out", tmp_path / "b")
     assert "no loop at 1 of 2 values of ecu.pressure.k_p (0 A/Pa)" in ranged.out
-    design = ("design", "pressure", *WITHOUT_GAIN, "--require", "phase margin >= 30 deg",
-              "--linear-only", "--out", tmp_path / "c")  # fmt: skip
+    design = (
+        "design",
+        "pressure",
+        *WITHOUT_GAIN,
+        "--require",
+        "phase margin >= 30 deg",
+        "--linear-only",
+        "--out",
+        tmp_path / "c",
+    )
     outcome = bywire(*design)
     assert outcome.status == 1
     assert "no loop: the loop gain is 0 at all frequencies, at nominal" in outcome.out

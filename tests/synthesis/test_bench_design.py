@@ -190,12 +190,12 @@ def test_a_verdict_says_where_it_was_computed() -> None:
         return verdict_text(wanted, tried), lines
 
     text, lines = verdict(small)
-    assert text == (
-        "requirements: 1 met on the nonlinear bench, 2 met on the linear model alone"
-    )
+    assert text == ("requirements: 1 met on the nonlinear bench, 2 met on the linear model alone")
     assert [line.partition(":")[0] for line in lines] == [
-        "on the bench", "on the linear model", "on the linear model",
-    ]  # fmt: skip
+        "on the bench",
+        "on the linear model",
+        "on the linear model",
+    ]
     text, lines = verdict(small, replace(small, phase_margin=70.0, crossover=3.0))
     assert lines[1].startswith("on the bench and the linear model (1 of 2 sines show it): phase")
     text, _ = verdict(small, missed="gain_margin >= 2")

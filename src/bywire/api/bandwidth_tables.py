@@ -39,8 +39,15 @@ def _title(flag: str) -> str:
 def figures_table(response: xr.Dataset, unit: str) -> Table:
     """Return bandwidth, crossover, margins and limits of the first variant by amplitude."""
     known = shares(response)
-    heading = ["amplitude", "bandwidth", "crossover", "phase margin", "gain margin",
-               "lower gain margin", *known.values()]  # fmt: skip
+    heading = [
+        "amplitude",
+        "bandwidth",
+        "crossover",
+        "phase margin",
+        "gain margin",
+        "lower gain margin",
+        *known.values(),
+    ]
     rows = []
     for j, size in enumerate(response["amplitude"].values):
         case = response.isel(variant=0, amplitude=j)

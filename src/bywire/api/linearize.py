@@ -86,9 +86,7 @@ def linearize(
             raise ParameterError("--reduce and --locus exclude each other: ask for one of them")
         if locus:
             return plant_locus(name, parameters, at, overrides, friction, speed, locus, side)
-        return linearize_plant(
-            name, parameters, at, overrides, friction, speed, reduce, side
-        )
+        return linearize_plant(name, parameters, at, overrides, friction, speed, reduce, side)
     case = _loop_case(name, parameters, at, overrides, friction, speed, side)
     model = case.loop.closed(case.par, case.value)
     dithered = _dithered(case) if dither else None

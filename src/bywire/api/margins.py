@@ -152,8 +152,14 @@ class Margins(Answer):
             text = NO_LOOP if state == "no loop" else state
             return Banner(text, "good" if state == "stable" else "bad")
         lost = [(states.count(state), state) for state in ("unstable", "no loop")]
-        texts = [f"{count} of {len(states)} {words}" for count, words in (
-            (lost[0][0], "loops unstable"), (lost[1][0], "values without a loop")) if count]
+        texts = [
+            f"{count} of {len(states)} {words}"
+            for count, words in (
+                (lost[0][0], "loops unstable"),
+                (lost[1][0], "values without a loop"),
+            )
+            if count
+        ]
         if texts:
             return Banner(", ".join(texts), "bad")
         return Banner("stable over the whole range", "good")

@@ -23,6 +23,7 @@ from bywire.analysis.linear.corners import (
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import Friction, free_signals, linearize, smooth_point
 from bywire.analysis.linear.smooth_functions import SmoothPoint
+from bywire.analysis.loop import LOOPS
 from bywire.contracts.evidence import Evidence, NotCheckedError, measured
 from bywire.contracts.probe import states
 from bywire.contracts.trial import Trial
@@ -42,12 +43,15 @@ AT_REST = 1e-3
 def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
     """Find whether the linear model of the plant gives its response to small moves.
 
+    Loops of the model are not on a corner at their usual operating point.
+
     Without dry friction where the start is an equilibrium of the smooth equations; else with what
     has friction held fast.
     """
     start = trial.start
     try:
         linear, removed = _linear(trial)
+        _require_loops_off_corners(trial)
     except CornerError as error:
         yield Evidence(False, f"at {start.known}: {error}", place=trial.place("balance", "wire"))
         return
@@ -76,6 +80,18 @@ def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
         yield measured(off, MISMATCH, text, place)
     if not moving:
         raise NotCheckedError(f"from {start.known} the controllers move no state")
+
+
+def _require_loops_off_corners(trial: Trial) -> None:
+    """Refuse loops of the model whose usual operating point is on a corner of plant or law."""
+    for loop in LOOPS.all().values():
+        if loop.assembly == trial.model.name:
+            try:
+                loop.gain_and_closed(trial.start.par, loop.at.default)
+            except CornerError:
+                raise
+            except InputError:  # a loop of other choices
+                continue
 
 
 def _linear(trial: Trial) -> tuple[LinearModel, bool]:
@@ -169,10 +185,12 @@ def _driven(
 
 
 def _with_its_contacts(at: SmoothPoint) -> SmoothPoint | None:
-    """Return a point with the contacts that are closed there; None where one just touches."""
+    """Return a point with its closed contacts; None where one touches, or a limit is reached."""
     model = at.model
     state = cast(NamedTuple, cast(Any, model.State)(*at.state.tolist()))
     memory = cast(NamedTuple, cast(Any, model.Memory)(*at.memory.tolist()))
+    if any(getattr(state, name) <= 0.0 for name in model.limits):
+        return None
     try:
         return smooth_point(model, at.par, (state, memory, None))
     except InputError:

@@ -65,10 +65,17 @@ FIGURES: Mapping[str, Kind] = {
 """figures that can be required"""
 
 
-LESS_IS_BETTER = frozenset({
-    "lower_gain_margin", "sensitivity_peak", "complementary_peak", "noise_gain", "overshoot",
-    "settling_time", "steady_state_error",
-})  # fmt: skip
+LESS_IS_BETTER = frozenset(
+    {
+        "lower_gain_margin",
+        "sensitivity_peak",
+        "complementary_peak",
+        "noise_gain",
+        "overshoot",
+        "settling_time",
+        "steady_state_error",
+    }
+)
 """figures of which a smaller value is better"""
 
 

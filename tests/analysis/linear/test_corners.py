@@ -161,9 +161,14 @@ def test_sides_are_read_from_text() -> None:
 def test_a_stimulus_of_the_loop_is_its_own_input() -> None:
     with taking("above"):
         found = closed_loop(
-            BentLag(control=lambda e: fmax(e, 0.0)), LAG, State(0.0), Memory(0.0, 0.0),
-            inputs=("wanted",), outputs=("y",), stimulus=Stimulus(0.0),
-        )  # fmt: skip
+            BentLag(control=lambda e: fmax(e, 0.0)),
+            LAG,
+            State(0.0),
+            Memory(0.0, 0.0),
+            inputs=("wanted",),
+            outputs=("y",),
+            stimulus=Stimulus(0.0),
+        )
     assert found.B[2, 0] == pytest.approx(LAG.k)
 
 
@@ -171,3 +176,18 @@ def test_functions_of_a_model_that_is_gone_are_not_those_of_the_next() -> None:
     """Python gives a new law the identity of one that is no longer there."""
     for factor in range(1, 21):
         assert slope(lambda y, k=factor: k * y) == pytest.approx(factor)
+
+
+def test_a_one_sided_limit_that_is_reached_is_a_corner() -> None:
+    class Stopped(BentLag):
+        limits = ("y",)
+
+    at = (LAG, State(0.0), Memory(0.0, 0.0))
+    with pytest.raises(CornerError, match="y is on its one-sided limit"):
+        linearize(Stopped(), *at, inputs=("drive",), outputs=("y",))
+    with taking("above"):
+        model = linearize(Stopped(), *at, inputs=("drive",), outputs=("y",))
+    assert model.A[0, 0] == -1.0 / LAG.tau
+    assert model.corners == ("above the limit of y",)
+    away = (LAG, State(1.0), Memory(0.0, 1.0))
+    assert linearize(Stopped(), *away, inputs=("drive",), outputs=("y",)).corners == ()

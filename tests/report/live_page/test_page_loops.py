@@ -16,8 +16,15 @@ from bywire.export.loop_source import loop_source
 SAME = 1e-9
 CANCELED = 1e-12  # of a loop gain, beside the 1 that matters
 NAMES = {
-    "gain", "lower_gain", "phase", "crossover", "delay", "disk", "sensitivity", "complementary",
-}  # fmt: skip
+    "gain",
+    "lower_gain",
+    "phase",
+    "crossover",
+    "delay",
+    "disk",
+    "sensitivity",
+    "complementary",
+}
 BENCH_OF = {
     "pressure": (BENCHES["motorcycle"], VARIED["motorcycle"]),
     "moment": (BENCHES["wedge"], (*VARIED["wedge"], "flywheel.Omega_0")),

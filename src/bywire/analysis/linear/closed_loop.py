@@ -66,10 +66,15 @@ def closed_loop(
         When a name is unknown.
     """
     return sampled_models(
-        model, par, (state, memory, stimulus),
+        model,
+        par,
+        (state, memory, stimulus),
         lambda system: (closed_again(model, system, inputs),),
-        inputs=inputs, outputs=outputs, locked=locked, step=step,
-    )[0]  # fmt: skip
+        inputs=inputs,
+        outputs=outputs,
+        locked=locked,
+        step=step,
+    )[0]
 
 
 def closed_again(model: Model, system: SampledSystem, inputs: Sequence[str]) -> LinearModel:

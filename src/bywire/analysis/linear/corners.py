@@ -23,7 +23,6 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-import bywire
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.smooth_functions import SmoothPoint, equations
 from bywire.core import elementary, ops
@@ -39,6 +38,7 @@ REACH = 1e-9
 points are solved to 1e-10 of these, so that nobody can say on which side of a nearer corner they
 are; and what is smooth changes by as little over such a distance"""
 _FINER = 1.0 / 4.0  # what is smooth differs by a quarter at a quarter of the distance
+_LASTING = 0.4  # of a difference: what is left of it nearby where it is none of smooth equations
 _SAME = 1e-6  # of an entry of a Jacobian: what differs by no more is compared no further
 _SMALL = 1e-8  # of the largest entry in its row, each by a usual magnitude: the same
 _EQUAL = 1e-5  # of a response: models that differ by no more are one
@@ -209,7 +209,7 @@ def magnitudes(point: SmoothPoint) -> Array:
         if direction:
             k = model.State._fields.index(name)
             usual[k] = min(usual[k], 0.5 * values[k] / REACH)
-    return usual
+    return np.asarray(usual)
 
 
 def beside_point(point: SmoothPoint, free: NDArray[np.bool_]) -> Array:
@@ -262,9 +262,7 @@ def _evaluate(point: SmoothPoint, numbers: list[Any], outputs: bool, ticks: bool
     stimulus = cast(Any, model.Stimulus)(*numbers[n + m :])
     gaps = [d for group in model.gap(x, x, par) for d in group]
     contact = tuple(sum(k * d for k, d in zip(row, gaps, strict=True)) for row in point.K)
-    equations(
-        model, par, (x, held), contact, point.directions, point.moving, outputs=outputs
-    )
+    equations(model, par, (x, held), contact, point.directions, point.moving, outputs=outputs)
     for task in model.tasks(par) if ticks else ():
         task.tick(x, held, stimulus, par)
 
@@ -281,8 +279,28 @@ def linear_models(of: Linearization) -> tuple[LinearModel, ...]:
     CornerError
         When the point lies on a corner whose sides have different models, and no side is stated.
     """
+    limits = _limits_reached(of)
+    if limits and _STATED.get().usual != ABOVE:
+        names = ", ".join(limits)
+        raise CornerError(
+            f"{of.point.model.name}: at the operating point {names} is on its one-sided limit, and "
+            "cannot fall. Choose another operating point, or take the model of motions that rise: "
+            "--side above"
+        )
     corner = _Corner(of)
-    return corner.models() if corner.is_near() else of.models(of.point)
+    models = corner.chosen() if corner.is_near() else of.models(of.point)
+    texts = tuple(f"above the limit of {name}" for name in limits)
+    return tuple(replace(each, corners=texts + each.corners) for each in models)
+
+
+def _limits_reached(of: Linearization) -> list[str]:
+    """Return the free states that are on their one-sided limits, at 0."""
+    point = of.point
+    fields, usual = point.model.State._fields, magnitudes(point)
+    places = {name: fields.index(name) for name in point.model.limits}
+    return [
+        name for name, k in places.items() if of.free[k] and point.state[k] <= REACH * usual[k]
+    ]
 
 
 class _Corner:
@@ -293,30 +311,35 @@ class _Corner:
         self.usual = magnitudes(of.point)[of.free]
         generic = _generic(int(of.free.sum()))
         self.generic = [*generic, *-generic]
-        self.known: dict[tuple[bytes, float], Jacobians] = {}
+        self.here = np.zeros(self.usual.size)
+        self.known: dict[bytes, Jacobians] = {}
 
-    def moved(self, direction: Array, share: float = 1.0) -> SmoothPoint:
+    def moved(self, direction: Array) -> SmoothPoint:
         """Return the point beside the operating point."""
         by = np.zeros(self.of.free.size)
-        by[self.of.free] = share * REACH * direction * self.usual
+        by[self.of.free] = REACH * direction * self.usual
         return self.of.point.moved(by)
 
-    def jacobians(self, direction: Array, share: float = 1.0) -> Jacobians:
-        key = (direction.tobytes(), share)
+    def jacobians(self, direction: Array) -> Jacobians:
+        """Return the numbers of the linear model beside the operating point."""
+        key = direction.tobytes()
         if key not in self.known:
-            self.known[key] = self.of.jacobians(self.moved(direction, share))
+            self.known[key] = self.of.jacobians(self.moved(direction))
         return self.known[key]
+
+    def models(self, direction: Array) -> tuple[LinearModel, ...]:
+        """Return the linear models beside the operating point."""
+        return self.of.models(self.moved(direction))
 
     def is_near(self) -> bool:
         """Return whether anything breaks between the point and its surroundings."""
-        here = np.zeros(self.usual.size)
-        if not here.size:
+        if not self.here.size:
             return False
         first, _, opposite, _ = self.generic
-        return self.breaks(first, opposite) or self.breaks(first, here)
+        return self.breaks(first, opposite, self.here) or self.breaks(first, self.here, self.here)
 
-    def breaks(self, one: Array, other: Array) -> bool:
-        """Return whether slopes differ between two directions however near, or values jump."""
+    def breaks(self, one: Array, other: Array, middle: Array) -> bool:
+        """Return whether slopes differ at two places however near to a middle, or values jump."""
         a, b = self.jacobians(one), self.jacobians(other)
         if not (np.isfinite(a.slopes).all() and np.isfinite(b.slopes).all()):
             return True
@@ -327,8 +350,21 @@ class _Corner:
         seen = apart > np.maximum(_SAME * size, _SMALL * size.max(axis=1, keepdims=True))
         if not seen.any():
             return False
-        near, far = self.jacobians(one, _FINER), self.jacobians(other, _FINER)
-        return bool((np.abs(near.slopes - far.slopes) > 0.5 * apart)[seen].any())
+        a, b = (self.jacobians(middle + _FINER * (each - middle)) for each in (one, other))
+        return bool((np.abs(a.slopes - b.slopes) > _LASTING * apart)[seen].any())
+
+    def differ(self, one: Array, other: Array, middle: Array) -> bool:
+        """Return whether models answer differently at two places however near to a middle."""
+        pairs = [*zip(self.models(one), self.models(other), strict=True)]
+        seen = [_apart(*pair) for pair in pairs]
+        if not any((apart > least).any() for apart, least in seen):
+            return False
+        a, b = (self.models(middle + _FINER * (each - middle)) for each in (one, other))
+        nearer = [_apart(*pair)[0] for pair in zip(a, b, strict=True)]
+        return any(
+            bool((near > _LASTING * apart)[apart > least].any())
+            for near, (apart, least) in zip(nearer, seen, strict=True)
+        )
 
     def jumps(self, a: Jacobians, b: Jacobians) -> tuple[str, ...]:
         """Return the names of the rows whose values jump between two points."""
@@ -337,9 +373,10 @@ class _Corner:
         jump = np.abs(a.values - b.values) > 4.0 * REACH * slopes + rounding
         return tuple(a.names[k] or "an output" for k in np.flatnonzero(jump))
 
-    def models(self) -> tuple[LinearModel, ...]:
+    def chosen(self) -> tuple[LinearModel, ...]:
         """Return the models of the stated side, or those of all sides where they agree."""
-        sides, found = _STATED.get(), {}
+        sides = _STATED.get()
+        found: dict[str, Kink] = {}
         for direction in self.generic:
             found |= {each.place: each for each in self.kinks(direction)}
         if not found:
@@ -351,13 +388,14 @@ class _Corner:
 
     def agreed(self) -> tuple[LinearModel, ...]:
         """Return the model that all sides have in common."""
-        first, *others = (self.of.models(self.moved(each)) for each in self.generic)
-        finite = all(np.isfinite(model.A).all() and np.isfinite(model.D).all() for model in first)
-        if not finite or any(_differ(first, each) for each in others):
+        first, *others = self.generic
+        found = self.models(first)
+        finite = all(np.isfinite(model.A).all() and np.isfinite(model.D).all() for model in found)
+        if not finite or any(self.differ(first, each, self.here) for each in others):
             raise CornerError(self.refusal(()))
-        here = self.of.jacobians(self.of.point)
-        at = self.of.models(self.of.point) if np.isfinite(here.slopes).all() else None
-        return first if at is None or _differ(first, at) else at
+        if not np.isfinite(self.jacobians(self.here).slopes).all():
+            return found
+        return found if self.differ(first, self.here, self.here) else self.models(self.here)
 
     def taken(self, sides: Sides) -> tuple[LinearModel, ...]:
         """Return the models on the stated sides; of corners that exclude each other, the first."""
@@ -377,19 +415,20 @@ class _Corner:
             direction = moved
         kinks = self.kinks(direction)
         texts = tuple(dict.fromkeys(f"{each.side} the corner of {each.place}" for each in kinks))
-        return tuple(
-            replace(model, corners=texts) for model in self.of.models(self.moved(direction))
-        )
+        return tuple(replace(model, corners=texts) for model in self.models(direction))
 
     def kinks(self, direction: Array) -> list[Kink]:
         """Return the operations whose corner, crossed near a direction, changes the models."""
-        known: dict[bytes, bool] = {}
+        known: dict[tuple[bytes, float], bool] = {}
         return [each for each in self.near(direction) if self._matters(each, direction, known)]
 
-    def _matters(self, kink: Kink, direction: Array, known: dict[bytes, bool]) -> bool:
+    def _matters(
+        self, kink: Kink, direction: Array, known: dict[tuple[bytes, float], bool]
+    ) -> bool:
         """Return `matters`, which is one for all operations that test the same quantity."""
-        c = kink.slope / kink.slope[np.abs(kink.slope).argmax()]
-        key = c.round(9).tobytes()
+        largest = kink.slope[np.abs(kink.slope).argmax()]
+        away = round(self.offset(kink, direction) / float(largest), 6)
+        key = ((kink.slope / largest).round(9).tobytes(), away)
         if key not in known:
             known[key] = self.matters(kink, direction)
         return known[key]
@@ -401,25 +440,25 @@ class _Corner:
         missing = c @ direction + self.offset(kink, direction) / largest
         along = direction - c * missing / (c @ c)  # right on the corner
         one, other = along + _ACROSS * c, along - _ACROSS * c
-        if not self.breaks(one, other):
+        if not self.breaks(one, other, along):
             return False
-        above, below = (self.of.models(self.moved(each)) for each in (one, other))
-        if _differ(above, below):
+        if self.differ(one, other, along):
             return True
         jumping = self.jumps(self.jacobians(one), self.jacobians(other))
-        felt = {name for model in above for name in _felt(model)}
+        felt = {name for model in self.models(one) for name in _felt(model)}
         return any(name in felt or name == "an output" for name in jumping)
 
     def near(self, direction: Array) -> list[Kink]:
         """Return the operations with a corner near the point, as a displaced point shows them."""
         usual = magnitudes(self.of.point)
         kinks = kinks_at(
-            self.moved(direction), self.of.free, usual,
-            outputs=self.of.outputs, ticks=self.of.ticks,
+            self.moved(direction),
+            self.of.free,
+            usual,
+            outputs=self.of.outputs,
+            ticks=self.of.ticks,
         )
-        return [
-            each for each in kinks if abs(self.offset(each, direction)) <= _size(each.slope)
-        ]
+        return [each for each in kinks if abs(self.offset(each, direction)) <= _size(each.slope)]
 
     def offset(self, kink: Kink, direction: Array) -> float:
         """Return the excess at the operating point itself, over the reach."""
@@ -456,44 +495,42 @@ def _direction(rows: Sequence[tuple[Array, float, float]], generic: Array) -> Ar
         cost = np.zeros(n + 1)
         cost[-1] = -1.0
         answer = linprog(cost, limits, beyond, bounds=[(-1.0, 1.0)] * (n + 1))
-        least = -answer.fun if answer.success else 0.0
+        if not answer.success:
+            continue
+        *_, least = solution = np.asarray(answer.x)
         if least > 1e-6:
             # A little of the generic one, so that no other corner is met by chance.
-            best = answer.x[:n] + 0.3 * min(least, 1.0) * generic
+            best = solution[:n] + 0.3 * min(float(least), 1.0) * generic
             kept, offsets = tried, beyond
     return np.asarray(best)
 
 
-def _differ(ones: Sequence[LinearModel], others: Sequence[LinearModel]) -> bool:
-    return any(_unlike(*pair) for pair in zip(ones, others, strict=True))
-
-
-def _unlike(one: LinearModel, other: LinearModel) -> bool:
-    """Return whether two models answer differently, or have other poles where nothing answers."""
+def _apart(one: LinearModel, other: LinearModel) -> tuple[Array, Array]:
+    """Return how far responses are apart, and what counts as equal; matrices without an answer."""
     if not one.inputs or not one.outputs:
-        entries = ((one.A, other.A), (one.B, other.B))
-        return not all(np.allclose(a, b, _EQUAL, 0.0) for a, b in entries)
-    rates = np.abs(np.concatenate([one.poles(), other.poles()]))
+        a, b = (np.hstack([model.A, model.B]) for model in (one, other))
+        return np.abs(a - b), _EQUAL * np.maximum(np.abs(a), np.abs(b))
     if one.period:
         highest = one.nyquist
         lowest = 1e-5 * highest
     else:
+        rates = np.abs(np.concatenate([one.poles(), other.poles()]))
         moving = rates[(rates > 0.0) & np.isfinite(rates)] / (2.0 * np.pi)
         highest, lowest = (moving.max() * 10.0, moving.min() / 10.0) if moving.size else (1.0, 1e-3)
     f = np.geomspace(lowest, highest, _FREQUENCIES) * 0.997
-    a, b = one.response(f), other.response(f)
-    size = np.maximum(np.abs(a), np.abs(b))
+    first, second = one.response(f), other.response(f)
+    size = np.maximum(np.abs(first), np.abs(second))
     rounding = 1e-10 * size.max(axis=0, keepdims=True)
-    return not bool(np.all(np.abs(a - b) <= _EQUAL * size + rounding))
+    return np.abs(first - second), _EQUAL * size + rounding
 
 
 def _felt(model: LinearModel) -> tuple[str, ...]:
     """Return the states that an output feels, sooner or later; all where there is no output."""
     if not model.outputs:
         return model.states
-    reached = model.C.any(axis=0)
+    reached = np.asarray(model.C.any(axis=0))
     for _ in model.states:
-        reached = reached | (model.A[reached] != 0.0).any(axis=0)
+        reached = np.asarray(reached | (model.A[reached] != 0.0).any(axis=0))
     return tuple(name for name, kept in zip(model.states, reached, strict=True) if kept)
 
 
@@ -523,7 +560,7 @@ def _place() -> tuple[str, str]:
 @lru_cache(maxsize=1024)
 def _shown_file(name: str) -> str:
     path = Path(name)
-    package = Path(bywire.__file__).parent.parent
+    package = Path(_OPS_FILE).parents[2]
     for folder in (Path.cwd(), package):
         if path.is_relative_to(folder) and "site-packages" not in path.relative_to(folder).parts:
             path = path.relative_to(folder)
@@ -552,7 +589,7 @@ class _Number:
         return _Number(self.value - _value(other), self.slope - _slope(other), self.watch)
 
     def __rsub__(self, other: Any) -> _Number:
-        return -(self - other)
+        return _as_number(other, self) - self
 
     def __mul__(self, other: Any) -> _Number:
         b = _value(other)
@@ -572,7 +609,7 @@ class _Number:
 
     def __pow__(self, exponent: Any) -> _Number:
         if isinstance(exponent, _Number):
-            return cast(_Number, ops.exp(exponent * ops.log(self)))  # type: ignore[operator, arg-type]
+            return cast(_Number, ops.exp(exponent * ops.log(self)))  # type: ignore[arg-type]
         if exponent != int(exponent):
             self.watch.see(self.value, self.slope, 0.0)
         with np.errstate(all="ignore"):
@@ -581,7 +618,7 @@ class _Number:
         return self._chain(value, factor)
 
     def __rpow__(self, base: Any) -> _Number:
-        return cast(_Number, ops.exp(self * ops.log(base)))  # type: ignore[operator, arg-type]
+        return cast(_Number, ops.exp(self * ops.log(base)))  # type: ignore[arg-type]
 
     def __neg__(self) -> _Number:
         return self._chain(-self.value, -1.0)
@@ -597,7 +634,7 @@ class _Number:
         return cast(_Number, self / other)._floor()
 
     def __mod__(self, other: Any) -> _Number:
-        return self - other * (self // other)
+        return cast(_Number, self - (self // other) * other)
 
     def __lt__(self, other: Any) -> _Choice:
         return self._compared(operator.lt, other)

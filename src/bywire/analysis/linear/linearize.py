@@ -86,13 +86,14 @@ def linearize(
     free = free_signals(point, model.State._fields, inputs, ())
     return linear_models(
         Linearization(
-            point, free,
+            point,
+            free,
             lambda at: jacobians(at, at.plant(), outputs, free),
             lambda at: (plant_model(at, inputs, outputs),),
             outputs=bool(outputs),
             ticks=False,
         )
-    )[0]  # fmt: skip
+    )[0]
 
 
 def smooth_point(
@@ -157,9 +158,7 @@ def jacobians(
     return Jacobians(slopes, np.concatenate(values), tuple(names))
 
 
-def plant_model(
-    point: SmoothPoint, inputs: Sequence[str], outputs: Sequence[str]
-) -> LinearModel:
+def plant_model(point: SmoothPoint, inputs: Sequence[str], outputs: Sequence[str]) -> LinearModel:
     """Return the Jacobians of the smooth part at a point, which may lie on a corner."""
     model = point.model
     A, B, C, D, rate, _ = point.plant()

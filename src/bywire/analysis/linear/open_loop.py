@@ -58,9 +58,12 @@ def open_loop(
         As `bywire.analysis.linear.linearize.linearize`.
     """
     return sampled_models(
-        model, par, (state, memory, stimulus), lambda system: (cut_open(model, system, cut),),
+        model,
+        par,
+        (state, memory, stimulus),
+        lambda system: (cut_open(model, system, cut),),
         locked=locked,
-    )[0]  # fmt: skip
+    )[0]
 
 
 def cut_open(model: Model, system: SampledSystem, cut: str) -> LinearModel:

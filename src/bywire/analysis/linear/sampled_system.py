@@ -126,7 +126,7 @@ def sampled_models(
     free = free_signals(at, states, model.Memory._fields, inputs)
     functions = smooth_functions(model, par)
     reads = tuple(_named(model.State._fields, row) for row in functions.reads)
-    takes = _named(model.Memory._fields, functions.driven[1].any(axis=0))
+    takes = _named(model.Memory._fields, np.asarray(functions.driven[1].any(axis=0)))
     periods = {task.name: task.period for task in tasks}
     frame, every = frames_of([*periods.values()])
 
@@ -146,13 +146,14 @@ def sampled_models(
 
     return linear_models(
         Linearization(
-            at, free,
+            at,
+            free,
             lambda at: jacobians(at, at.plant(), outputs, free, at.ticks()),
             lambda at: build(system(at)),
             outputs=bool(outputs),
             ticks=True,
         )
-    )  # fmt: skip
+    )
 
 
 def _named(names: Sequence[str], chosen: NDArray[np.bool_]) -> frozenset[str]:

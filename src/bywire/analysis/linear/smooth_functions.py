@@ -104,7 +104,7 @@ def _build(model: Model, par: ParameterSet) -> SmoothFunctions:
         stimulus = cast(Any, model.Stimulus)(*_split(u))
         renewed = ca.vertcat(*task.tick(at, held, stimulus, symbolic))
         parts = [ca.jacobian(renewed, by) for by in (x, m, u)]
-        reads.append(_pattern(parts[0]).any(axis=0))
+        reads.append(np.asarray(_pattern(parts[0]).any(axis=0)))
         results = [ca.densify(each) for each in (*parts, renewed)]
         ticks.append(ca.Function(f"tick_{k}", [x, m, u, p], results))
     groups = [C for C in model.compliance(symbolic) if C]
@@ -228,16 +228,22 @@ class SmoothPoint:
         """Return the point displaced in state, memory and stimulus, in a row."""
         n, m = self.state.size, self.memory.size
         return replace(
-            self, state=self.state + by[:n], memory=self.memory + by[n : n + m],
+            self,
+            state=self.state + by[:n],
+            memory=self.memory + by[n : n + m],
             stimulus=self.stimulus + by[n + m :],
-        )  # fmt: skip
+        )
 
     def plant(self) -> list[Array]:
         """Return A, B, C, D, rate and y; by all of the Memory and for all of the Output."""
         return smooth_functions(self.model, self.par).plant_at(
-            self.state, self.memory, vector(self.par), self.K.ravel(order="F"), self.directions,
+            self.state,
+            self.memory,
+            vector(self.par),
+            self.K.ravel(order="F"),
+            self.directions,
             self.moving,
-        )  # fmt: skip
+        )
 
     def ticks(self) -> list[list[Array]]:
         """Return of each task its Jacobians by state, memory and stimulus, and the new memory."""

@@ -139,10 +139,12 @@ def width(variant: Variant, response: xr.Dataset) -> Width:
     margin, factors = measured_margin(f[known], L), gain_factors(f[known], L)
     upper, lower = upper_factor(factors), lower_factor(factors)
     return Width(
-        bandwidth, margin.crossover, margin.phase,
+        bandwidth,
+        margin.crossover,
+        margin.phase,
         upper.factor if math.isfinite(upper.frequency) else math.nan,
         lower.factor if math.isfinite(lower.frequency) else math.nan,
-    )  # fmt: skip
+    )
 
 
 def widths(variants: Sequence[Variant], response: xr.Dataset) -> list[list[Width]]:
@@ -157,9 +159,12 @@ def widths(variants: Sequence[Variant], response: xr.Dataset) -> list[list[Width
 def with_widths(response: xr.Dataset, figures: Sequence[Sequence[Width]]) -> xr.Dataset:
     """Return a response with its figures by variant and amplitude, see `Width`."""
     units = {
-        "bandwidth": "Hz", "crossover": "Hz", "phase_margin": "degree", "gain_margin": "1",
+        "bandwidth": "Hz",
+        "crossover": "Hz",
+        "phase_margin": "degree",
+        "gain_margin": "1",
         "lower_gain_margin": "1",
-    }  # fmt: skip
+    }
     rows = {
         name: [[getattr(figure, name) for figure in row] for row in figures] for name in units
     }

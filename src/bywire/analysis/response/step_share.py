@@ -7,8 +7,15 @@ import xarray as xr
 
 from bywire.core.typing import Array
 
-FIGURES = ("gain", "phase", "bandwidth", "crossover", "phase_margin", "gain_margin",
-           "lower_gain_margin")  # fmt: skip
+FIGURES = (
+    "gain",
+    "phase",
+    "bandwidth",
+    "crossover",
+    "phase_margin",
+    "gain_margin",
+    "lower_gain_margin",
+)
 """what gets an error; phases and margins in degree"""
 
 

@@ -17,7 +17,11 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     from bywire.api.margins import margins
 
     return margins(
-        asked["loop"], asked["parameters"], asked["at"], asked["set"], asked["over"],
+        asked["loop"],
+        asked["parameters"],
+        asked["at"],
+        asked["set"],
+        asked["over"],
         side=asked["side"],
     )
 
