@@ -64,6 +64,11 @@ class BenchResult(Result, Answer):
         return self.status not in ("failed", "undecided")
 
     @property
+    def warnings(self) -> list[str]:
+        """What the user should know of the bench and of its runs."""
+        return [*self.bench.outdated, *super().warnings]
+
+    @property
     def rows(self) -> list[KpiRow]:
         """The key figures beside their requirements."""
         verdicts, stated = {v.kpi: v for v in self.verdicts}, stated_figures(self.bench)

@@ -76,7 +76,7 @@ class BenchRange(Answer):
         """What the runs warned of, and at which values."""
         said: dict[str, list[float]] = {}
         for value, result in zip(self.values, self.results, strict=True):
-            for text in result.warnings:
+            for text in (*result.bench.outdated, *result.warnings):
                 said.setdefault(text, []).append(value)
         return [f"{text} ({self._at(values)})" for text, values in said.items()]
 

@@ -118,7 +118,7 @@ class StudyRun(Answer):
     @cached_property
     def _warnings(self) -> list[str]:
         """The warnings, for which all cases are gone through once."""
-        said = warned(self.findings, self.nominal.warnings)
+        said = [*self.nominal.bench.outdated, *warned(self.findings, self.nominal.warnings)]
         if self.status == "unfinished":
             resume = StudyStore(self.folder).resume_command
             said.append(unfinished(self.plan, len(self.cases), resume))

@@ -60,8 +60,7 @@ class Result:
     @property
     def warnings(self) -> list[str]:
         """What the user should know of the runs."""
-        said = [*self.bench.outdated]
-        said += [
+        said = [
             f"{label}: {text}" if len(self.recordings) > 1 else text
             for label, recording in self.recordings.items()
             for text in str(recording.attrs.get("warnings", "")).split("; ")
