@@ -120,7 +120,9 @@ def signal_in(annotation: Any) -> Signal | None:
     """Return the Signal of an annotation, with the bounds that stand behind it; None for none."""
     notes = getattr(annotation, "__metadata__", ())
     signal = next((note for note in notes if isinstance(note, Signal)), None)
-    for note in notes if signal is not None else ():
+    if signal is None:
+        return None
+    for note in notes:
         if isinstance(note, (Gt, Ge)):
             low: Any = note.gt if isinstance(note, Gt) else note.ge
             signal = replace(signal, low=float(low))
