@@ -12,6 +12,7 @@ from random import Random
 
 from bywire.core.scratch import PREFIX, UNFINISHED
 from bywire.report.result_folder import earlier_files
+from fuzz import options
 from fuzz.forked import Forked
 from fuzz.judge import judged
 
@@ -67,6 +68,7 @@ def case(
     sign = sign or rng.choice((signal.SIGINT, signal.SIGKILL))
     out, temporary = folder / "out", folder / "tmp"
     temporary.mkdir()
+    options.prepared(folder)
     paths = os.pathsep.join(filter(None, sys.path))
     env = {**os.environ, "TMPDIR": str(temporary), "PYTHONPATH": paths}
     names = rng.sample(["run", "ramp", "stribeck", "margins"], 2)
@@ -103,7 +105,7 @@ def case(
 
 
 def _words(name: str, out: Path) -> list[str]:
-    return [word.format(out=out, name="drum") for word in WRITERS[name]]
+    return [word.format(out=out, folder=out.parent, name="drum") for word in WRITERS[name]]
 
 
 def _finished(process: Forked | subprocess.Popen[str]) -> None:

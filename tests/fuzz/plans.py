@@ -85,9 +85,9 @@ def study_text(rng: Random) -> tuple[str, bool]:
 
 def life_text(rng: Random) -> str:
     """Return a life file of a few stops."""
-    lines = [f'life = "{rng.choice(("wedge-pads", "wedge-pads", "pads"))}"', "[vary]"]
+    lines = [f'life = "{rng.choice(("wedge-pads",) * 9 + ("pads",))}"', "[vary]"]
     lines += _varied(rng, _LIFE_NAMES)
-    lines += ["[projection]", "stops = 1", f"longest = {rng.choice((10, 100, 1000))}"]
+    lines += ["[projection]", "stops = 2", f"longest = {rng.choice((10, 100, 1000))}"]
     lines += [f'share = "{_width(rng)}"'] if rng.random() < 0.3 else []
     lines += [f"seed = {rng.randrange(9)}"] if rng.random() < 0.5 else []
     text = "\n".join(lines) + "\n"

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import sys
+from itertools import groupby
 from pathlib import Path
 from random import Random
 
 import pytest
 
 from bywire.data import limited_source
-from fuzz import inputs, kills, study_kills
+from fuzz import inputs, judge, kills, options, study_kills
 from fuzz.__main__ import KINDS, tried
 from fuzz.judge import judged
 
@@ -55,6 +56,48 @@ REPLAYED = {
 @pytest.mark.parametrize("case", REPLAYED)
 def test_what_went_wrong_once(case: str) -> None:
     assert judged(REPLAYED[case]).wrong == ""
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_no_message_repeats_a_long_value(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two options of every command; ``options.long_values`` lists all of them."""
+    monkeypatch.chdir(options.prepared(tmp_path))
+    monkeypatch.setattr(judge, "LONGEST", 3100)
+    rng = Random(SEED)
+    by_command = groupby(options.long_values(), key=lambda value: value[0])
+    each = [value for _, values in by_command for value in rng.sample(list(values), 2)]
+    assert {command for command, _, _ in each} == set(options.COMMANDS)
+    wrong = [
+        f"{command} {name}: {said}"
+        for command, name, text in each
+        if (said := judged(options.words_with(command, name, text)).wrong)
+    ]
+    assert wrong == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["frequency-response", "position", "--frequencies", "1e-9 Hz"],
+        ["frequency-response", "pressure", "--frequencies", "1e-5 Hz, 1 Hz"],
+        ["agreement", "pressure", "--frequencies", "1e-9 Hz"],
+        ["frequency-response", "position", "--excitation", "multisine", "--frequencies", "1e-9 Hz"],
+        ["linearize", "pressure", "--reduce", "1" * 5000],
+        ["margins", "pressure", "--over", f"motor.R_m=0.3 ohm:0.4 ohm:{'9' * 5000}"],
+        ["study", "run", "weights.toml"],
+    ],
+    ids=["sine", "sines", "agreement", "lines", "order", "count", "weights"],
+)
+def test_a_number_that_takes_too_much_is_refused(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    values = f'values = ["+1 %", "-1 %"], weights = [1, {"9" * 400}]'
+    (tmp_path / "weights.toml").write_text(
+        f'bench = "hard-braking"\n[vary]\n"motor.R_m" = {{ kind = "discrete", {values} }}\n'
+    )
+    verdict = judged(words)
+    assert (verdict.status, verdict.wrong) == (2, "")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")

@@ -16,7 +16,7 @@ import pytest
 
 from bywire.core import scratch
 from bywire.server import handler
-from bywire.server.address import HERE
+from bywire.server.address import HERE, NAMES
 from bywire.server.guard import require_place
 from bywire.server.place import Place, folder_name, safe_name
 from bywire.server.refusal import RefusedError
@@ -37,7 +37,7 @@ PIECES = [
         "1/cancel",
     ),
     *("curve.toml", "results", "measurements", "*", ";", "'", '"', "<b>", "{}", "nul.csv"),
-    *("page.html", "serve.js", "http://h:port/", "localhost", "127.0.0.1:x"),
+    *("page.html", "serve.js", "http://h:port/", *NAMES, f"{HERE}:x"),
     *("\xe9", "\xbc", "\t", "\x01", "\x7f", "a" * 300, "x/" * 3000),
 ]
 BODIES = [
@@ -188,7 +188,7 @@ def test_the_port_of_http_is_left_out_by_browsers():
     for host, port, is_known in [
         (HERE, 80, True),
         (f"{HERE}:80", 80, True),
-        ("LOCALHOST", 80, True),
+        (NAMES[1].upper(), 80, True),
         (HERE, 81, False),
         (f"{HERE}:81", 80, False),
         ("evil.example", 80, False),

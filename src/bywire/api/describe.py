@@ -34,7 +34,7 @@ from bywire.campaigns.declared import CAMPAIGNS, DeclaredCampaign
 from bywire.contracts.elements import Element, elements_by_name, parameter_classes
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.catalog import CitedSet as Set
-from bywire.core.errors import UnknownNameError, unknown_name
+from bywire.core.errors import UnknownNameError, quoted, unknown_name
 from bywire.core.field_notes import field_notes
 from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import leaf_fields
@@ -52,6 +52,7 @@ Object = dict[str, Any]
 
 _LINES = ("parts", "assembly", "system", "at", "unit", "range", "experiment", "records", "source",
           "parameter sets", "experiments", "loops", "plants", "studies", "methods")  # fmt: skip
+_LONGEST = 200  # characters that are looked for
 _TABLES = ("drives", "signals", "found in", "values", "estimates", "kpis")
 
 
@@ -140,6 +141,10 @@ def describe(name: str) -> Description | Mentioned:
     UnknownNameError
         With the nearest known names.
     """
+    if len(name) > _LONGEST:
+        raise UnknownNameError(
+            f"{quoted(name)}: a name, or a few words, of at most {_LONGEST} characters is wanted"
+        )
     try:
         return Description(name, tuple(described(name)))
     except UnknownNameError:

@@ -79,7 +79,7 @@ class Start:
 
         def stimulus(t: Array) -> Array:
             wave = np.where(t < ACTIVE, np.sin(2.0 * np.pi / ACTIVE * t), 0.0)
-            return np.clip(base + share * wave[:, None] * reach, low, high)
+            return np.asarray(np.clip(base + share * wave[:, None] * reach, low, high))
 
         return Run(
             self.model, self.par, self.state, self.memory, stimulus, duration, self.step,
