@@ -267,8 +267,11 @@ def test_encodings(tmp_path, encoding):
     ("content", "text"),
     [
         (HEADER + "0,1\n1,2,3\n", "line 3: 3 cells, .*skip_lines in the mapping"),
+        ("Time,p [bar]\n12:34,1\n12:35,2\n", "'Time': its times or dates can be read in several"),
+        ("t;p\ns;foo\n0;1\n1;2\n", "its columns are s, foo"),
+        ("t;p;x\ns;bar;foo\n0;1;2\n1;2;3\n", "column 'x': the unit 'foo' is not known"),
         ("t [s] p [bar]\n0 1\n1\n", "line 3: 1 cells, .*a missing value needs a mark"),
-        ("Date,p [bar]\n03/04/2026,1\n03/04/2026,2\n", "'Date': its dates mean different days"),
+        ("Date,p [bar]\n03/04/2026,1\n03/04/2026,2\n", "'Date': its times or dates can be read in"),
         ("time [s],p [bar]\n09:12:33.5,1\n9.7,2\n", "line 2, .*is a time stamp"),
         (
             lvm("One", ["X_Value\tp\tu", "0\t1\t1", "1\t2\t1", "Channels\t2"]),

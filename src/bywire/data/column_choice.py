@@ -289,7 +289,7 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
                 "a mapping "
                 'time = { column = "t", unit = "ms" } or rate = "1 kHz"; '
                 + _listing(source.columns)
-                + (before if len(source.columns) == 1 else "")
+                + (before if len(source.columns) == 1 or source.remarks else "")
                 + why,
                 {},
             )

@@ -13,7 +13,7 @@ from bywire.core.errors import FileError, UnitError, quoted
 from bywire.data.column_units import split_title, unit_of
 from bywire.data.file_format import ReadOptions
 from bywire.data.text_encoding import head_text
-from bywire.data.time_stamps import is_stamp, is_unclear, kind_of_stamps
+from bywire.data.time_stamps import is_stamp, kind_of_stamps
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
 """what may stand between two cells, in the order in which it is looked for"""
@@ -32,7 +32,7 @@ MARKS = frozenset(("", *_MARKS.split()))
 COMMENTS = ("#", "%", "//", "!")
 """what a line of comment begins with"""
 
-NUMBER, TEXT, UNCLEAR = "number", "text", "date of no clear order"
+NUMBER, TEXT, UNCLEAR = "number", "text", "time of no clear order"
 """kinds of columns, beside those of time stamps"""
 
 _ROWS = 200  # rows that are looked at for the decimal mark and the kinds of columns
@@ -333,7 +333,10 @@ def _from_numbers(
     notes: list[str] = []
     start = first
     if alike and alike[-1] == above[-1]:
-        has_units = len(alike) == 2 and _are_units(rows[alike[-1]])
+        has_units = len(alike) == 2 and (
+            _are_units(rows[alike[-1]])
+            or _known_units(rows[alike[-1]]) > max(_known_units(rows[alike[-2]]), width / 2)
+        )
         start = alike[-2] if has_units else alike[-1]
         titles, units = _titles_of(rows[start], rows[alike[-1]] if has_units else [])
         notes += _doubtful_titles(titles, start)
@@ -415,6 +418,11 @@ def _are_units(cells: list[str]) -> bool:
     )
 
 
+def _known_units(cells: list[str]) -> int:
+    """Return how many cells of a row are units."""
+    return sum(bool(cell) and _is_unit(_bare(cell)) for cell in cells)
+
+
 def _bare(cell: str) -> str:
     """Return a unit without the brackets around it."""
     return cell[1:-1].strip() if cell[:1] in "[(" and cell[-1:] in "])" and cell else cell
@@ -447,7 +455,7 @@ def _kinds(dialect: Dialect) -> tuple[str, ...]:
 def _kind(cells: list[str]) -> str:
     if not cells or any(_NUMBER.fullmatch(cell) for cell in cells):
         return NUMBER
-    if all(is_unclear(cell) for cell in cells):
-        return UNCLEAR
     kind = kind_of_stamps(cells)
+    if not kind and all(is_stamp(cell) for cell in cells):
+        return UNCLEAR
     return kind or (NUMBER if any(_BEGINS_LIKE_ONE.match(cell) for cell in cells) else TEXT)

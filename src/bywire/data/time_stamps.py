@@ -76,11 +76,6 @@ def is_stamp(cell: str) -> bool:
     )
 
 
-def is_unclear(cell: str) -> bool:
-    """Return whether a cell has a date that means different days to different readers."""
-    return bool(_UNCLEAR.fullmatch(cell))
-
-
 def over_midnight(seconds: NDArray[np.float64]) -> int:
     """Have times of day go on over midnight, where they lie; return how often they pass it."""
     there = np.flatnonzero(np.isfinite(seconds))

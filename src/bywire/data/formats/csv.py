@@ -170,7 +170,10 @@ class TextSource:
         if kind == TEXT:
             return "it holds text"
         if kind == UNCLEAR:
-            return "its dates mean different days to different readers: write 2026-11-26"
+            return (
+                "its times or dates can be read in several ways: write 09:12:33.5, 2026-11-26, or "
+                "both"
+            )
         if kind == DAY:
             clocks = [k for k, other in enumerate(self._dialect.kinds) if other == CLOCK]
             is_used = self._day == column and clocks
