@@ -14,6 +14,7 @@ from bywire.authoring import (
     CitedSet,
     Duration,
     Integral,
+    Limited,
     Loop,
     ParameterSet,
     Part,
@@ -84,7 +85,7 @@ class Stimulus(NamedTuple):
 class Memory(NamedTuple):
     """What the controller holds between its ticks."""
 
-    v: Annotated[float, Signal("V", "motor voltage", 5.0)]
+    v: Annotated[float, Signal("V", "motor voltage", 5.0), Limited("control.v_max")]
     v_i: Annotated[float, Signal("V", "integral part", 5.0)]
     sat_voltage: Annotated[float, Signal("1", "voltage limited")]
 

@@ -25,6 +25,7 @@ from bywire.authoring import (
     CitedSet,
     Duration,
     Integral,
+    Limited,
     ParameterSet,
     Part,
     Role,
@@ -57,7 +58,7 @@ class Memory(NamedTuple):
     """What the controller holds between its ticks: measured angle, voltage, integral part."""
 
     seen: Angle
-    v: Annotated[float, Signal("V", "voltage")]
+    v: Annotated[float, Signal("V", "voltage"), Limited("v_max")]
     v_i: Annotated[float, Signal("V", "integral part")]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-from bywire.authoring import Signal
+from bywire.authoring import Limited, Signal
 from bywire.control import current_pi
 from bywire.core import ops
 from bywire.plant import adc, h_bridge
@@ -32,7 +32,7 @@ class Memory(NamedTuple):
     F_ref: Annotated[float, Signal("N", "force set point", 1e4, set_point_of="F_cl")]
     omega_ref: Annotated[float, Signal("rad/s", "speed set point", 100.0, set_point_of="omega")]
     i_ref: Annotated[float, Signal("A", "current set point", 10.0, set_point_of="i")]
-    duty: Annotated[float, Signal("1", "duty cycle", 0.5)]
+    duty: Annotated[float, Signal("1", "duty cycle", 0.5), Limited("ecu.current.D_max")]
     v_source: Annotated[float, Signal("V", "source voltage", 10.0)]
     parked: Annotated[float, Signal("1", "parked by position control")]
     sat_speed: Annotated[float, Signal("1", "speed demand saturated")]

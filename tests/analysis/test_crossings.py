@@ -13,9 +13,11 @@ from bywire.analysis.crossings import (
     disk_margin,
     fall,
     gain_crossings,
+    gain_factors,
+    lower_factor,
     margin_of,
     measured_margin,
-    real_crossings,
+    upper_factor,
 )
 
 COARSE = np.array([1.0, 4.0, 30.0, 100.0])
@@ -103,5 +105,11 @@ def test_a_fall_is_read_exactly_and_the_ends_have_their_say() -> None:
 def test_disk_margin_and_crossings_of_the_negative_axis() -> None:
     assert disk_margin(np.array([1.0, 1j, -0.5])) == pytest.approx(2.0 / 3.0)
     assert disk_margin(np.array([-3.0 + 0j, 1.0])) == pytest.approx(1.0)
-    turning = np.array([1j, -1 + 1j, -1 - 1j, 1 - 1j, 1 + 1j, -1 + 1j])
-    assert real_crossings(turning) == [1]
+
+
+def test_factors_are_those_of_the_negative_axis_alone() -> None:
+    turning = np.array([1j, -1 + 1j, -1 - 1j, 1 - 1j, 1 + 1j, -4 + 1j, -4 - 1j, -0.1 - 1j, 1 + 1j])
+    factors = gain_factors(np.arange(1.0, 10.0), turning)
+    assert [each.factor for each in factors] == pytest.approx([1.0, 0.25])
+    assert upper_factor(factors).factor == math.inf
+    assert lower_factor(factors).factor == pytest.approx(0.25)

@@ -28,7 +28,7 @@ def test_a_loop_turns_unstable_at_its_gain_margin_and_swings_at_the_phase_crosso
     found = locus(loop, par, 200.0, "control.moment.f_c", "Hz", values.tolist())
     (border,) = found.borders
     assert border.value / f_c == pytest.approx(curve.margins.gain, rel=1e-3)
-    assert border.rate.imag / (2.0 * math.pi) == pytest.approx(curve.phase_crossover, rel=1e-3)
+    assert border.rate.imag / (2.0 * math.pi) == pytest.approx(curve.margins.gain_at, rel=1e-3)
     assert abs(border.rate.real) < 1e-3
     assert not border.above
     np.testing.assert_array_equal(found.stable, values < border.value)

@@ -45,7 +45,7 @@ def test_a_disk_ends_where_gain_alone_may_go() -> None:
 def test_the_gain_margin_is_read_at_the_phase_crossover(name: str) -> None:
     curve, loop = curve_of(name), LOOPS.find(name)
     par = parameters(main_set(loop.assembly))
-    (at,) = loop.gain(par, loop.at.default).response(np.array([curve.phase_crossover]))[:, 0, 0]
+    (at,) = loop.gain(par, loop.at.default).response(np.array([curve.margins.gain_at]))[:, 0, 0]
     assert complex(at) == pytest.approx(-1.0 / curve.margins.gain, rel=1e-3)
 
 

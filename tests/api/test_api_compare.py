@@ -81,7 +81,7 @@ def test_a_change_smaller_than_the_steps_error_is_not_distinct(results, folders,
     with undrawn():
         near.write(tmp_path / "near")
     energies = [each.kpi("energy") for each in (results[0], near)]
-    assert 0.0 < abs(energies[1].value - energies[0].value) < sum(e.error for e in energies)
+    assert 0.0 < abs(energies[1].value - energies[0].value) < sum(e.bound for e in energies)
     pairs = (results[0], near), (folders[0], tmp_path / "near")
     for comparison in (bywire.compare(*pair) for pair in pairs):
         assert "not distinct" in next(
@@ -89,7 +89,7 @@ def test_a_change_smaller_than_the_steps_error_is_not_distinct(results, folders,
         )
         record = {each["name"]: each for each in comparison.as_object()["kpis"]}
         assert record["energy"]["distinct"] is False
-        assert record["energy"]["errors"] == [each.error for each in energies]
+        assert record["energy"]["errors"] == [each.bound for each in energies]
     far = {each.name: each.is_distinct for each in bywire.compare(*folders).figures}
     assert far["energy"]
     without = bywire.run("hard-braking", changed, estimate_error=False)
@@ -194,10 +194,10 @@ def test_different_spans_are_said(results):
 def test_a_static_characteristic_is_compared_by_its_figures():
     with pytest.warns(AnswerWarning, match="not drawn"):
         comparison = bywire.compare(
-            "stribeck", "hard-braking", overrides={"seal.T_pr": "0.003 N*m"}
+            "seal-stribeck", "hard-braking", overrides={"seal.T_pr": "0.003 N*m"}
         )
     (row,) = [each for each in comparison.settings if each.name == "experiment"]
-    assert row.values == ("stribeck", "hard-braking")
+    assert row.values == ("seal-stribeck", "hard-braking")
 
 
 @pytest.mark.parametrize("count", [0, 1])
@@ -248,7 +248,7 @@ def test_a_damaged_recording(folders, tmp_path):
 
 def test_a_folder_whose_settings_another_bench_lacks(results, folders):
     """Other options: what only one of two benches has stands beside a gap."""
-    ramp = bywire.run("stribeck")
+    ramp = bywire.run("seal-stribeck")
     (row,) = [e for e in bywire.compare(results[0], ramp).settings if e.name == "options.p_to"]
     assert row.values == (37e5, None)
 

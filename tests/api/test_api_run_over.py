@@ -70,7 +70,7 @@ def test_what_changes_by_less_than_its_error_is_said_to_be_not_distinct(found):
 
 
 def test_a_static_characteristic_over_a_range(tmp_path):
-    found = bywire.run("stribeck", over="seal.T_pr=0.002 N*m, 0.004 N*m")
+    found = bywire.run("seal-stribeck", over="seal.T_pr=0.002 N*m, 0.004 N*m")
     assert np.ptp(found.kpi("breakaway_apply")) > 0
     found.write(tmp_path)
 

@@ -102,7 +102,7 @@ def test_what_is_refused(bench):
 
 def test_key_figures_and_warnings_without_recordings_are_the_same():
     """The piston of a release rests on its stop, which the run warns of."""
-    bench = bywire.Bench("release", "dardanelli2010")
+    bench = bywire.Bench("pressure-release", "dardanelli2010")
     benches = [bench.varied({"motor.R_m": value}, {}) for value in (0.3, 0.4)]
     figures = key_figures_of(benches)
     for k, result in enumerate(ensemble.run_benches(benches)):

@@ -44,7 +44,8 @@ LARGE = (
 )  # fmt: skip
 """kernels in lanes that no other test needs, and long runs; other experiments of the same models
 have their figures computed in the same way, and all that are computed by families are left"""
-WARNED = {name: ["retracted stop"] for name in ("release", "rear-drag")}  # its port is no model's
+WARNED = {name: ["retracted stop"] for name in ("pressure-release", "rear-drag")}
+"""their port is no model's"""
 STEP = '[stimulus]\nkind = "step"\nstart = "0 {0}"\nend = "1 {0}"\nt_step = "0.1 s"\n'
 
 
@@ -212,7 +213,8 @@ def test_every_stimulus_drives_the_open_loop(kind, source, unit):
     }  # fmt: skip
     options = {"source": source, "duration": "50 ms"}
     bench = bywire.Bench(
-        "open-loop", "dardanelli2010", options=options, stimulus={"kind": kind, **values[kind]}
+        "motor-open-loop", "dardanelli2010", options=options,
+        stimulus={"kind": kind, **values[kind]},
     )
     recording = bywire.run(bench).recordings["run"]
     assert float(abs(recording["i"]).max()) > 0.1

@@ -62,14 +62,14 @@ def test_recording_interval_longer_than_the_run(record, text):
 @pytest.mark.parametrize("duration", ["1e9 s", "1e300 s"])
 def test_run_that_no_memory_holds(duration):
     options = {"duration": duration}
-    bench = bywire.Bench("open-loop", SET, options=options, stimulus=STEP)
+    bench = bywire.Bench("motor-open-loop", SET, options=options, stimulus=STEP)
     with pytest.raises(StepError, match=r"needs about .* GB of memory, but this machine has"):
         run_once(bench)
 
 
 def test_settling_that_no_float_counts_in_bytes():
     options = {"settle": "1e305 s"}
-    bench = bywire.Bench("open-loop", SET, options=options, stimulus=STEP)
+    bench = bywire.Bench("motor-open-loop", SET, options=options, stimulus=STEP)
     with pytest.raises(StepError, match=r"needs about .* GB of memory, but this machine has"):
         run_once(bench)
 

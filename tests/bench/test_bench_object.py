@@ -159,7 +159,7 @@ def test_what_does_not_fit_is_refused_at_construction(changes, error, text):
 )
 def test_override_without_effect_is_refused(name, value, options):
     with pytest.raises(ParameterError, match=r"would have no effect.*leave it out"):
-        bywire.Bench("release", SET, {name: value}, options).cases()
+        bywire.Bench("pressure-release", SET, {name: value}, options).cases()
 
 
 def test_set_of_another_assembly_is_refused(monkeypatch):
@@ -182,7 +182,7 @@ def test_override_that_one_of_two_runs_takes_is_kept():
 @pytest.mark.parametrize(
     ("experiment", "changes", "error", "text"),
     [
-        ("open-loop", {}, ParameterError, r"needs a \[stimulus\] section"),
+        ("motor-open-loop", {}, ParameterError, r"needs a \[stimulus\] section"),
         ("hard-braking", {"step": "30 us"}, StepError, "does not divide the ecu interval"),
         ("pressure-step", {"step": "30 us"}, StepError, "does not divide the ecu interval"),
         ("hard-braking", {"record": "30 us"}, StepError, "does not divide the recording"),
@@ -198,7 +198,7 @@ def test_what_costs_no_run_is_checked_at_construction(experiment, changes, error
 def test_run_takes_the_path_of_a_bench_file_too(path):
     with pytest.raises(FileError, match=r"cannot read bench file no/a\.toml"):
         bywire.run(path)
-    assert bywire.run("stribeck").bench.parameters == SET
+    assert bywire.run("seal-stribeck").bench.parameters == SET
 
 
 def test_numbers_are_si_in_python_and_need_a_unit_in_files(tmp_path):

@@ -10,7 +10,7 @@ import xarray as xr
 
 import bywire
 from bywire.bench.energy_ledger import role_attributes
-from bywire.bench.recording import energy_residual, open_books, parameter_hash
+from bywire.bench.recording import energy_doubts, energy_residual, parameter_hash
 from bywire.core.errors import FileError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
@@ -87,7 +87,7 @@ def test_netcdf_gives_the_same_recording_back(recording, tmp_path):
 
 
 def test_static_characteristic_gives_itself_back_too(tmp_path):
-    curve = run_once(bywire.Bench("stribeck", "dardanelli2010")).recordings["curve"]
+    curve = run_once(bywire.Bench("seal-stribeck", "dardanelli2010")).recordings["curve"]
     path = bywire.write_recording(curve, tmp_path / "curve.nc")
     xr.testing.assert_identical(bywire.read_recording(path), curve)
 
@@ -180,4 +180,4 @@ def test_a_run_whose_energy_balance_is_open_says_so(k_lf, is_open):
 def test_a_standing_body_with_much_energy_stored_closes_its_books():
     names = {"E_source": 0.0, "E_stored": 1e3, "E_friction": 0.0}
     rows = {n: ("time", value + 1e-13 * np.arange(3.0)) for n, value in names.items()}
-    assert open_books(xr.Dataset(rows, {"time": [0.0, 1.0, 2.0]})) == []
+    assert energy_doubts(xr.Dataset(rows, {"time": [0.0, 1.0, 2.0]})) == []

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import bywire
+from bywire.bench import ensemble, running, step_error
+from bywire.bench.ensemble import run_benches
 from bywire.bench.experiment import as_run
+from bywire.bench.result import Result
+from bywire.bench.running import run
 from bywire.brakes.motorcycle.operating_point import settled_start
+from bywire.core.errors import WorkLimitError
+from bywire.simulation.run import simulate
+from bywire.simulation.run_group import simulate_group
 from run_once import run_once
 
 SET = "dardanelli2010"
@@ -83,7 +91,7 @@ def test_noise_is_the_same_whatever_the_duration():
 
 
 def test_recording_can_be_made_again():
-    bench = bywire.Bench("open-loop", SET, options=SHORT, stimulus=STEP, seed=4)
+    bench = bywire.Bench("motor-open-loop", SET, options=SHORT, stimulus=STEP, seed=4)
     recording = run_once(bench).recording
     attrs = recording.attrs
     again = bywire.Bench(
@@ -98,8 +106,39 @@ def test_recording_can_be_made_again():
 def test_breakaway_is_that_of_the_highest_pressure_in_any_order():
     names = ("breakaway_apply", "breakaway_release")
     found = [
-        [run_once(bywire.Bench("stribeck", SET, options={"pressures": p})).kpi(n).value
+        [run_once(bywire.Bench("seal-stribeck", SET, options={"pressures": p})).kpi(n).value
          for n in names]
         for p in ("2 bar, 20 bar, 40 bar", "40 bar, 2 bar, 20 bar")
     ]  # fmt: skip
     assert found[0] == found[1]
+
+
+HALF = "the error estimate from half the step was abandoned: it took more than 1.5 times the work"
+
+
+def estimated(bench: bywire.Bench) -> list[Result]:
+    """Return the bench run with errors, alone and beside another one."""
+    return [run(bench, estimate_error=True), *run_benches([bench] * 2, estimate_error=True)]
+
+
+def test_an_estimate_that_takes_too_much_work_is_abandoned_with_a_note(monkeypatch):
+    """Half the step is twice the work; twice the step, half of it, still tells the error."""
+    bench = bywire.Bench("hard-braking", SET, options={"duration": 0.1, "settle": 0.1})
+    usual = estimated(bench)
+    for module in (running, ensemble, step_error):
+        monkeypatch.setattr(module, "MOST_WORK", 1.5)
+    for whole, abandoned in zip(usual, estimated(bench), strict=True):
+        assert whole.warnings == []
+        (warning,) = abandoned.warnings
+        assert warning.startswith(HALF)
+        assert 0.0 < abandoned.kpi("rise_time").error <= whole.kpi("rise_time").error
+
+
+def test_work_is_counted_in_substeps_the_same_alone_and_side_by_side():
+    (case,) = bywire.Bench("hard-braking", SET, options={"duration": 0.1, "settle": 0.1}).cases()
+    computed = as_run(case, 20e-6, seed=(0, 0))
+    alone = simulate(computed)
+    assert alone.work >= 0.2 / 20e-6
+    assert alone.work == simulate_group([computed] * 3)[1].work
+    with pytest.raises(WorkLimitError, match="more than"):
+        simulate(replace(computed, most_work=0.5 * alone.work))

@@ -42,7 +42,9 @@ SECTION = st.one_of(st.dictionaries(NAMES, VALUES, max_size=3), VALUES)
 CONTENT = st.fixed_dictionaries(
     {
         "experiment": st.one_of(
-            st.sampled_from(["hard-braking", "open-loop", "stribeck", "pedal-tracking"]), VALUES
+            st.sampled_from(
+                ["hard-braking", "motor-open-loop", "seal-stribeck", "pedal-tracking"]
+            ), VALUES
         ),
         "parameters": st.one_of(st.just("dardanelli2010"), VALUES),
     },

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -9,8 +13,17 @@ import xarray as xr
 from bywire.api.run import run
 from bywire.api.run_sections import energy_table
 from bywire.bench.bench import Bench
-from bywire.bench.energy_ledger import actuator_ledger, further_ledgers, role_attributes
+from bywire.bench.energy_ledger import (
+    actuator_ledger,
+    deliveries,
+    further_ledgers,
+    role_attributes,
+)
+from bywire.bench.ensemble import simulate_ensemble
+from bywire.bench.key_figures import key_figures_of
+from bywire.bench.running import run as run_bench
 from bywire.core.signals import Role
+from systems.loading import SPRING_AXIS, loaded
 
 T = np.linspace(0.0, 1.0, 5)
 
@@ -91,3 +104,81 @@ def test_energy_given_back_is_turned_over():
     books = actuator_ledger(recording(E_source=-1.0, E_gear=-0.5, E_stored=-0.5))
     assert books.turnover == pytest.approx(1.0)
     assert books.closing_error == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_loss_gives_what_it_loses_of_its_largest_value():
+    rows = {"E_source": [0.0, 5.0, 5.0], "E_friction": [0.0, 3.0, 2.5], "E_tyre": [0.0, 2.0, -0.5],
+            "E_air": [0.0, -1.0, 1.0], "E_stored": [0.0, -4.0, 2.0], "W_load": [0.0, -3.0, 0.0],
+            "E_alone": [1.0, 1.5, 2.0]}  # fmt: skip
+    roles = {"E_tyre": Role("sink", "tyre", book="vehicle", returns="taken"),
+             "E_air": Role("sink", "air", returns="any"),
+             "W_load": Role("sink", "load")}  # fmt: skip
+    made = xr.Dataset(
+        {n: ("time", v, role_attributes(roles.get(n))) for n, v in rows.items()},
+        {"time": [0.0, 1.0, 2.0]},
+    )
+    given = {each.name: each.energy for each in deliveries(made)}
+    assert given == {"E_friction": 0.5, "E_tyre": 0.5, "E_alone": 0.0}
+
+
+_ENERGIES = """
+    E_source: Annotated[float, Signal("J", "work of the forces")]
+    E_friction: Annotated[float, Signal("J", "dry friction")]
+    E_damping: Annotated[float, Signal("J", "viscous damping")]
+"""
+_RECORDED = """
+    E_stored: Annotated[float, Signal("J", "stored")]
+"""
+
+
+@pytest.fixture
+def axis(tmp_path: Path) -> Iterator[Callable[[str], Bench]]:
+    """Return a step of a user's axis whose books close, damped or driven by its damping."""
+    with ExitStack() as stack:
+
+        def made(sign: str) -> Bench:
+            text = SPRING_AXIS.read_text()
+            for old, new in {
+                "- par.d * x.v)": f"{sign} par.d * x.v)",
+                'impulse: Annotated[float, Signal("N*s", "impulse")]': _ENERGIES.strip(),
+                'F: Annotated[float, Signal("N", "force", 100.0)]\n\n\ndef': (
+                    f'F: Annotated[float, Signal("N", "force", 100.0)]{_ENERGIES}{_RECORDED}\n\ndef'
+                ),
+                "return Flow(m.F)": "return Flow((m.F - m.F_load) * x.v, -reaction[0] * x.v, "
+                f"{'' if sign == '-' else '-'}par.d * x.v * x.v)",
+                "return Output(x.x, x.v, m.F)": "return Output(x.x, x.v, m.F, *flow, "
+                "0.5 * par.m * x.v * x.v + 0.5 * par.k * x.x * x.x)",
+            }.items():
+                assert text.count(old) == 1, old
+                text = text.replace(old, new)
+            name = "damped" if sign == "-" else "driven"
+            path = tmp_path / f"{name}.py"
+            path.write_text(text.replace("spring-axis", name))
+            stack.enter_context(loaded(path))
+            options = {"input": "F_set", "output": "x", "duration": 0.05}
+            return Bench("step", f"{name}-one", options=options)
+
+        yield made
+
+
+def of_study(bench: Bench) -> Sequence[str]:
+    return key_figures_of([bench] * 5).warnings[4]
+
+
+def of_ensemble(bench: Bench) -> Sequence[str]:
+    return simulate_ensemble(bench, {"F_c": np.full(3, 1.0)}).results[2].warnings
+
+
+@pytest.mark.parametrize(
+    "warned", [lambda bench: run_bench(bench).warnings, of_study, of_ensemble],
+    ids=["run", "study", "ensemble"],
+)  # fmt: skip
+def test_every_run_tells_of_a_loss_that_gives_energy(
+    axis: Callable[[str], Bench], warned: Callable[[Bench], Sequence[str]]
+) -> None:
+    (told,) = warned(axis("+"))
+    assert told.startswith("the loss 'viscous damping' (E_damping) gives ")
+
+
+def test_no_run_tells_of_a_loss_that_loses(axis: Callable[[str], Bench]) -> None:
+    assert run_bench(axis("-")).warnings == []

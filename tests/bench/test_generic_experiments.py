@@ -14,13 +14,20 @@ import bywire
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.key_figures import key_figures_of
+from bywire.core.brake import load_system
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError
+from bywire.core.errors import (
+    InputError,
+    ModelError,
+    ParameterError,
+    UnitError,
+    UnknownNameError,
+)
 from bywire.core.model import ASSEMBLIES
 from bywire.core.signals import signals_of
 from bywire.report.bench_figures import bench_figures
 from run_once import run_once
-from systems.loading import SPRING_AXIS, loaded
+from systems.loading import SPRING_AXIS, forgotten, loaded
 
 SET = "spring-axis-one"
 K, M, D, F_C, K_C = 1e4, 2.0, 60.0, 5.0, 200.0
@@ -76,8 +83,6 @@ def test_cases_side_by_side_have_the_figures_of_single_runs(name: str) -> None:
 @pytest.mark.parametrize("parameters", ["dardanelli2010", "roberts2003"])
 @pytest.mark.parametrize("name", ["step", "ramp", "sine-sweep", "release", "open-loop"])
 def test_every_stimulus_of_our_brakes_can_be_driven(name: str, parameters: str) -> None:
-    if (name, parameters) in (("release", "dardanelli2010"), ("open-loop", "dardanelli2010")):
-        return  # it has its own
     model = ASSEMBLIES.find(PARAMETER_SETS.find(parameters).assembly)
     for stimulus, signal in signals_of(model.Stimulus).items():
         if stimulus.startswith("noise_"):
@@ -242,10 +247,48 @@ def test_a_bench_file_of_any_brake_and_its_text(tmp_path: Any) -> None:
         bywire.load(path)
 
 
-def test_a_brake_s_own_experiment_goes_before_one_of_any_brake() -> None:
-    own = bywire.Bench("open-loop", "dardanelli2010", stimulus={**STEP, "end": "1 A"})
-    assert own.definition is EXPERIMENTS.find("open-loop")
-    assert bench("open-loop", stimulus=STEP).definition.assembly == "spring-axis"
+@pytest.mark.parametrize(
+    ("name", "own", "option"),
+    [
+        ("open-loop", "motor-open-loop", {"source": "current"}),
+        ("release", "pressure-release", {"p_from": "20 bar"}),
+        ("stribeck", "seal-stribeck", {"pressures": "10 bar"}),
+    ],
+)
+def test_an_earlier_name_means_one_experiment_or_is_refused(name, own, option) -> None:
+    stimulus = {**STEP, "end": "1 A"} if name == "open-loop" else {}
+    known = bywire.Bench(name, "dardanelli2010", options=option, stimulus=stimulus)
+    assert known.definition is EXPERIMENTS.find(own)
+    assert known.experiment == own
+    with pytest.raises(ParameterError, match=f"is called '{own}' now: write {own}, or say which"):
+        bywire.Bench(name, "dardanelli2010", stimulus=stimulus)
+    signal = {"friction": "omega"} if name == "stribeck" else {"input": "i_set"}
+    generic = bywire.Bench(name, "dardanelli2010", options=signal, stimulus=stimulus)
+    assert generic.experiment == name
+    assert set(generic.definition.kpis) != set(known.definition.kpis)
+    with pytest.raises(ParameterError, match=f"that of the motorcycle-brake is called '{own}' now"):
+        bywire.run(name)
+
+
+def test_one_name_is_one_experiment(tmp_path) -> None:
+    assert not EXPERIMENTS.all().keys() & GENERIC_EXPERIMENTS.all().keys()
+    file = tmp_path / "axis_twice.py"
+    file.write_text(
+        SPRING_AXIS.read_text().replace("spring-axis", "axis-twice")
+        + "from dataclasses import replace\n"
+        "from bywire.bench.experiment import EXPERIMENTS\n"
+        'TAKEN = replace(EXPERIMENTS.find("hard-braking"), name="ramp", assembly="axis-twice")\n'
+    )
+    taken = r"axis_twice\.py, line \d+: the experiment 'ramp' is declared in .*ramp\.py.* already"
+    with forgotten():
+        load_system(file)
+        with pytest.raises(ModelError, match=taken):
+            bywire.Bench("ramp", "axis-twice-one", options={"input": "F_set"})
+        with pytest.raises(ModelError, match=taken):
+            EXPERIMENTS.all()
+
+
+def test_experiment_and_parameter_set_belong_together() -> None:
     with pytest.raises(ParameterError, match="'hard-braking' tests a motorcycle-brake, but param"):
         bywire.Bench("hard-braking", SET)
     with pytest.raises(UnknownNameError, match="unknown assembly 'spring-axes'"):

@@ -15,7 +15,7 @@ from bywire.data.writing import write_measurement
 from run_once import run_once
 
 BENCH = """
-experiment = "open-loop"
+experiment = "motor-open-loop"
 parameters = "dardanelli2010"
 [options]
 duration = "0.3 s"
@@ -81,7 +81,7 @@ def test_nodes_come_from_any_measurement_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ('unit = "bra"', "stimulus.unit = 'bra' is no known unit"),
+        ('unit = "bra"', "stimulus.unit = 'bra': the unit 'bra' is not known"),
         ("column = true", "stimulus.column"),
         ('rate = "5 ms"', "rate = '5 ms' has the wrong unit"),
         ('tme = "t"', "tme"),

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 import bywire
+from bywire.api.run_faults import FaultCampaign
 from bywire.bench.running import run
 from bywire.campaigns.campaign_file import read_campaign
 from bywire.campaigns.criterion import Criterion
-from bywire.campaigns.findings import CampaignFindings, finding
+from bywire.campaigns.findings import CampaignFindings, FaultFinding, finding
 from bywire.campaigns.judging import FACTORS, judge_healthy
 from bywire.campaigns.lasting import first_time, least_of_the_last, mean_of_the_last
 from bywire.campaigns.residual import NEVER, detected, threshold
@@ -332,3 +333,47 @@ def test_what_lasts_is_counted_over_the_rows_before():
     shown = np.array([[0.0, 1.0, 2.0]])
     assert detected(shown, 0.5, np.arange(3.0), np.zeros(1)).tolist() == [1.0]
     assert np.isnan(detected(shown, NEVER, np.arange(3.0), np.zeros(1))).all()
+
+
+def hand_made(plan, loss, reacted, answered, seen=0.01):
+    """Return a finding of two runs: when each violates "loss", and with the reaction."""
+    never = np.full(2, np.nan)
+    return FaultFinding(
+        plan.faults[0], {"loss": np.array(loss), "too much": never},
+        {each.name: np.full((len(FACTORS), 2), seen) for each in plan.watched}, {},
+        {"loss": np.array(reacted), "too much": never[: len(answered)]} if answered else {},
+        answered,
+    )  # fmt: skip
+
+
+def test_harm_done_by_the_reaction_is_counted_run_by_run(campaign):
+    plan, nan = campaign.findings.plan, np.nan
+    faults = (
+        hand_made(plan, [nan, nan], [0.1, 0.1], [0, 1]),  # harmless, seen: the reaction costs it
+        hand_made(plan, [nan, nan], [nan, nan], [0, 1]),  # harmless with and without
+        hand_made(plan, [nan, nan], [], [], seen=nan),  # latent, never answered
+        hand_made(plan, [0.3, nan], [0.2, nan], [0, 1]),  # dangerous, and sooner so
+        hand_made(plan, [0.3, nan], [0.2], [1]),  # the other run becomes dangerous
+        hand_made(plan, [0.3, nan], [nan, nan], [0, 1]),  # relieved
+    )
+    found = CampaignFindings(plan, campaign.findings.healthy, faults)
+    harmed = {k: each.only_with_reaction for k, each in enumerate(faults)}
+    assert {k: counts for k, counts in harmed.items() if counts} == {0: {"loss": 2}, 4: {"loss": 1}}
+    assert [each.is_relieved for each in faults] == [False] * 5 + [True]
+    assert found.harm_of_reaction() == (
+        "the reaction, bridge.open-phase, makes things worse: it alone causes loss in 1 of 2 "
+        "harmless, seen faults; loss in 1 of 3 dangerous faults",
+        "the reaction, bridge.open-phase, hastens loss in 1 of 3 dangerous faults",
+    )
+    assert found.benefit_of_reaction() == (
+        "the reaction prevents loss in 1 of 3 dangerous faults, and makes 1 of 3 dangerous faults "
+        "harmless"
+    )
+    shown = FaultCampaign(found)
+    assert str(shown).startswith("The reaction, bridge.open-phase, makes things worse: ")
+    assert next(iter(shown.as_object())) == "headline"
+    banner = shown.document().banner
+    assert banner.text.startswith("The reaction, bridge.open-phase, makes things worse: ")
+    calm = FaultCampaign(CampaignFindings(plan, campaign.findings.healthy, faults[1:3]))
+    assert not calm.warnings
+    assert "headline" not in calm.as_object()

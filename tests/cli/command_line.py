@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 SCRIPT = Path(sysconfig.get_path("scripts")) / "bywire"
 BRAKING = 'experiment = "hard-braking"\nparameters = "dardanelli2010"\n'
-OPEN_LOOP = 'experiment = "open-loop"\nparameters = "dardanelli2010"\n'
+OPEN_LOOP = 'experiment = "motor-open-loop"\nparameters = "dardanelli2010"\n'
 PEDAL = 'experiment = "pedal-tracking"\nparameters = "dardanelli2010"\n'
 QUICK = '\n[options]\nduration = "40 ms"\nsettle = "10 ms"\n'
 LONG = (

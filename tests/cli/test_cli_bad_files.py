@@ -81,7 +81,7 @@ def test_what_editors_of_other_systems_write_is_read(bywire, bench, mark, end):
 def test_file_name_that_is_no_text(bywire, tmp_path):
     path = os.fsencode(tmp_path) + b"/\xff.toml"
     with open(path, "wb") as stream:
-        stream.write(b'experiment = "stribeck"\nparameters = "dardanelli2010"\n')
+        stream.write(b'experiment = "seal-stribeck"\nparameters = "dardanelli2010"\n')
     status, out, err = bywire("run", os.fsdecode(path), "--out", tmp_path / "out", "--json")
     assert (status, "Traceback" in err) == (0, False)
     assert '"bench": "?"' in out

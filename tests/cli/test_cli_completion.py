@@ -13,7 +13,7 @@ from bywire.cli.completion import ANYTHING, BENCHES, CAMPAIGNS, LOOPS, changeabl
 @pytest.mark.parametrize(
     ("complete", "typed", "wanted"),
     [
-        (BENCHES, "hard", "hard-braking"), (BENCHES, "open", "open-loop"),
+        (BENCHES, "hard", "hard-braking"), (BENCHES, "motor-o", "motor-open-loop"),
         (LOOPS, "pres", "pressure"), (CAMPAIGNS, "mot", "motorcycle"),
         (ANYTHING, "dardanelli2010-m", "dardanelli2010-measured"),
     ],

@@ -34,7 +34,9 @@ def test_design_over_a_range_names_what_binds(bywire):
     gains = found["gains"]
     # The command margins says the same of these gains.
     settings = [text for name, value in gains.items() for text in ("--set", f"{name}={value} Hz")]
-    margins = bywire("margins", "moment", *settings, "--json").object["margins"]
+    shown = bywire("margins", "moment", *settings, "--json").object
+    margins = shown["margins"]
+    assert gains.keys() <= shown["changes"].keys()
     assert margins["phase"] == pytest.approx(found["linear"]["nominal"]["phase_margin"], rel=1e-3)
 
 

@@ -37,6 +37,7 @@ def test_a_campaign_is_written_and_shown(bywire, tmp_path):
     assert outcome.status == 0
     made = outcome.object
     assert (made["campaign"], made["runs"]) == ("small", 2)
+    assert made["changes"]["options.settle"]["instead_of"] == "1 s"
     kinds = {each["fault"]: each["class"] for each in made["faults"]}
     assert kinds["pressure.stuck"] in ("covered", "too late", "undetected")
     names = {path.name for path in out.iterdir()}

@@ -196,11 +196,11 @@ def test_parameters_go_on_as_a_bench_file(tmp_path: Path, dither: str) -> None:
     assert leaves["seal.T_pr"] == 0.0123
     assert leaves["motor.R_m"] == 0.321
     other = parameter_file("hard-braking", "dardanelli2010", par, {"drive.mode": "current-source"})
-    assert "# the experiment sets this itself: drive.mode" in other
+    assert "# without effect in this experiment: drive.mode" in other
     path.write_text(other)
     load(path)
-    driven = parameter_file("open-loop", "dardanelli2010", par, {"motor.R_m": 0.321})
-    assert "# experiment 'open-loop' wants more than this file says" in driven
+    driven = parameter_file("motor-open-loop", "dardanelli2010", par, {"motor.R_m": 0.321})
+    assert "# experiment 'motor-open-loop' wants more than this file says" in driven
     path.write_text(driven)
     assert load(path).par.leaves()["motor.R_m"] == 0.321
 

@@ -23,6 +23,8 @@ def test_a_life_is_written_and_told(bywire, tmp_path):
     made = outcome.object
     assert (made["life"], made["name"], made["ended_by"]) == ("two-wheeler-pads", "short", "lining")
     assert made["stops"] == pytest.approx(1060, rel=0.05)
+    assert made["changes"]["wear.h_new"]["value"] == "0.6 mm"
+    assert made["changes"]["options.v_0"]["value"] == "13.8889 m/s"
     assert made["states"]["h_pad"]["end"] == pytest.approx(0.5e-3, rel=0.001)
     assert abs(made["states"]["h_pad"]["deviation"]) < 1e-6
     assert {path.name for path in out.iterdir()} == {

@@ -188,3 +188,61 @@ def test_what_sticks_is_said_and_has_no_gain(bywire):
 )
 def test_bad_input(bywire, arguments, texts):
     refused(bywire(*arguments), *texts)
+
+
+SENSOR_ON_ITS_CORNER = ("--set", "pressure_sensor.p_high=2101325 Pa")  # 20 bar above the ambient
+WITHOUT_GAIN = tuple(
+    word for name in ("k_p", "k_i", "k_d") for word in ("--set", f"ecu.pressure.{name}=0")
+)
+
+
+@pytest.mark.parametrize(
+    ("command", "rest"),
+    [
+        ("margins", ()), ("linearize", ()), ("agreement", ()), ("frequency-response", ()),
+        ("design", ("--require", "bandwidth >= 1 Hz", "--linear-only")),
+        ("margins", ("--over", "at=20 bar, 10 bar")),
+        ("linearize", ("--locus", "motor.R_m=0.2 ohm:0.4 ohm:2")),
+    ],
+)  # fmt: skip
+def test_every_linear_model_names_the_operation_on_its_corner(bywire, command, rest):
+    outcome = bywire(command, "pressure", *SENSOR_ON_ITS_CORNER, *rest)
+    refused(outcome, "plant/pressure_sensor.py:", "return ops.clip(", "--side above")
+
+
+def test_a_stated_side_of_a_corner_is_taken(bywire):
+    """Below its end the sensor is the usual one; above, nothing is fed back."""
+    usual = bywire("margins", "pressure", "--json").object["margins"]
+    asked = ("margins", "pressure", *SENSOR_ON_ITS_CORNER, "--json", "--side")
+    below, above = (bywire(*asked, side) for side in ("below", "above"))
+    found = below.object["margins"]
+    for name in ("gain", "phase", "crossover", "bandwidth"):
+        assert found[name] == pytest.approx(usual[name], rel=1e-6)
+    assert "plant/pressure_sensor.py:" in found["corners"][0]
+    assert "below the corner of" in below.err
+    assert not above.object["margins"]["has_loop"]
+    refused(bywire(*asked, "left"), "side = 'left': write 'above' or 'below'")
+
+
+@pytest.mark.usefixtures("drawn")
+def test_a_loop_without_gain_is_reported_as_none(bywire, tmp_path):
+    outcome = bywire("margins", "pressure", *WITHOUT_GAIN, "--out", tmp_path / "a")
+    assert outcome.status == 0
+    assert "no loop: the loop gain is 0 at all frequencies" in outcome.out
+    page = (tmp_path / "a" / "report.html").read_text(encoding="utf-8")
+    assert "no loop" in page
+    found = bywire("margins", "pressure", *WITHOUT_GAIN, "--json").object["margins"]
+    assert (found["gain"], found["disk"], found["has_loop"]) == (None, None, False)
+    over = ("--over", "ecu.pressure.k_p=0 A/Pa:1e-5 A/Pa:2")
+    ranged = bywire("margins", "pressure", *WITHOUT_GAIN, *over, "--out", tmp_path / "b")
+    assert "no loop at 1 of 2 values of ecu.pressure.k_p (0 A/Pa)" in ranged.out
+    design = ("design", "pressure", *WITHOUT_GAIN, "--require", "phase margin >= 30 deg",
+              "--linear-only", "--out", tmp_path / "c")  # fmt: skip
+    outcome = bywire(*design)
+    assert outcome.status == 1
+    assert "no loop: the loop gain is 0 at all frequencies, at nominal" in outcome.out
+    sines = ("--frequencies", "1 Hz, 2 Hz", "--no-error-estimate")
+    response = bywire("frequency-response", "pressure", *WITHOUT_GAIN, *sines)
+    assert "no loop: the loop gain is 0" in response.err
+    assert bywire("linearize", "pressure", *WITHOUT_GAIN, "--json").object["has_loop"] is False
+    refused(bywire("agreement", "pressure", *WITHOUT_GAIN), "no loop", "--set")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.cli.output import shortened
+from bywire.core.clean_text import shortened
 from bywire.core.errors import FileError
 from bywire.data.formats import mdf4
 from bywire.data.writing import write_measurement

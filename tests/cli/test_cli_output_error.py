@@ -15,7 +15,7 @@ from bywire.bench.bench_file import load
 
 Bywire = Callable[..., Outcome]
 
-BENCH = """experiment = "open-loop"
+BENCH = """experiment = "motor-open-loop"
 parameters = "dardanelli2010"
 [options]
 source = "voltage"
@@ -42,7 +42,7 @@ def bench(tmp_path: Path) -> Path:
 def run_file(path: Path, p_start: float, f: str, seed: int) -> Path:
     """Write what the bench's sensors would show, with other parameters than it has."""
     made = bywire.run(bywire.Bench(
-        "open-loop", "dardanelli2010", overrides={"motor.R_m": 0.42, "motor.K_e": 0.028},
+        "motor-open-loop", "dardanelli2010", overrides={"motor.R_m": 0.42, "motor.K_e": 0.028},
         options={"source": "voltage", "add_holding": True, "duration": 0.25, "p_start": p_start},
         stimulus={"kind": "sine", "mean": 0, "amplitude": 2, "f": f, "phase": 0, "t_start": 0},
     )).recording  # fmt: skip

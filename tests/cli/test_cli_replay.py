@@ -40,6 +40,9 @@ def test_right_parameters_pass_and_the_report_is_complete(
     assert outcome.status == 0, outcome.err
     found = outcome.object
     assert found["holds"]
+    assert found["changes"] == {
+        "wedge.mu_B": {"value": "0.32", "instead_of": "0.35", "of": "roberts2003"}
+    }
     assert {s["name"] for s in found["segments"]} >= {"hold-1", "move-1"}
     assert {Path(f).name for f in found["files"]} == {
         "y_M.png", "x.png", "track-wedge.mu_B.png", "report.html", "replay.nc", "replay.json",
@@ -82,6 +85,6 @@ def test_refusals(bywire: Bywire, stop: Path) -> None:
     refused(bywire(*moment, "--tolerance", "nrmse"), "nrmse <= 5 %")
     refused(bywire(*moment, "--tolerance", "nmrse <= 5 %"), "nrmse")
     refused(bywire(*moment, "--track", "alpha"), "wedge.mu_B")
-    refused(bywire(*base, "open-loop"), "nothing measured drives the model")
+    refused(bywire(*base, "motor-open-loop"), "nothing measured drives the model")
     refused(bywire(*base, "hard-braking"), "i_set, v_set and one of M_set, ")
     refused(bywire("replay", "none.csv", "--bench", "moment-pulses"), "none.csv")

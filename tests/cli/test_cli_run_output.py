@@ -11,7 +11,7 @@ from command_line import BRAKING, OPEN_LOOP, QUICK, no_half_files, refused
 import bywire as package
 
 NAMES = ["../../escaped", "/escaped", "a/b\\c", "..", "con", "x" * 300, "<script>alert(1)</script>"]
-CURVE = BRAKING.replace("hard-braking", "stribeck")  # the quickest result
+CURVE = BRAKING.replace("hard-braking", "seal-stribeck")  # the quickest result
 STEP = '[stimulus]\nkind = "step"\nstart = 0\nend = "20 A"\nt_step = "10 ms"\n'
 UNDEFINED = '\n[requirements]\nsettling_time = "<= 10 s"\n'
 
@@ -155,8 +155,8 @@ def test_a_file_comes_before_an_experiment_of_its_name(bywire, tmp_path, monkeyp
     (tmp_path / "hard-braking").write_text("nothing = 1")
     refused(bywire("run", "hard-braking"), "unknown key 'nothing'")
     # A folder is no bench file: that of the last results does not stand in the way.
-    (tmp_path / "stribeck").mkdir()
-    assert bywire("run", "stribeck").status == 0
+    (tmp_path / "seal-stribeck").mkdir()
+    assert bywire("run", "seal-stribeck").status == 0
 
 
 def test_misspelled_experiment(bywire):

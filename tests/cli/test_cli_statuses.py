@@ -15,7 +15,7 @@ from command_line import BRAKING, OPEN_LOOP, QUICK, SCRIPT, refused
 from bywire import __version__
 from bywire.bench.experiment import EXPERIMENTS
 
-CURVE = 'experiment = "stribeck"\nparameters = "dardanelli2010"\n'  # the quickest result
+CURVE = 'experiment = "seal-stribeck"\nparameters = "dardanelli2010"\n'  # the quickest result
 MISSED = CURVE + '[requirements]\nbreakaway_apply = "<= 1 mN*m"\n'
 STRICT = QUICK + '\n[requirements]\npeak_current = "<= 1 A"\nenergy = ">= 1 kJ"\n'
 
@@ -91,7 +91,7 @@ def test_list_is_complete(bywire):
     found = json.loads(out)
     titles = {
         "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "loops",
-        "plants",
+        "plants", "elements",
         "studies", "lives", "methods", "stimuli", "faults", "campaigns", "residuals", "kpis",
     }  # fmt: skip
     assert set(found) == titles | {"kpis_of_experiments"}

@@ -83,14 +83,14 @@ MISTAKES = {
         "par.K_e * u.omega)",
         "par.K_e)",
         on(check_units, "balance"),
-        "DimensionalityError",
+        "DimensionError",
     ),
     "unlike branches": Mistake(
         "plant/caliper",
         "(p > p0, s, slope)",
         "(p > p0, s, 1.0)",
         on(check_units, "mass"),
-        "DimensionalityError",
+        "DimensionError",
     ),
     "wrong unit of one choice": Mistake(
         "plant/reservoir_port", "G=0.0 * par.G_port", "G=par.x_port", on(check_units, "output")
@@ -159,6 +159,7 @@ def test_gate_refuses(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     refused = mistake.gate(wrong)
     assert not refused.holds
     assert mistake.said in refused.text
+    assert "; {" not in refused.text  # choices and values are said in words
 
 
 def _loaded(name: str, source: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:

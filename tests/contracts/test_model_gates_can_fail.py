@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from bywire.analysis.linear import linearize
 from bywire.api.new import write_package
 from bywire.contracts import stepping
 from bywire.contracts.evidence import Evidence, examine
@@ -84,6 +86,14 @@ MISTAKES = {
 }  # fmt: skip
 
 
+FAULTS = """
+from bywire.authoring import Channel, Channels
+from {package}.model import {model}
+
+CHANNELS = Channels({model}.name, (Channel("angle", "angle sensor", "rad", "{signal}"),))
+"""
+
+
 @contextmanager
 def seeded(folder: Path, name: str, mistake: Mistake | None = None) -> Iterator[Any]:
     """Yield the trial of a template's brake with a mistake; nobody knows it afterwards."""
@@ -106,6 +116,17 @@ def test_gate_refuses(mistake: str, tmp_path: Path) -> None:
     with seeded(tmp_path, name, wanted) as subject:
         found = examine(OF_A_MODEL[wanted.contract], subject, subject.place())
     assert not found.holds, found.text
+
+
+def test_a_linear_model_that_is_the_mean_of_two_sides_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What differentiation makes of a magnitude at 0, without a word."""
+    monkeypatch.setattr(linearize, "linear_models", lambda of: of.models(of.point))
+    with seeded(tmp_path, "seeded-mean", MISTAKES["kink where it rests"]) as subject:
+        found = examine(OF_A_MODEL["linear model on corners"], subject, subject.place())
+    assert not found.holds, found.text
+    assert re.search(r"\w+\.py:\d+ on its corner", found.text)
 
 
 def test_every_gate_lets_the_right_brake_pass(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ def test_oscillator_against_its_closed_form() -> None:
 def _sliding(law: str) -> Run:
     """Return a run that starts in the midst of sliding, from the end of another one."""
     bench = Bench(
-        "open-loop",
+        "motor-open-loop",
         "dardanelli2010",
         overrides={"gear.law": law, "drive.T_source": 1e-3},
         options={"source": "voltage", "p_start": 10e5, "add_holding": True, "duration": 0.1},

@@ -28,7 +28,7 @@ def test_first_jumps_of_the_ramp(law: str) -> None:
     to the dynamics. Angles at rest are what the error of a whole jump adds up to.
     """
     bench = Bench(
-        "open-loop",
+        "motor-open-loop",
         "dardanelli2010",
         overrides={"gear.law": law, "drive.T_source": 5e-3},
         options={"source": "current", "duration": 12.0, "record": 5e-3},

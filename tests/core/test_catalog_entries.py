@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from typing import get_args
@@ -9,11 +10,12 @@ from typing import get_args
 import pytest
 
 import bywire
-from bywire.core.catalog import PARAMETER_SETS, CitedSet
-from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.core.catalog import PARAMETER_SETS, CitedSet, outdated_values
+from bywire.core.errors import ModelError, ParameterError, UnknownNameError
 from bywire.core.model import ASSEMBLIES
-from bywire.core.parameters import choice_fields, leaf_fields
+from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
 from bywire.core.provenance import Cited, Kind, calibrated, chosen, derived, paper
+from bywire.core.quantities import Force, Length, Torque
 
 NAMES = sorted(PARAMETER_SETS.all())
 
@@ -99,3 +101,72 @@ def test_kinds_of_provenance():
     made = [paper(1, "a"), derived(1, "a"), chosen(1, "a"), calibrated(1, "a")]
     assert [cited.kind for cited in made] == ["paper", "derived", "chosen", "calibrated"]
     assert set(get_args(Kind)) == {cited.kind for cited in made}
+
+
+class Lever(ParameterSet):
+    """A force, an arm, and what a controller knows of both."""
+
+    F: Force
+    arm: Length
+    T_hat: Torque
+
+
+class Levers(ParameterSet):
+    """Two of a kind."""
+
+    left: Lever
+    right: Lever
+
+
+def torque(par):
+    return par.F * par.arm
+
+
+LEVER = {"F": chosen(4.0, "a force"), "arm": chosen(0.5, "an arm"),
+         "T_hat": derived(torque, "F times arm")}  # fmt: skip
+
+
+def test_a_derived_value_is_computed_once_and_found_where_it_no_longer_matches():
+    lever = CitedSet("lever", "lever", "2026", "a lever", Lever, LEVER)
+    par = lever.parameters()
+    assert par.T_hat == 2.0
+    (found,) = outdated_values(lever.values, par.replace({"arm": 0.25}), {"arm"})
+    assert (found.name, found.now, found.formula, found.changed) == ("T_hat", 2.0, 1.0, ("arm",))
+    both = par.replace({"arm": 0.25, "T_hat": 1.5})
+    assert outdated_values(lever.values, both, {"arm", "T_hat"}) == []
+    same = par.replace({"arm": 0.25, "F": 8.0})
+    assert outdated_values(lever.values, same, {"arm", "F"}) == []
+
+
+def test_a_derived_value_follows_its_set_into_another_one():
+    values = {f"{side}.{name}": each.moved_to({"": side}) for side in ("left", "right")
+              for name, each in LEVER.items()}  # fmt: skip
+    levers = CitedSet("levers", "levers", "2026", "two levers", Levers, {
+        **values, "right.F": chosen(6.0, "a larger force"),
+    })  # fmt: skip
+    assert (levers.parameters().left.T_hat, levers.parameters().right.T_hat) == (2.0, 3.0)
+    changed = levers.parameters().replace({"right.arm": 1.0})
+    (found,) = outdated_values(levers.values, changed, {"right.arm"})
+    assert (found.name, found.formula) == ("right.T_hat", 6.0)
+
+
+def test_a_formula_that_reads_what_there_is_not_is_refused():
+    for formula in (lambda par: par.length, lambda par: par.T_hat):
+        with pytest.raises(ModelError, match=r"length, which the set lacks|T_hat wait for each"):
+            CitedSet("lever", "lever", "2026", "", Lever, {**LEVER, "T_hat": derived(formula, "x")})
+
+
+@pytest.mark.parametrize(
+    ("name", "changed", "derived_name", "value"),
+    [
+        ("sport600", {"vehicle.body.h": 0.7}, "ecu.front_lift.a_lim", 0.95 * 9.81 * 0.69 / 0.7),
+        ("front600", {"brake.disc.mu_pad": 0.3}, "slip.k_hat", 4 * 0.3 * 14.1e-4 * 0.13),
+        ("roberts2003-corner", {"screw.lead": 4e-3}, "control.offset.k_hat", 2e-3 / math.pi),
+        ("dardanelli2010-measured", {"seal.k_brk_p": 3.0}, "ecu.est_par.k_brk_p", 3.0),
+    ],
+)  # fmt: skip
+def test_derived_values_of_our_sets_are_found(name, changed, derived_name, value):
+    found = PARAMETER_SETS.find(name)
+    outdated = outdated_values(found.values, found.parameters().replace(changed), changed)
+    formulas = {each.name: each.formula for each in outdated}
+    assert formulas[derived_name] == pytest.approx(value, rel=1e-12)

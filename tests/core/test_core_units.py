@@ -99,9 +99,10 @@ WRONG_UNIT = [
     ("1", "rad", "a pure number cannot be rad"),
     ("5 %", "rad", "% cannot be rad"),
     ("20 deg", "1", "deg cannot be a pure number"),
-    ("3 lambda", "1", "lambda cannot be a pure number"),
+    ("3 %", "K", "% cannot be K"),
 ]
-UNKNOWN = ["9 bananas", "9 nan", "9 inf", "9 None", "9 True", "9 def", "9 is not m", "9 import"]
+UNKNOWN = ["9 bananas", "9 nan", "9 inf", "9 None", "9 True", "9 def", "9 is not m", "9 import",
+           "3 lambda", "3 furlong", "3 tex", "3 year"]
 NO_QUANTITY = [
     "", " ", "m", "mm 9", "nine mm", "9,5 mm", "1_000 mm", "0x10 mm", "- 9 mm", "--9 mm", "9 9 mm",
     "9 mm 3", "9 m*", "9 *m", "9 m**", "9 (m", "9 m)", "9 m*(s", "9 m**9**9", "9 m^2^3", "9 m**10",
@@ -121,7 +122,7 @@ def test_wrong_unit(text, symbol, message):
 
 @pytest.mark.parametrize("text", UNKNOWN)
 def test_unknown_unit(text):
-    with pytest.raises(UnitError, match="is not known; write for instance"):
+    with pytest.raises(UnitError, match=r"is not known.*; write for instance"):
         units.parse(text, "m", "x")
 
 
@@ -160,7 +161,7 @@ HOSTILE = [
 
 @pytest.mark.parametrize("text", HOSTILE, ids=lambda text: text[:12])
 def test_hostile_text_is_refused_at_once(text):
-    units.registry()  # its loading does not count
+    units.parse('9 mm', 'm', 'x')  # making the list does not count
     started = time.process_time()
     with pytest.raises(BywireError) as refused:
         units.parse(text, "m", "x")
@@ -198,6 +199,8 @@ def test_shown(value, symbol, text):
 
 
 def test_conversion_and_its_inverse():
+    with pytest.raises(UnitError, match="Pa cannot be converted to V"):
+        units.convert(1.0, "Pa", "V")
     assert units.convert(25e5, "Pa", "bar") == pytest.approx(25.0)
     assert units.convert(1.0, "m**3", "ml") == pytest.approx(1e6)
     assert units.convert(3.0, "A", "A") == 3.0
@@ -218,21 +221,8 @@ def test_home_that_cannot_be_written_is_no_obstacle(home):
     assert (done.stdout, done.stderr) == ("9000.0\n", "")
 
 
-def test_what_the_edges_show_takes_no_library_of_units():
-    code = (
-        "import sys; from bywire.core.quantities import DISPLAY_UNITS; "
-        "from bywire.core.units import convert, parse\n"
-        "for symbol, unit in DISPLAY_UNITS.items():\n"
-        "    convert(1.0, symbol, unit), parse(f'1 {unit}', symbol, 'x')\n"
-        "assert 'pint' not in sys.modules"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
 @pytest.mark.parametrize(("symbol", "unit"), quantities.DISPLAY_UNITS.items())
-def test_what_the_edges_show_is_as_the_library_of_units_has_it(symbol, unit):
-    shown = units.registry().Quantity(3.7, symbol).to(unit).magnitude
-    assert units.convert(3.7, symbol, unit) == pytest.approx(shown, rel=1e-14)
+def test_what_the_edges_show_comes_back(symbol, unit):
     assert units.convert(units.convert(3.7, symbol, unit), unit, symbol) == pytest.approx(3.7)
 
 

@@ -32,7 +32,7 @@ def braking(law: str, dither: str) -> Run:
 def ramp(law: str, duration: float) -> Run:
     """Return the ramp of eq. (17), from an ideal current source that holds for 5 ms."""
     bench = Bench(
-        "open-loop",
+        "motor-open-loop",
         "dardanelli2010",
         overrides={"gear.law": law, "drive.T_source": 5e-3},
         options={"source": "current", "duration": duration, "record": 5e-3},

@@ -40,7 +40,7 @@ def test_a_mapping_file_means_what_it_says(tmp_path):
     [
         ({"formt": "csv"}, UnknownNameError, "unknown key 'formt': did you mean 'format'"),
         (signal(colum="a"), UnknownNameError, r"\[signals.p\] 'colum': did you mean 'column'"),
-        (signal(unit="bra"), UnitError, "signals.p.unit = 'bra' is no known unit"),
+        (signal(unit="bra"), UnitError, "signals.p.unit = .bra.: the unit .bra. is not known"),
         (signal(offset="2 mm"), UnitError, "signals.p.offset = '2 mm' has the wrong unit"),
         (signal(offset=2), UnitError, "signals.p.offset = 2 has no unit: .* '1.5 bar'"),
         (signal(delay="2 bar"), UnitError, "signals.p.delay = '2 bar' has the wrong unit"),

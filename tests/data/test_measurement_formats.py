@@ -13,7 +13,7 @@ from bywire.core.errors import FileError, UnknownNameError
 from bywire.data import limited_source
 from bywire.data.file_format import ReadOptions
 from bywire.data.format_registry import FORMATS as KNOWN
-from bywire.data.measurement import read_measurement
+from bywire.data.measurement import MeasurementWarning, read_measurement
 from bywire.data.writing import write_measurement
 
 TIME = np.cumsum(np.random.default_rng(5).uniform(0.5, 1.5, 300)) * 1e-3
@@ -154,7 +154,8 @@ def test_hdf5_files_of_h5py(tmp_path):
         file["rig/p"].attrs["unit"] = "Pa"
         file["away"] = h5py.ExternalLink("other.h5", "/secret")
         file["round"] = h5py.SoftLink("/")
-    found = read_measurement(tmp_path / "a.h5")
+    with pytest.warns(MeasurementWarning, match="'away', 'round': it is a link"):
+        found = read_measurement(tmp_path / "a.h5")
     assert list(found.data_vars) == ["rig.p"]
     np.testing.assert_array_equal(found["rig.p"], VALUES)
     with h5py.File(file_of(tmp_path, "mat73"), "r") as file:
@@ -198,7 +199,9 @@ def test_mdf_files_of_asammdf(tmp_path):
         ])  # fmt: skip
         file.append([asammdf.Signal(VALUES[:30], 7 * TIME[:30], name="p", unit="Pa")])
         file.save(tmp_path / "a.mf4", compression=2)
-    found = read_measurement(tmp_path / "a.mf4")
+    with pytest.warns(MeasurementWarning) as warned:
+        found = read_measurement(tmp_path / "a.mf4")
+    assert len(warned) == 2  # of the formula, and of samples that are marked as invalid
     assert list(found.data_vars) == ["p@0", "u", "on", "p@1"]  # a formula is never evaluated
     np.testing.assert_array_equal(found["p@0"], np.where(VALUES > 1, np.nan, VALUES))
     np.testing.assert_array_equal(found["u"], 0.5 * counts + 1)

@@ -71,7 +71,7 @@ def test_without_names_every_column_comes_in_si(tmp_path):
         ("time [s], pedl [mm]\n0,1\n1,2\n", r"no column 'pedal'.* is it 'pedl'"),
         ("clock [s], pedal [mm]\n0,1\n1,2\n", r"does not say when .*: call a column 'time \[s\]'"),
         ("time [s], pedal [mm], Pedal [mm]\n0,1,1\n1,2,1\n", "'pedal': the name stands twice"),
-        (b"time [s], pedal [mm]\n0,1\n1,2 \xb5\n", "line 3: it is not UTF-8: save"),
+        (b"time [s], pedal [mm]\n0,1\n1,2 \xb5\n", "line 3: it is not UTF-8: name its encoding"),
     ],
 )
 def test_refused_files(tmp_path, content, text):
@@ -86,8 +86,8 @@ def test_refused_files(tmp_path, content, text):
     [
         ("pedal", r"'pedal': it has no unit: write it behind the title, as 'pedal \[mm\]'"),
         ("pedal [N]", "'N' has the wrong unit, it cannot be m"),
-        ("pedal [furlongs per beat]", "is no known unit"),
-        ("pedal [9**9**9**9]", "is no known unit"),
+        ("pedal [furlongs per beat]", "the unit 'furlongs' in .* is not known"),
+        ("pedal [9**9**9**9]", "is not written like a unit"),
     ],
 )
 def test_refused_units(tmp_path, title, text):

@@ -14,6 +14,7 @@ import argparse
 import contextlib
 import faulthandler
 import math
+import shutil
 import signal
 import sys
 import tempfile
@@ -31,7 +32,7 @@ if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bywire.data import limited_source
-from fuzz import failing, inputs, kills, sound, study_kills
+from fuzz import failing, inputs, kills, options, plans, sound, study_kills
 from fuzz.judge import Verdict, judged, judged_alone
 
 
@@ -89,9 +90,31 @@ def campaign(rng: Random, folder: Path) -> Verdict:
     return judged(["faults", str(path)])
 
 
+def study(rng: Random, folder: Path) -> Verdict:
+    """Run a generated study."""
+    text, is_sound = plans.study_text(rng)
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    verdict = judged(["study", "run", str(folder / "study.toml"), "--out", str(folder / "study")])
+    shutil.rmtree(folder / "study", ignore_errors=True)
+    return replace(verdict, is_sound=is_sound)
+
+
+def life(rng: Random, folder: Path) -> Verdict:
+    """Project a generated life."""
+    (folder / "life.toml").write_text(plans.life_text(rng), encoding="utf-8")
+    return judged(["life", str(folder / "life.toml")])
+
+
+def option(rng: Random, folder: Path) -> Verdict:
+    """Run a command with a value that is too large, too small or not a number at all."""
+    if not (folder / "measured.csv").exists():
+        options.prepared(folder)
+    return judged(options.command_line(rng))
+
+
 KINDS: dict[str, Callable[[Random, Path], Verdict]] = {
     "bench": bench, "command": command, "extreme": extreme, "measurement": measurement,
-    "faulty": faulty, "campaign": campaign,
+    "faulty": faulty, "campaign": campaign, "study": study, "life": life, "option": option,
 }  # fmt: skip
 
 

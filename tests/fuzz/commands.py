@@ -53,7 +53,8 @@ def _over(rng: Random, _: Path) -> list[str]:
 
 def _compare(rng: Random, _: Path) -> list[str]:
     duration = sound.text(rng, rng.choice((20e-3, 30e-3)), "s")
-    return ["compare", "hard-braking", rng.choice(("current-step", "hard-braking", "release")),
+    other = rng.choice(("current-step", "hard-braking", "pressure-release"))
+    return ["compare", "hard-braking", other,
             "--set", f"options.duration={duration}", "--set", "simulation.step=50 us"]  # fmt: skip
 
 

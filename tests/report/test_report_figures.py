@@ -45,11 +45,11 @@ DRAWN: dict[str, Callable[[xr.Dataset], Figure]] = {
 }
 
 
-@pytest.fixture(params=[*sorted(DRAWN), "stribeck"])
+@pytest.fixture(params=[*sorted(DRAWN), "seal-stribeck"])
 def figure(
     request: pytest.FixtureRequest, recording: xr.Dataset, curve: xr.Dataset
 ) -> Figure:
-    if request.param == "stribeck":
+    if request.param == "seal-stribeck":
         return stribeck_curve(curve)
     return DRAWN[request.param](recording)
 

@@ -36,7 +36,7 @@ def curve(gain: float) -> LoopCurve:
     s = 2j * np.pi * FREQUENCY
     L = gain / (s * (s + 1.0) ** 2)
     if gain >= 2.0:
-        return LoopCurve(FREQUENCY, L, UNSTABLE, math.nan)
+        return LoopCurve(FREQUENCY, L, UNSTABLE)
     S = 1.0 / (1.0 + L)
     k = int(np.flatnonzero(np.abs(L) > 1.0)[-1])
     margins = LoopMargins(
@@ -44,8 +44,9 @@ def curve(gain: float) -> LoopCurve:
         crossover=float(FREQUENCY[k]), delay=0.1, disk=2.0 / float(np.abs(2.0 * S - 1.0).max()),
         sensitivity=float(np.abs(S).max()), complementary=float(np.abs(1.0 - S).max()),
         bandwidth=0.2, stable=True, phase_at=float(FREQUENCY[k]),
+        gain_at=1.0 / (2.0 * np.pi), lower_gain=0.0,
     )  # fmt: skip
-    return LoopCurve(FREQUENCY, L, margins, 1.0 / (2.0 * np.pi))
+    return LoopCurve(FREQUENCY, L, margins)
 
 
 def legend_of(figure: Figure) -> str:

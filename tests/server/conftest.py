@@ -19,7 +19,7 @@ from bywire.server.guard import cookie_name
 from bywire.server.serving import Opened, opened
 
 LARGEST = 3_000_000
-CURVE = 'experiment = "stribeck"\nparameters = "dardanelli2010"\n'
+CURVE = 'experiment = "seal-stribeck"\nparameters = "dardanelli2010"\n'
 
 STANDIN = """
 import json, sys, time
@@ -100,7 +100,7 @@ def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visitor]:
 def standin(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have jobs be processes that only speak as a job's does: they take no time to start."""
 
-    def started() -> subprocess.Popen[bytes]:
+    def started(_: Path) -> subprocess.Popen[bytes]:
         return subprocess.Popen(
             [sys.executable, "-S", "-E", "-c", STANDIN], start_new_session=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,

@@ -125,9 +125,9 @@ BAD = [
     ("life", {"life": "wedge-pads", "set": "wear.x=1"}, "set", "unknown"),
     ("compare", {"runs": "curve.toml"}, "runs", "two at least"),
     ("compare", {"runs": "curve.toml\naside"}, "runs", "no finished result"),
-    ("compare", {"runs": "curve.toml\nstribek"}, "runs", "stribeck"),
-    ("compare", {"runs": "curve.toml\nstribeck", "set": "motor.x=1"}, "set", "motor.x"),
-    ("compare", {"runs": "curve.toml\nstribeck", "error_estimate": "yes"}, "error_estimate",
+    ("compare", {"runs": "curve.toml\nseal-stribek"}, "runs", "seal-stribeck"),
+    ("compare", {"runs": "curve.toml\nseal-stribeck", "set": "motor.x=1"}, "set", "motor.x"),
+    ("compare", {"runs": "curve.toml\nseal-stribeck", "error_estimate": "yes"}, "error_estimate",
      "true or false"),
     ("size", {"study": "drive-trains"}, "study", "drive-train"),
     ("size", {"study": "drive-train", "parameters": "roberts"}, "parameters", "roberts2003"),
@@ -179,10 +179,10 @@ def test_no_thing_leads_out_of_the_folder(visit, task, field):
         assert answer.status in (404, 422)
         assert "secret" not in answer.object["error"].replace("secret.csv", "")
     # A link that is called as an experiment, and leads to somebody else's results.
-    link = visit.folder / "stribeck"
+    link = visit.folder / "seal-stribeck"
     link.symlink_to(visit.folder.parent)
     try:
-        assert visit.begin("compare", runs="curve.toml\nstribeck").status == 404
+        assert visit.begin("compare", runs="curve.toml\nseal-stribeck").status == 404
     finally:
         link.unlink()
 

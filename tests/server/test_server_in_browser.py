@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import os
 import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
 from bywire.server import routes
+from bywire.server.address import HERE
 from bywire.server.task_registry import tasks
 
 NEWEST = '() => document.querySelector("#jobs li")?.className'
-HERE = "() => document.activeElement.getAttribute('aria-label') ?? document.activeElement.tagName"
+FOCUS = "() => document.activeElement.getAttribute('aria-label') ?? document.activeElement.tagName"
 RUN = "form[data-task=run] button:enabled"
 posix = pytest.mark.skipif(os.name != "posix", reason="processes of POSIX")
 
@@ -52,19 +54,55 @@ def test_forms_files_and_jobs(visit, chromium, tmp_path):
     page.set_input_files(upload, tmp_path / "text.docx")
     page.wait_for_selector("text='text.docx' has the ending of no measurement format")
     assert [path.name for path in (visit.folder / "measurements").iterdir()] == ["a-rig.csv"]
-    # what the folder holds may not ask the server
-    (visit.folder / "page.html").write_text(
-        "<p>mute</p><script>fetch('/api/jobs').then(() => { document.body.textContent = 'read' })"
-        "</script>"
-    )
-    before = len(asked)
-    page.goto(f"{page.url.partition('/bench')[0]}/file/page.html")
-    page.wait_for_load_state("networkidle")
-    assert page.inner_text("body") == "mute"
-    assert len(asked) == before + 1
     here = visit.server.link.partition("/?")[0]
     assert [url for url in asked if not url.startswith(here)] == []
     page.close()
+
+
+LEAKING = """<p>mute</p><a id="way" href="{site}/way">way</a><a id="kept" download
+ href="{site}/kept">k</a><form id="form" action="{site}/form"></form>
+<meta http-equiv="refresh" content="1;url={site}/refresh"><link rel="prefetch" href="{site}/early">
+<img src="{site}/img"><script>
+fetch("/api/jobs").then(() => {{ document.body.textContent = "read" }});
+fetch("{site}/fetch").catch(() => 0);
+const ways = [() => navigator.sendBeacon("{site}/beacon"), () => open("{site}/open"),
+  () => form.submit(), () => kept.click(), () => way.click(),
+  () => {{ top.location = "{site}/top" }},
+  () => {{ location.href = "{site}/href?" + document.cookie }},
+  () => location.replace("{site}/replace")];
+ways.forEach((way, k) => setTimeout(() => {{ try {{ way() }} catch {{}} }}, 800 + 50 * k));
+</script>"""
+
+
+@posix
+@pytest.mark.usefixtures("standin")
+def test_a_report_leads_to_no_other_site(visit, chromium):
+    """Neither alone in a tab, nor by a script, a link, a form, a download or after some time."""
+    asked: list[str] = []
+
+    class Elsewhere(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            asked.append(self.path)
+            self.send_error(404)
+
+        do_POST = do_GET
+
+        def log_message(self, *_: object) -> None:
+            """Say nothing."""
+
+    with ThreadingHTTPServer((HERE, 0), Elsewhere) as site:
+        threading.Thread(target=site.serve_forever, args=(0.02,), daemon=True).start()
+        text = LEAKING.format(site=f"http://{HERE}:{site.server_address[1]}")
+        (visit.folder / "leaking.html").write_text(text)
+        page = chromium.new_page()
+        page.goto(visit.server.link)
+        page.goto(f"{visit.server.link.partition('/?')[0]}/file/leaking.html")
+        assert page.frames[1].inner_text("p") == "mute"
+        page.wait_for_timeout(1800)
+        assert page.url.endswith("/file/leaking.html")
+        page.close()
+        site.shutdown()
+    assert asked == []
 
 
 @posix
@@ -91,7 +129,7 @@ def test_a_key_that_comes_before_the_script_sends_nothing(visit, chromium, monke
     page.press(RUN, "Enter")
     page.wait_for_selector(f"#jobs li.held[data-number='{before + 1}']")
     assert noise == []
-    assert page.evaluate(HERE) == "BUTTON"  # it keeps the focus while it sends
+    assert page.evaluate(FOCUS) == "BUTTON"  # it keeps the focus while it sends
     page.close()
 
 
@@ -112,10 +150,10 @@ def test_who_is_in_the_list_of_jobs_stays_there(visit, chromium):
     for _ in range(2):
         turn.release()
     page.wait_for_selector(f"#jobs li.running[data-number='{number}']")
-    assert page.evaluate(HERE) == "cancel Run with Python of curve.toml"
+    assert page.evaluate(FOCUS) == "cancel Run with Python of curve.toml"
     other = visit.begin("run", bench="curve.toml", set="motor.R_m=0.4 ohm").object["number"]
     page.wait_for_selector(f"#jobs li.held[data-number='{other}']")  # above it
-    assert page.evaluate(HERE) == "cancel Run with Python of curve.toml"
+    assert page.evaluate(FOCUS) == "cancel Run with Python of curve.toml"
     page.keyboard.press("Enter")
     page.wait_for_selector(f"#jobs li.canceled[data-number='{number}']")
     assert page.evaluate("() => document.activeElement.dataset.number") == number

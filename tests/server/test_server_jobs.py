@@ -129,7 +129,8 @@ def test_what_does_not_fit_is_told_in_one_message(capsys):
 
 @posix
 def test_ctrl_c_ends_it_with_its_jobs(tmp_path):
-    (tmp_path / "curve.toml").write_text('experiment = "stribeck"\nparameters = "dardanelli2010"\n')
+    text = 'experiment = "seal-stribeck"\nparameters = "dardanelli2010"\n'
+    (tmp_path / "curve.toml").write_text(text)
     with subprocess.Popen(
         [sys.executable, "-m", "bywire", "serve", "--port", "0"],
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

@@ -66,7 +66,7 @@ def filled(field: Field) -> Any:
 @pytest.fixture
 def place(tmp_path: Path) -> Place:
     for name in "x.csv", "b.toml":
-        (tmp_path / name).write_text('experiment = "stribeck"\n')
+        (tmp_path / name).write_text('experiment = "seal-stribeck"\n')
     return Place(tmp_path.resolve())
 
 
@@ -175,7 +175,8 @@ def test_a_study_tells_now_and_then_what_there_is(monkeypatch, tmp_path):
 
 
 def test_what_a_study_shows_so_far_is_counted_from_its_cases(tmp_path):
-    (tmp_path / "curve.toml").write_text('experiment = "stribeck"\nparameters = "dardanelli2010"\n')
+    text = 'experiment = "seal-stribeck"\nparameters = "dardanelli2010"\n'
+    (tmp_path / "curve.toml").write_text(text)
     (tmp_path / "study.toml").write_text(STUDY)
     plan = read_study(tmp_path / "study.toml")
     torques = np.append(np.linspace(0.2, 0.6, 63), np.nan)
@@ -202,7 +203,7 @@ def test_a_page_of_a_bench_simulates_nothing(monkeypatch):
     monkeypatch.setattr("bywire.bench.running.run_of", refused)
     stops = shown_bench(Path("repeated-stops"), "repeated-stops")
     assert len(stops.cases) == 2
-    driven = shown_bench(Path("open-loop"), "open-loop")
+    driven = shown_bench(Path("motor-open-loop"), "motor-open-loop")
     assert "[stimulus]" in driven.trouble
     page = bench_page(driven, Contents(), 1)
     assert "iframe" not in page
@@ -222,7 +223,7 @@ def test_a_folder_is_listed_by_what_its_files_are(place):
         (result / name).write_text("{}")
     (place.root / "rig.nc").write_text("x")
     there = contents(place)
-    assert there.benches == {"b.toml": "stribeck"}
+    assert there.benches == {"b.toml": "seal-stribeck"}
     assert there.studies == {"study.toml": "b.toml"}
     assert there.campaigns == {"campaign.toml": "b.toml"}
     assert there.lives == {"life.toml": "wedge-pads"}

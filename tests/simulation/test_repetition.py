@@ -17,8 +17,9 @@ from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.core.catalog import parameters
+from bywire.core.errors import SolverError
+from bywire.core.interrupts import thread_pool
 from bywire.simulation import window as part
-from bywire.simulation.case_kernels import LaneKernel
 from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
 
@@ -31,7 +32,7 @@ def position(*frequencies: float) -> tuple[Run, Sweep]:
     return point.run(), Sweep(loop.inputs, loop.output, frequencies, [0.25], whole=whole)
 
 
-def window(stop: threading.Event | None = None, *, lanes: bool = True) -> Repeated:
+def window(*, lanes: bool = True) -> Repeated:
     """Return some windows of 48 ms at rest in one place."""
     run, _ = position()
     run = replace(run, duration=0.048, record=1e-3)
@@ -43,9 +44,7 @@ def window(stop: threading.Event | None = None, *, lanes: bool = True) -> Repeat
     def figures(found: NDArray[np.float64]) -> NDArray[np.complex128]:
         return found[:, :, 0].astype(complex)
 
-    return repeat(
-        run, matrix, stimuli, ("theta_1", "omega_1"), figures, 1e-9, 3, lanes=lanes, stop=stop
-    )
+    return repeat(run, matrix, stimuli, ("theta_1", "omega_1"), figures, 1e-9, 3, lanes=lanes)
 
 
 @pytest.mark.parametrize("lanes", [True, False])
@@ -59,29 +58,26 @@ def test_parts_of_a_window_change_no_bit(monkeypatch, lanes):
     np.testing.assert_array_equal(parts.figures, whole.figures)
 
 
-def test_what_is_stopped_ends():
-    stop = threading.Event()
-    stop.set()
-    with pytest.raises(KeyboardInterrupt):
-        window(stop)
+def test_what_a_stopped_thread_repeats_ends():
+    begun, ended = threading.Event(), list[BaseException]()
 
+    def repeated() -> None:
+        begun.wait()
+        time.sleep(0.05)  # until the pool is left
+        try:
+            window()
+        except BaseException as error:
+            ended.append(error)
 
-def test_window_is_stopped_in_its_midst(monkeypatch):
-    monkeypatch.setattr(part, "CHUNK", 350)
-    stop, ends = threading.Event(), list[int]()
-    compiled = LaneKernel.advance
+    def fails() -> None:
+        with thread_pool(1) as pool:
+            pool.submit(repeated)
+            begun.set()
+            raise SolverError("another thread failed")
 
-    def stopping(self, *arguments):
-        ends.append(arguments[-1])
-        if len(ends) == 2:
-            stop.set()
-        compiled(self, *arguments)
-
-    monkeypatch.setattr(LaneKernel, "advance", stopping)
-    with pytest.raises(KeyboardInterrupt):
-        window(stop)
-    per_row = ends[0] // 7
-    assert ends == [7 * per_row, 7 * per_row]
+    with pytest.raises(SolverError):
+        fails()
+    assert [type(error) for error in ended] == [KeyboardInterrupt]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")

@@ -18,7 +18,8 @@ from bywire.plant import battery_supply, caliper, dc_motor, master_cylinder, pip
 from bywire.simulation.run import simulate
 
 BRAKING = ("hard-braking", {"settle": 0.2, "duration": 0.6})
-RELEASE = ("release", {"settle": 0.1, "duration": 0.8})  # to the end stop, with makeup flow
+RELEASE = ("pressure-release", {"settle": 0.1, "duration": 0.8})
+"""to the end stop, with makeup flow"""
 LOSSES = ("E_supply", "E_copper", "E_gear", "E_seal", "E_damping", "E_pipeline", "E_stop")
 
 

@@ -34,7 +34,7 @@ def open_loop(
     overrides: dict[str, float], options: dict[str, object], start: float, slope: float
 ) -> Run:
     bench = Bench(
-        "open-loop",
+        "motor-open-loop",
         "dardanelli2010",
         overrides=overrides,
         options=options,

@@ -18,7 +18,7 @@ from bywire.studies.study_file import read_study
 from emulated_driver import EmulatedDriver, Status, emulated
 
 RELEASE = """
-experiment = "release"
+experiment = "pressure-release"
 parameters = "dardanelli2010"
 [options]
 duration = "40 ms"
@@ -31,7 +31,7 @@ parameters = "roberts2003-corner"
 v_0 = "10 km/h"
 """
 OPEN_LOOP = """
-experiment = "open-loop"
+experiment = "motor-open-loop"
 parameters = "dardanelli2010"
 [options]
 duration = "40 ms"
@@ -78,7 +78,7 @@ def test_cases_of_several_structures_run_in_groups(study, monkeypatch):
         (OPEN_LOOP, "options.add_holding", ["false", "true"], "motor.R_m"),
         (CORNER, "options.surface", ["dry-asphalt", "ice"], "options.v_0"),
     ],
-    ids=["release", "open-loop", "corner"],
+    ids=["pressure-release", "motor-open-loop", "corner"],
 )
 def test_key_figures_of_choices_among_the_options_are_those_of_single_runs(
     study, monkeypatch, bench, name, values, other

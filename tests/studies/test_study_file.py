@@ -12,11 +12,11 @@ import pytest
 from bywire.core.errors import InputError
 from bywire.studies.study_file import read_study
 
-RELEASE = 'experiment = "release"\nparameters = "dardanelli2010"\n'
+RELEASE = 'experiment = "pressure-release"\nparameters = "dardanelli2010"\n'
 PULSES = 'experiment = "moment-pulses"\nparameters = "roberts2003"\n'
 STOPS = 'experiment = "repeated-stops"\nparameters = "sport600"\n'
 OPEN_LOOP = """
-experiment = "open-loop"
+experiment = "motor-open-loop"
 parameters = "dardanelli2010"
 [stimulus]
 kind = "step"

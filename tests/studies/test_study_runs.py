@@ -75,7 +75,7 @@ def test_a_linear_axis_has_the_quantiles_of_its_closed_form(tmp_path, spring_axi
 
 
 def test_a_choice_among_the_options_varies_from_the_file_to_the_worst_bench(study, tmp_path):
-    bench = ('experiment = "release"\nparameters = "dardanelli2010"\n[options]\n'
+    bench = ('experiment = "pressure-release"\nparameters = "dardanelli2010"\n[options]\n'
              'duration = "40 ms"\nsettle = "10 ms"\n')  # fmt: skip
     found = bywire.run_study(study(
         '[vary]\n"options.how" = { values = ["controlled", "current-off"] }\n'

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from bywire.analysis.margins import margins
 from bywire.analysis.response.dataset import Sweep, complex_values
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.api.loop_case import loop_case
-from bywire.api.verification_parts import verification_parts
+from bywire.api.verification_parts import verdict_text, verification_parts
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import from_mapping
 from bywire.bench.running import run
@@ -23,11 +24,11 @@ from bywire.core.catalog import main_set, parameters
 from bywire.synthesis.bench_figures import BenchFigures, bench_figures
 from bywire.synthesis.bench_sines import Small, loop_gain
 from bywire.synthesis.bench_tuning import Tuning
-from bywire.synthesis.candidate import Candidate, bench_slacks, linear_slacks
-from bywire.synthesis.linear_case import cases_of
+from bywire.synthesis.candidate import Candidate, bench_slacks, judged, linear_slacks
+from bywire.synthesis.linear_case import NOMINAL, cases_of
 from bywire.synthesis.optimizer import Problem
 from bywire.synthesis.outcome import bench_text
-from bywire.synthesis.requirement import read
+from bywire.synthesis.requirement import FIGURES, read
 from bywire.synthesis.trial import Trial
 from bywire.synthesis.verification import Verification, verify
 
@@ -165,9 +166,40 @@ def test_what_is_not_defined_says_why(peak: float, crossover: float, why: str) -
     small = Small(1e5, 0.0, 0.0, math.nan, crossover, peak, True)
     step = {"overshoot": math.nan}
     figures = BenchFigures((small,), step, {"overshoot": "the response never moves"})
-    one = Candidate({}, figures, {"overshoot <= 1 %": 0.1})
-    nominal = dict.fromkeys(("phase_margin", "gain_margin", "disk_margin"), 1.0)
+    one = Candidate({}, figures, {"overshoot <= 1 %": 0.1}, shown={"overshoot <= 1 %": (1, 1)})
+    nominal = dict.fromkeys(FIGURES, 1.0)
     parts = verification_parts(loop_case("pressure"), nominal, Verification(one, None, (), nominal))
     texts = [part for part in parts if isinstance(part, str)]
     assert any(why in text for text in texts)
     assert "overshoot, hard-braking, is not defined: the response never moves" in texts
+
+
+def test_a_verdict_says_where_it_was_computed() -> None:
+    """Sines without a phase margin leave it to the linear model; a gain margin always is there."""
+    wanted = read(["bandwidth >= 1 Hz", "phase_margin >= 60 deg", "gain_margin >= 2"])
+    small = Small(1e5, 4.0, 0.9, math.nan, math.nan, 1.0, True)
+    linear = dict.fromkeys((each.text for each in wanted), 0.1)
+    nominal = dict.fromkeys(FIGURES, 1.0)
+
+    def verdict(*sines: Small, missed: str = "") -> tuple[str, list[str]]:
+        slacks = {**linear, missed: -0.1} if missed else linear
+        one = judged(wanted, {}, {NOMINAL: BenchFigures(sines, {})}, slacks)
+        tried = Verification(one, None, (), nominal)
+        parts = verification_parts(loop_case("pressure"), nominal, tried)
+        lines = [part for part in parts if isinstance(part, str) and " met (" in part]
+        return verdict_text(wanted, tried), lines
+
+    text, lines = verdict(small)
+    assert text == (
+        "requirements: 1 met on the nonlinear bench, 2 met on the linear model alone"
+    )
+    assert [line.partition(":")[0] for line in lines] == [
+        "on the bench", "on the linear model", "on the linear model",
+    ]  # fmt: skip
+    text, lines = verdict(small, replace(small, phase_margin=70.0, crossover=3.0))
+    assert lines[1].startswith("on the bench and the linear model (1 of 2 sines show it): phase")
+    text, _ = verdict(small, missed="gain_margin >= 2")
+    assert text == (
+        "requirements: 1 met on the nonlinear bench, 1 of 2 not met on the linear model alone"
+    )
+    assert verdict()[0] == "requirements met on the linear model alone"

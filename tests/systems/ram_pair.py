@@ -118,7 +118,7 @@ class Coupled(Pair):
     """The same with a spring between both pistons."""
 
     name = "coupled"
-    E_spring = Integral("J", "energy in the spring", role=Role("sink", "spring"))
+    E_spring = Integral("J", "energy in the spring", role=Role("sink", "spring", returns="any"))
     force = Wire("N", "force of the spring", 10.0)
 
     def wire(self, w):

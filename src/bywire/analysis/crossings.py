@@ -121,7 +121,10 @@ def measured_margin(frequencies: Array, L: Complex) -> Margin:
 
     The margin is the distance from -1, within 180 degree. NaN where the frequencies hold no fall
     to 1, with a crossover of infinity where the gain ends above: then it falls only beyond them.
+    Where there is no loop gain, NaN.
     """
+    if not (np.isfinite(L).all() and L.all()):
+        return Margin(math.nan, math.nan)
     if abs(L[-1]) >= 1.0:
         return Margin(math.inf, math.nan)
     crossings = gain_crossings(frequencies, L)
@@ -186,9 +189,65 @@ def disk_margin(L: Complex) -> float:
     return 2.0 / float(np.max(np.abs((1.0 - L) / (1.0 + L))))
 
 
-def real_crossings(L: Complex) -> list[int]:
-    """Return the points behind which a loop gain crosses the negative real axis."""
-    return np.flatnonzero(np.diff(np.signbit(L.imag)) & (L.real[:-1] < 0)).tolist()
+class GainFactor(NamedTuple):
+    """A factor that takes a loop to the border of stability.
+
+    Parameters
+    ----------
+    factor
+        Above 1 where the loop gain may grow by it, below where it may fall.
+    frequency
+        Where the loop gain times the factor is -1 [Hz].
+    """
+
+    factor: float
+    frequency: float
+
+
+def gain_factors(
+    frequencies: Array, L: Complex, response: Response | None = None
+) -> list[GainFactor]:
+    """Return the factors with which a loop gain passes through -1, by ascending frequency.
+
+    Parameters
+    ----------
+    frequencies, L
+        Frequencies [Hz], ascending, and loop gain there, shape (n,) each.
+    response
+        The loop gain as a function, where factors are wanted to rounding.
+    """
+    factors = []
+    for k in map(int, np.flatnonzero(np.diff(np.signbit(L.imag)))):
+        share = float(L.imag[k] / (L.imag[k] - L.imag[k + 1]))
+        at = float(frequencies[k] * (frequencies[k + 1] / frequencies[k]) ** share)
+        real = float(L.real[k] + share * (L.real[k + 1] - L.real[k]))
+        if response is not None and real < 0.0:
+            at = _solved_real(response, frequencies[k], frequencies[k + 1])
+            real = float(response(np.array([at]))[0].real)
+        factors += real_factor(real, at)
+    return factors
+
+
+def real_factor(real: float, frequency: float) -> list[GainFactor]:
+    """Return the factor of a loop gain that is real at a frequency [Hz]; none right of 0."""
+    if not (math.isfinite(real) and real < 0.0):
+        return []
+    return [GainFactor(-1.0 / real, frequency)]
+
+
+def upper_factor(factors: Sequence[GainFactor]) -> GainFactor:
+    """Return by how much a stable loop's gain may grow, and where; infinity, NaN for any."""
+    return min((each for each in factors if each.factor > 1.0), default=_ANY_GROWTH)
+
+
+def lower_factor(factors: Sequence[GainFactor]) -> GainFactor:
+    """Return to what share a stable loop's gain may fall, and where; 0, NaN for any."""
+    lower = (each for each in factors if _LEAST_FACTOR < each.factor < 1.0)
+    return max(lower, default=_ANY_FALL)
+
+
+_ANY_GROWTH, _ANY_FALL = GainFactor(math.inf, math.nan), GainFactor(0.0, math.nan)
+_LEAST_FACTOR = 1e-9  # below, L is at a pole on the border of stability, where it has no size
 
 
 def _passing(frequencies: Array, values: Array, k: int) -> float:
@@ -196,6 +255,13 @@ def _passing(frequencies: Array, values: Array, k: int) -> float:
     share = values[k] / (values[k] - values[k + 1])
     low, high = frequencies[k], frequencies[k + 1]
     return float(low * (high / low) ** share)
+
+
+def _solved_real(response: Response, low: float, high: float) -> float:
+    """Return the frequency between two others at which a response is real."""
+    from scipy.optimize import brentq
+
+    return float(brentq(lambda f: float(response(np.array([f]))[0].imag), low, high))
 
 
 def _solved(response: Response, level: float, low: float, high: float) -> float:

@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bywire.analysis.linear.closed_loop import closed_again, closed_loop
+from bywire.analysis.linear.corners import taking
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.open_loop import analog_gain, cut_open, open_loop
-from bywire.analysis.linear.sampled_system import sampled_system
+from bywire.analysis.linear.sampled_system import sampled_models
 from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.analysis.response.saturation import Saturation
 from bywire.core.errors import unknown_name
@@ -128,6 +129,9 @@ class Loop:
         loop gain a continuous model.
     locked
         States that its linear models hold, as those of a clamped shaft.
+    side
+        Side on which its linear models are taken where the operating point lies on the corner of
+        an operation, see `corners.read_sides`; empty: such a point is refused.
     """
 
     name: str
@@ -154,6 +158,7 @@ class Loop:
     single: bool = True
     analog: bool = False
     locked: tuple[str, ...] = ()
+    side: str = ""
 
     def require_number(self, par: ParameterSet, name: str) -> None:
         """Refuse a name that is neither the operating quantity nor a parameter.
@@ -204,34 +209,42 @@ class Loop:
         With a step [s] it is the one that the simulation's midpoint rule has, see ``stepped``.
         """
         p = self.point(self.smooth(par), value)
-        model = closed_loop(
-            p.model, p.par, p.state, p.memory,
-            inputs=self.inputs, outputs=(self.output,), stimulus=p.stimulus, locked=self.locked,
-            step=step,
-        )  # fmt: skip
+        with taking(self.side):
+            model = closed_loop(
+                p.model, p.par, p.state, p.memory,
+                inputs=self.inputs, outputs=(self.output,), stimulus=p.stimulus,
+                locked=self.locked, step=step,
+            )  # fmt: skip
         return model.together(self.inputs)
 
     def gain(self, par: ParameterSet, value: float) -> LinearModel:
         """Return the exact loop gain at an operating point."""
         p = self.point(self.smooth(par), value)
-        if self.analog:
-            return analog_gain(
-                p.model, p.par, p.state, p.memory, cut=self.cut, locked=self.locked
+        with taking(self.side):
+            if self.analog:
+                return analog_gain(
+                    p.model, p.par, p.state, p.memory, cut=self.cut, locked=self.locked
+                )
+            return open_loop(
+                p.model, p.par, p.state, p.memory,
+                cut=self.cut, stimulus=p.stimulus, locked=self.locked,
             )  # fmt: skip
-        return open_loop(
-            p.model, p.par, p.state, p.memory,
-            cut=self.cut, stimulus=p.stimulus, locked=self.locked,
-        )  # fmt: skip
 
     def gain_and_closed(self, par: ParameterSet, value: float) -> tuple[LinearModel, LinearModel]:
         """Return `gain` and `closed` at an operating point, from one model of its plant."""
         if self.analog:
             return self.gain(par, value), self.closed(par, value)
         p = self.point(self.smooth(par), value)
-        at, outputs = (p.state, p.memory, p.stimulus), (self.output,)
-        system = sampled_system(p.model, p.par, at, self.inputs, outputs, self.locked)
-        closed = closed_again(p.model, system, self.inputs)
-        return cut_open(p.model, system, self.cut), closed.together(self.inputs)
+        with taking(self.side):
+            closed, gain = sampled_models(
+                p.model, p.par, (p.state, p.memory, p.stimulus),
+                lambda system: (
+                    closed_again(p.model, system, self.inputs).together(self.inputs),
+                    cut_open(p.model, system, self.cut),
+                ),
+                inputs=self.inputs, outputs=(self.output,), locked=self.locked,
+            )  # fmt: skip
+        return gain, closed
 
 
 LOOPS = Kind("loop", ("loops",), instances(Loop), declared="a Loop")

@@ -6,10 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
 
-from bywire.analysis.crossings import NEARLY_ZERO, real_crossings
-from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.crossings import NEARLY_ZERO
 from bywire.analysis.loop import Loop
 from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.margins import LoopMargins, margins_of
@@ -32,14 +30,11 @@ class LoopCurve:
         Loop gain, shape (n,).
     margins
         Margins of the loop.
-    phase_crossover
-        Frequency at which the gain margin is read [Hz]; NaN where there is none.
     """
 
     frequency: Array
     L: Complex
     margins: LoopMargins
-    phase_crossover: float
 
     @property
     def S(self) -> Complex:
@@ -79,8 +74,8 @@ class Family:
 
     @property
     def worst(self) -> int:
-        """Index of the least disk margin; an unstable loop is worse than any."""
-        disks = [c.margins.disk if c.margins.stable else -math.inf for c in self.curves]
+        """Index of the least disk margin; an unstable loop, or none, is worse than any."""
+        disks = [c.margins.disk if c.margins.is_sound else -math.inf for c in self.curves]
         return int(np.argmin(disks))
 
 
@@ -141,20 +136,4 @@ def loop_curve(loop: Loop, figures: LoopFigures, points: int = _POINTS) -> LoopC
     """
     margins = margins_of(figures)
     shown = replace(figures, points=points, lowest=loop.band[0] / _BELOW)
-    crossover = _phase_crossover(figures.gain, shown.frequencies, shown.L, margins.gain)
-    return LoopCurve(shown.frequencies, shown.L, margins, crossover)
-
-
-def _phase_crossover(gain: LinearModel, f: Array, L: Complex, margin: float) -> float:
-    """Return where the loop gain is real and -1/margin, NaN without a margin."""
-    if not math.isfinite(margin):
-        return math.nan
-
-    def imaginary(at: float) -> float:
-        return float(gain.response(np.array([at]))[0, 0, 0].imag)
-
-    crossovers = [float(brentq(imaginary, f[k], f[k + 1])) for k in real_crossings(L)]
-    if gain.period:
-        crossovers.append(gain.nyquist)  # where the response is real, beyond the grid
-    sizes = np.abs(gain.response(np.array(crossovers))[:, 0, 0])
-    return crossovers[int(np.argmin(np.abs(sizes * margin - 1.0)))]
+    return LoopCurve(shown.frequencies, shown.L, margins)

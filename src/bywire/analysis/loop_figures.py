@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, wraps
 
 import numpy as np
 
 from bywire.analysis.crossings import (
     DROP,
     Crossing,
+    GainFactor,
     disk_margin,
     fall,
     gain_crossings,
-    real_crossings,
+    gain_factors,
+    lower_factor,
+    real_factor,
+    upper_factor,
 )
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.core.typing import Array, Complex
 
+NO_LOOP = 1e-9
+"""a loop gain that is nowhere larger is that of no loop: what is fed back does nothing"""
+_SLOWEST, _SLOW_POINTS = 1e-6, 40  # below the grid, where the loop gain is real, Hz
+_BEYOND = 100.0  # times the fastest pole: where a grid without sampling ends
 _LOWEST = 1e-2  # lower end of the frequencies looked at, Hz
 _NYQUIST = 0.998  # of half the sampling frequency, where the phase has no direction
 _REST = 1e-6  # where a response counts as that at rest, Hz
@@ -27,6 +36,29 @@ _MOST = 2**15  # samples of a step response: 33 s of a loop of 1 kHz
 _NOISE_POINTS = 1000  # frequencies, evenly spaced
 _LEFT_AFTER = 10.0  # periods of the bandwidth: when an error counts as steady
 _SETTLED = 1e-4  # share of the slowest mode that may be left where a step response ends
+
+
+Figure = Callable[["LoopFigures"], float]
+
+
+def _of_a_loop(figure: Figure) -> Figure:
+    """Have a figure be NaN where there is no loop."""
+
+    @wraps(figure)
+    def guarded(figures: LoopFigures) -> float:
+        return figure(figures) if figures.has_loop else math.nan
+
+    return guarded
+
+
+def _of_an_answer(figure: Figure) -> Figure:
+    """Have a figure be NaN where the output does not answer."""
+
+    @wraps(figure)
+    def guarded(figures: LoopFigures) -> float:
+        return figure(figures) if figures.answers else math.nan
+
+    return guarded
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,14 +90,27 @@ class LoopFigures:
 
     @cached_property
     def frequencies(self) -> Array:
-        """The grid [Hz], up to half the sampling frequency."""
+        """The grid [Hz], up to half the sampling frequency; without one, beyond all poles."""
         highest = _NYQUIST * min(self.gain.nyquist, self.closed.nyquist)
+        if math.isinf(highest):
+            rates = np.abs(np.concatenate([self.gain.poles(), self.closed.poles()]))
+            highest = max(_BEYOND * float(rates.max(initial=0.0)) / (2.0 * math.pi), 1.0)
         return np.geomspace(self.lowest, highest, self.points)
 
     @cached_property
     def L(self) -> Complex:
         """Loop gain on the grid, shape (points,)."""
         return self._gain_at(self.frequencies)
+
+    @cached_property
+    def has_loop(self) -> bool:
+        """Whether anything is fed back: gains of 0, or a shut valve, leave no loop."""
+        return bool(np.max(np.abs(self.L)) > NO_LOOP)
+
+    @cached_property
+    def answers(self) -> bool:
+        """Whether the output answers to the set point at all."""
+        return bool(np.max(np.abs(self.T)) > 0.0)
 
     @cached_property
     def growth(self) -> float:
@@ -80,6 +125,7 @@ class LoopFigures:
         return self.closed.is_stable
 
     @cached_property
+    @_of_an_answer
     def bandwidth(self) -> float:
         """Lowest frequency at which the closed loop has fallen to -3 dB of its gain at rest [Hz].
 
@@ -98,16 +144,19 @@ class LoopFigures:
         return self._closed_at(self.frequencies)
 
     @property
+    @_of_a_loop
     def crossover(self) -> float:
         """Highest frequency at which the loop gain falls to 1 [Hz]; 0 where it never does."""
         return max((at.frequency for at in self.crossings if at.falls), default=0.0)
 
     @property
+    @_of_a_loop
     def phase_margin(self) -> float:
         """Smallest phase margin of all gain crossovers [degree]; 180 where there is none."""
         return min((at.distance for at in self.crossings), default=180.0)
 
     @property
+    @_of_a_loop
     def delay_margin(self) -> float:
         """Additional dead time that the loop can take [s]; inf where there is no crossover."""
         # What is missing to -1 in the direction of a delay, which turns clockwise.
@@ -115,35 +164,50 @@ class LoopFigures:
                    default=math.inf)  # fmt: skip
 
     @cached_property
-    def gain_margin(self) -> float:
-        """Factor above 1 by which the loop gain may grow; inf where any may."""
-        L = self.L
-        sizes = []
-        for k in real_crossings(L):
-            share = L.imag[k] / (L.imag[k] - L.imag[k + 1])
-            sizes.append(abs(L.real[k] + share * (L.real[k + 1] - L.real[k])))
-        # Half the sampling frequency, where L is real, lies beyond the grid.
-        if self.gain.period:
-            last = float(self._gain_at(np.array([self.gain.nyquist]))[0].real)
-            sizes.append(max(-last, 0.0))
-        return min((1.0 / float(size) for size in sizes if 0.0 < size < 1.0), default=math.inf)
+    def factors(self) -> list[GainFactor]:
+        """Factors that take the loop to the border of stability, by ascending frequency."""
+        solved = self._gain_at if self.exact else None
+        slow = np.geomspace(_SLOWEST, self.lowest, _SLOW_POINTS, endpoint=False)
+        f = np.concatenate([slow, self.frequencies])
+        L = np.concatenate([self._gain_at(slow), self.L])
+        # At rest, and at half the sampling frequency, L is real beyond both ends of the grid.
+        at_rest = real_factor(self._real_at(0.0), 0.0)
+        last = self.gain.nyquist
+        at_last = real_factor(self._real_at(last), last) if self.gain.period else []
+        return [*at_rest, *gain_factors(f, L, solved), *at_last]
 
     @property
+    @_of_a_loop
+    def gain_margin(self) -> float:
+        """Factor above 1 by which the loop gain may grow; inf where any may."""
+        return upper_factor(self.factors).factor
+
+    @property
+    @_of_a_loop
+    def lower_gain_margin(self) -> float:
+        """Factor below 1 to which the loop gain may fall; 0 where it may be any."""
+        return lower_factor(self.factors).factor
+
+    @property
+    @_of_a_loop
     def disk_margin(self) -> float:
         """Symmetric disk margin, 0 to 2."""
         return disk_margin(self.L)
 
     @property
+    @_of_a_loop
     def sensitivity_peak(self) -> float:
         """Largest magnitude of 1/(1 + L)."""
         return float(np.max(1.0 / np.abs(1.0 + self.L)))
 
     @property
+    @_of_a_loop
     def complementary_peak(self) -> float:
         """Largest magnitude of L/(1 + L)."""
         return float(np.max(np.abs(self.L / (1.0 + self.L))))
 
     @cached_property
+    @_of_a_loop
     def noise_gain(self) -> float:
         """Rms of the output over that of white noise of each measured sample; NaN if analog.
 
@@ -173,11 +237,13 @@ class LoopFigures:
         return np.asarray(D + np.concatenate([[0.0], np.cumsum(pulses)]))
 
     @property
+    @_of_an_answer
     def overshoot(self) -> float:
         """Excess of the step's response over its end, at the sampling instants [%]."""
         return 100.0 * max(float(self.step.max()) - 1.0, 0.0)
 
     @property
+    @_of_an_answer
     def settling_time(self) -> float:
         """Time after which the response stays within 2 % of the step [s], interpolated."""
         z = np.abs(self.step - 1.0)
@@ -191,6 +257,7 @@ class LoopFigures:
         return float((k + share) * self.closed.period)
 
     @property
+    @_of_an_answer
     def steady_state_error(self) -> float:
         """What a unit step leaves after ten periods of the bandwidth [%].
 
@@ -221,6 +288,13 @@ class LoopFigures:
             size[-1] = min(size[-1], math.nextafter(DROP * self.rest, 0.0))
             at = fall(size, f, self.rest, solved)
         return at
+
+    def _real_at(self, frequency: float) -> float:
+        """Return the loop gain where it is real [Hz]; NaN where it integrates."""
+        try:
+            return float(self._gain_at(np.array([frequency]))[0].real)
+        except np.linalg.LinAlgError:
+            return math.nan
 
     def _gain_at(self, frequencies: Array) -> Complex:
         return np.asarray(self.gain.response(frequencies)[:, 0, 0])

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bywire.analysis.crossings import margin_of
+from bywire.analysis.crossings import lower_factor, margin_of, upper_factor
 from bywire.analysis.loop import Loop
 from bywire.analysis.loop_figures import LoopFigures
 from bywire.core.errors import ParameterError
@@ -16,7 +16,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.undefined import EqualWhereUndefined
 
 SENSES = {
-    "gain": 1, "phase": 1, "delay": 1, "disk": 1, "bandwidth": 1,
+    "gain": 1, "lower_gain": -1, "phase": 1, "delay": 1, "disk": 1, "bandwidth": 1,
     "sensitivity": -1, "complementary": -1,
 }  # fmt: skip
 """figures of `LoopMargins`: 1 where more is better, -1 where less is"""
@@ -25,7 +25,9 @@ _POINTS = 2000
 
 @dataclass(frozen=True, eq=False)
 class LoopMargins(EqualWhereUndefined):
-    """Margins of a sampled loop as it is, with its delays and filters; NaN where it is unstable.
+    """Margins of a sampled loop as it is, with its delays and filters.
+
+    NaN where it is unstable, and where there is no loop.
 
     Parameters
     ----------
@@ -44,8 +46,16 @@ class LoopMargins(EqualWhereUndefined):
         Frequency at which the closed loop has fallen to -3 dB of its gain at rest [Hz].
     stable
         Whether the closed loop is stable.
+    has_loop
+        Whether anything is fed back: gains of 0, or a shut valve, leave no loop.
+    lower_gain
+        Largest factor below 1 to which the loop gain may fall; 0 where none makes it unstable.
     phase_at
         Gain crossover at which the phase margin is read [Hz].
+    gain_at, lower_gain_at
+        Frequencies at which the two gain margins are read [Hz].
+    corners
+        As of `LinearModel`.
     """
 
     gain: float
@@ -57,9 +67,28 @@ class LoopMargins(EqualWhereUndefined):
     complementary: float
     bandwidth: float
     stable: bool
+    has_loop: bool = True
+    lower_gain: float = math.nan
     phase_at: float = math.nan
+    gain_at: float = math.nan
+    lower_gain_at: float = math.nan
+    corners: tuple[str, ...] = ()
+
+    @property
+    def state(self) -> str:
+        """``"stable"``, ``"unstable"``, or ``"no loop"``."""
+        if not self.has_loop:
+            return "no loop"
+        return "stable" if self.stable else "unstable"
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether there is a loop, and it is stable: whether it has margins."""
+        return self.stable and self.has_loop
 
 
+NO_LOOP = "no loop: the loop gain is 0 at all frequencies"
+"""what is said of gains of 0, or a shut valve"""
 UNSTABLE = LoopMargins(
     gain=math.nan, phase=math.nan, crossover=math.nan, delay=math.nan, disk=math.nan,
     sensitivity=math.nan, complementary=math.nan, bandwidth=math.nan, stable=False,
@@ -80,12 +109,18 @@ def figures_at(loop: Loop, par: ParameterSet, value: float) -> LoopFigures:
 
 def margins_of(figures: LoopFigures) -> LoopMargins:
     """Return the margins of a loop by its figures."""
+    corners = figures.gain.corners
+    if not figures.has_loop:
+        stable = figures.is_stable
+        return replace(UNSTABLE, corners=corners, stable=stable, has_loop=False)
     if not figures.is_stable:
-        return UNSTABLE
+        return replace(UNSTABLE, corners=corners) if corners else UNSTABLE
+    upper, lower = upper_factor(figures.factors), lower_factor(figures.factors)
     # Signed, where a design takes the distance from -1: below 0 the phase is beyond -180.
     margin = margin_of(figures.crossings)
     return LoopMargins(
-        gain=figures.gain_margin,
+        gain=upper.factor,
+        lower_gain=lower.factor,
         phase=margin.phase,
         crossover=margin.crossover,
         delay=_or_nan(figures.delay_margin),
@@ -95,6 +130,9 @@ def margins_of(figures: LoopFigures) -> LoopMargins:
         bandwidth=_or_nan(figures.fall),
         stable=True,
         phase_at=margin.at,
+        gain_at=upper.frequency,
+        lower_gain_at=lower.frequency,
+        corners=corners,
     )
 
 
@@ -108,13 +146,13 @@ def worst(
 ) -> Mapping[str, tuple[float, float]]:
     """Return the worst of each margin, and the value at which it occurs.
 
-    Nothing is worse than an unstable loop, whose margins are NaN.
+    Nothing is worse than an unstable loop, or none, whose margins are NaN.
     """
     if not margins:
         raise ParameterError("no margins to choose from: give at least one value")
     result: dict[str, tuple[float, float]] = {}
     for field, sense in SENSES.items():
-        sizes = [sense * getattr(row, field) if row.stable else -math.inf for row in margins]
+        sizes = [sense * getattr(row, field) if row.is_sound else -math.inf for row in margins]
         k = int(np.nanargmin(sizes)) if not all(map(math.isnan, sizes)) else 0
         result[field] = (getattr(margins[k], field), float(values[k]))
     return result

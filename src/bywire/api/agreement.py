@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from bywire.analysis import agreement as measuring
 from bywire.analysis.agreement import EVERYTHING, GAIN, LIMITS, NOTHING, PHASE, Agreement
+from bywire.analysis.loop_figures import LoopFigures
+from bywire.analysis.margins import NO_LOOP
 from bywire.analysis.response.frequency_response import require_stable
+from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase, loop_case, spread
 from bywire.bench.running import Progress
 from bywire.core.errors import ParameterError
@@ -62,6 +65,11 @@ class LoopAgreement(Answer):
     unit: str
 
     @property
+    def notes(self) -> list[str]:
+        """On which side of corners the linear model is."""
+        return corner_notes([self.case.loop.closed(self.case.par, self.case.value).corners])
+
+    @property
     def holds(self) -> bool:
         """Whether both responses agree with everything off."""
         return self.differences.holds
@@ -90,6 +98,7 @@ class LoopAgreement(Answer):
             brief=[f"{head}: nonlinear less linear", sizes, table, legend, text],
             data=self._data(),
             banner=Banner(text[0].upper() + text[1:], "good" if compared.holds else "bad"),
+            changes=case.subject.changes,
         )
 
     def _draw(self) -> Figure:
@@ -138,6 +147,7 @@ def agreement(
     frequencies: str = "",
     amplitudes: str = "",
     progress: Progress | None = None,
+    side: str = "",
 ) -> LoopAgreement:
     """Compare nonlinear and linear response of a loop, cause by cause.
 
@@ -151,6 +161,8 @@ def agreement(
         A small and a large one, ``"0.001 rad, 1 rad"``; the loop's own by default.
     progress
         Called with a label and the finished share, 0 to 1.
+    side
+        Of the linear model, as of `bywire.margins`.
 
     Returns
     -------
@@ -163,11 +175,17 @@ def agreement(
     InputError
         For names that are unknown, values out of range, sets of another brake, unstable loops.
     """
-    case = loop_case(loop, parameters, at, overrides)
+    case = loop_case(loop, parameters, at, overrides, side)
     unit = case.input_unit
     small, large = two_amplitudes(case, amplitudes)
     wanted = case.frequencies(frequencies, _POINTS)
-    require_stable(case.loop.closed(case.par, case.value))
+    gain, closed = case.loop.gain_and_closed(case.par, case.value)
+    require_stable(closed)
+    if not LoopFigures(gain, closed).answers:
+        raise ParameterError(
+            f"loop {case.loop.name!r} at {case.point}: {NO_LOOP}, and the output does not answer "
+            "to the set point; choose other gains with --set, or another point with --at"
+        )
     compared = measuring.agreement(
         case.loop, case.par, case.value, wanted, (small, large), progress=progress
     )

@@ -15,12 +15,12 @@ from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount, measured_amount
 
 NOTE = (
-    "bandwidth: -3 dB; crossover and phase margin of the loop gain's describing function; shares "
+    "bandwidth: -3 dB; crossover and margins of the loop gain's describing function; shares "
     "of the time: the largest of all frequencies"
 )
 
 
-_WIDTHS = ("bandwidth", "crossover", "phase_margin")
+_WIDTHS = ("bandwidth", "crossover", "phase_margin", "gain_margin", "lower_gain_margin")
 
 
 def shares(response: xr.Dataset) -> dict[str, str]:
@@ -37,9 +37,10 @@ def _title(flag: str) -> str:
 
 
 def figures_table(response: xr.Dataset, unit: str) -> Table:
-    """Return bandwidth, crossover and limits of the first variant by amplitude."""
+    """Return bandwidth, crossover, margins and limits of the first variant by amplitude."""
     known = shares(response)
-    heading = ["amplitude", "bandwidth", "crossover", "phase margin", *known.values()]
+    heading = ["amplitude", "bandwidth", "crossover", "phase margin", "gain margin",
+               "lower gain margin", *known.values()]  # fmt: skip
     rows = []
     for j, size in enumerate(response["amplitude"].values):
         case = response.isel(variant=0, amplitude=j)
@@ -47,8 +48,9 @@ def figures_table(response: xr.Dataset, unit: str) -> Table:
         margin = measured_amount(
             float(case["phase_margin"]), "deg", _step_error(case, "phase_margin"), 3
         )
+        factors = [_factor(case, name) for name in ("gain_margin", "lower_gain_margin")]
         rows.append([amount(float(size), unit, 3), _frequency(case, "bandwidth"),
-                     _frequency(case, "crossover"), margin, *most])  # fmt: skip
+                     _frequency(case, "crossover"), margin, *factors, *most])  # fmt: skip
     return text_table(heading, rows)
 
 
@@ -98,7 +100,10 @@ def figures_object(response: xr.Dataset, variant: int) -> list[dict[str, Any]]:
         case = response.isel(variant=variant, amplitude=j)
         row: dict[str, Any] = {"amplitude": float(size)}
         row |= _bounded(case, "bandwidth") | _bounded(case, "crossover")
-        row["phase_margin"] = _or_none(float(case["phase_margin"]))
+        row |= {
+            name: _or_none(float(case[name]))
+            for name in ("phase_margin", "gain_margin", "lower_gain_margin")
+        }
         row |= {
             key: _or_none(float(case[key])) for key in map("{}_step_error".format, _WIDTHS)
             if key in case
@@ -132,6 +137,11 @@ def _frequency(case: xr.Dataset, name: str) -> str:
     if value == 0.0:
         return f"< {amount(float(f[0]), 'Hz', 3)}"
     return measured_amount(value, "Hz", _step_error(case, name), 3)
+
+
+def _factor(case: xr.Dataset, name: str) -> str:
+    value = float(case[name])
+    return "-" if math.isnan(value) else measured_amount(value, "1", _step_error(case, name), 3)
 
 
 def _step_error(case: xr.Dataset, name: str) -> float:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bywire.contracts.finding import Finding
+from bywire.contracts.finding import Finding, one_by_cause
 from bywire.contracts.subjects import demands_on
 from bywire.core.brake import brakes, load_system, loaded_files
 from bywire.report.answer import Answer, use_case
@@ -157,12 +157,14 @@ def check(
     names: list[str | None] = [name] if name is not None else [*named] or [None]
     demands = [demand for each in names for demand in demands_on(each, FIGURES.all())]
     subject = ", ".join(each or "everything installed" for each in names)
-    findings = []
-    for k, demand in enumerate(demands):
-        if progress is not None:
-            progress(subject, k / len(demands))
-        findings.append(demand.settle())
-    return Check(subject, tuple(findings))
+
+    def settled() -> Iterator[Finding]:
+        for k, demand in enumerate(demands):
+            if progress is not None:
+                progress(subject, k / len(demands))
+            yield demand.settle()
+
+    return Check(subject, tuple(one_by_cause(settled())))
 
 
 def _figures(findings: list[Finding]) -> Table:

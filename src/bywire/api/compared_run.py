@@ -25,6 +25,8 @@ from bywire.bench.stimuli.registry import STIMULI
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError
 from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.report.changes import bench_changes
+from bywire.report.document import Change
 
 _BENCH = {
     "experiment": "experiment", "parameter_set": "parameters", "model": "assembly",
@@ -58,6 +60,8 @@ class ComparedRun:
         Key figures, and the requirements beside them.
     warnings
         What its run warned of.
+    changes
+        What of it was changed.
     """
 
     label: str
@@ -66,6 +70,7 @@ class ComparedRun:
     kpis: tuple[Kpi, ...]
     verdicts: tuple[Verdict, ...]
     warnings: tuple[str, ...] = ()
+    changes: tuple[Change, ...] = ()
 
     @cached_property
     def attributes(self) -> Mapping[str, Any]:
@@ -142,7 +147,10 @@ class ComparedRun:
 def ran(result: Result, label: str, source: str) -> ComparedRun:
     """Return a bench that was run just now."""
     warned = tuple(result.warnings)
-    return ComparedRun(label, source, result.recordings, result.kpis, result.verdicts, warned)
+    return ComparedRun(
+        label, source, result.recordings, result.kpis, result.verdicts, warned,
+        bench_changes(result.bench),
+    )  # fmt: skip
 
 
 def kept(folder: Path) -> ComparedRun:
@@ -155,8 +163,13 @@ def kept(folder: Path) -> ComparedRun:
     """
     result = read_result(folder)
     name = folder.resolve().name
-    recordings, figures, verdicts = result.recordings, result.kpis, result.verdicts
-    return ComparedRun(name, str(folder), recordings, figures, verdicts, result.warnings)
+    changes = tuple(
+        Change(changed, each["value"], each["instead_of"], each["of"])
+        for changed, each in result.changes.items()
+    )
+    return ComparedRun(
+        name, str(folder), result.recordings, result.kpis, result.verdicts, result.warnings, changes
+    )
 
 
 def _settings(

@@ -64,7 +64,7 @@ def compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tupl
 def compared_figures(runs: Sequence[ComparedRun]) -> tuple[Compared, ...]:
     """Return every key figure that some run has; those of another unit stay apart."""
     keys = dict.fromkeys((kpi.name, kpi.unit) for each in runs for kpi in each.kpis)
-    each_run = [{(k.name, k.unit): (k.value, k.error) for k in each.kpis} for each in runs]
+    each_run = [{(k.name, k.unit): (k.value, k.bound) for k in each.kpis} for each in runs]
     rows = []
     for name, unit in keys:
         pairs = [known.get((name, unit), (None, math.nan)) for known in each_run]

@@ -30,6 +30,7 @@ from bywire.report.document import (
     spaced,
 )
 from bywire.report.tables import value_text
+from bywire.report.terminal import change_texts
 from bywire.report.wording import duration
 
 if TYPE_CHECKING:
@@ -97,20 +98,35 @@ class Comparison(Answer):
         verdicts = [TableBlock(verdict_table(self.runs), title="Requirements:")]
         verdicts = verdicts if any(each.verdicts for each in self.runs) else []
         sources = [f"{each.label}: {each.source}" for each in self.runs]
+        changed = self._changed()
+        changes = [Listing(changed, "Changed besides:")] if changed else []
         return Document(
             "Comparison of " + ", ".join(each.label for each in self.runs),
             f"{len(self.runs)} runs; values in the order in which they were given",
             sections=lambda: [
-                Section("What differs", [Listing(sources), *settings]),
+                Section("What differs", [Listing(sources), *settings, *changes]),
                 *([Section("Requirements", verdicts)] if verdicts else []),
                 Section("Curves", self._curves()),
                 *([Section("Differences", apart)] if (apart := self._differences()) else []),
                 Section("Key figures", figures),
             ],
-            brief=spaced([*settings, *figures, *verdicts]),
+            brief=spaced([*settings, *changes, *figures, *verdicts]),
             data=self._data(),
             record="compare.json",
         )
+
+    def _changed(self) -> list[str]:
+        """Return what of the runs was changed and is no setting that differs between them."""
+        differing = {each.name for each in self.settings if each.differs}
+        said: dict[str, list[str]] = {}
+        for each in self.runs:
+            for text in change_texts([c for c in each.changes if c.name not in differing]):
+                said.setdefault(text, []).append(each.label)
+        every = len(self.runs)
+        return [
+            text if len(labels) == every else f"{', '.join(labels)}: {text}"
+            for text, labels in said.items()
+        ]
 
     @property
     def _mixed(self) -> bool:
@@ -234,6 +250,10 @@ class Comparison(Answer):
                     "label": each.label, "source": each.source, "assembly": each.model,
                     "holds": all(v.met for v in each.verdicts),
                     "requirements": [verdict_record(verdict) for verdict in each.verdicts],
+                    "changes": {
+                        change.name: {"value": change.now, "instead_of": change.before}
+                        for change in each.changes
+                    },
                 }
                 for each in self.runs
             ],

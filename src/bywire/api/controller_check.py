@@ -58,9 +58,10 @@ class ControllerCheck:
 
     @property
     def holds(self) -> bool:
-        """Whether all values are Python's and, but for free digits, all bits the same."""
+        """Whether values are Python's, bits the same but for free digits, and contracts kept."""
         return all(
-            each.differing == 0 and (self.is_identical(each) or each.precision in self.inexact)
+            each.differing == each.breaches == 0
+            and (self.is_identical(each) or each.precision in self.inexact)
             for each in self.trials
         )
 
@@ -68,11 +69,12 @@ class ControllerCheck:
         """Return a row for every trial."""
         figures = (Column(each, True) for each in _HEADINGS.values())
         columns = [Column("processor"), Column("precision"), Column("differing", True),
-                   Column("bits"), *figures]  # fmt: skip
+                   Column("breaches", True), Column("bits"), *figures]  # fmt: skip
         rows = tuple(self._row(each) for each in self.trials)
         caption = (
-            f"{self.vectors} vectors: values that differ from Python's, bits beside those of the "
-            "first row; instructions and stack of the task that takes most, calls included."
+            f"{self.vectors} vectors: values that differ from Python's, breaches of the contract "
+            "in README.txt, bits beside those of the first row; instructions and stack of the task "
+            "that takes most, calls included."
         )
         return TableBlock(Table(tuple(columns), rows), caption, width=120)
 
@@ -81,10 +83,11 @@ class ControllerCheck:
         same = Cell("the same" if identical else "others", "good" if identical else "bad")
         figures, goals = figures_of(trial), GOALS.get((trial.target, trial.precision), {})
         cells = [_measured(figures.get(name), goals.get(name)) for name in _HEADINGS]
-        differing = Cell(
-            str(trial.differing), "bad" if trial.differing else "good", trial.differing
-        )
-        return (Cell(trial.target), Cell(trial.precision), differing, same, *cells)
+        counts = [
+            Cell(str(each), "bad" if each else "good", each)
+            for each in (trial.differing, trial.breaches)
+        ]
+        return (Cell(trial.target), Cell(trial.precision), *counts, same, *cells)
 
     def as_object(self) -> dict[str, Any]:
         """Return plain data."""
@@ -95,7 +98,8 @@ class ControllerCheck:
             "trials": [
                 {
                     "processor": each.target, "precision": each.precision,
-                    "differing": each.differing, "identical": self.is_identical(each),
+                    "differing": each.differing, "breaches": each.breaches,
+                    "identical": self.is_identical(each),
                     **figures_of(each),
                     "goals": dict(GOALS.get((each.target, each.precision), {})),
                     "tasks": {name: vars(task) for name, task in (each.tasks or {}).items()},

@@ -37,12 +37,20 @@ class Conversion(Answer):
         Its signals, SI.
     alignment
         How they were brought to one time axis; None where they were left on their own.
+    remarks
+        What the user should know of how the file was read.
     """
 
     source: Path
     target: Path
     recording: xr.Dataset
     alignment: AlignmentReport | None = None
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> list[str]:
+        """What is left out, counts as missing, or was guessed when the file was read."""
+        return list(self.remarks)
 
     def document(self) -> Document:
         """Return the signals, and what was found while they were aligned."""
@@ -93,6 +101,7 @@ class Conversion(Answer):
                 "folded": list(report.folded),
                 "channels": {channel.name: _channel(channel) for channel in report.channels},
             },
+            "notes": list(self.remarks),
             "files": [str(self.target)],
         }  # fmt: skip
 
@@ -104,6 +113,7 @@ def convert(
     *,
     mapping: str | Path | None = None,
     signals: Sequence[str] = (),
+    time: str = "",
     rate: str | float | None = None,
     method: str = "",
     exclude: Sequence[str] | None = None,
@@ -121,7 +131,11 @@ def convert(
     mapping
         File that says what the columns mean.
     signals
-        Signals to keep; all by default.
+        Signals to keep, all by default: names, or columns such as ``"Pressure [psi]"`` and
+        ``"p_mc=Pressure [psi]"``, which gives one a name.
+    time
+        Column of the instants, such as ``"Zeit [s]"``, or a sample rate; that of the file by
+        default.
     rate
         Rate of the one time axis, for instance ``"1 kHz"`` [Hz]; by default every signal keeps its
         own instants.
@@ -149,7 +163,8 @@ def convert(
         When the file cannot be read or written, or something does not fit.
     """
     from bywire.data.format_registry import format_to_write
-    from bywire.data.measurement import read_measurement
+    from bywire.data.measurement import mapping_of
+    from bywire.data.named_columns import read_wanted
     from bywire.data.writing import require_free, write_measurement
 
     shown = no_progress if progress is None else progress
@@ -162,12 +177,12 @@ def convert(
             raise ParameterError(
                 f"--{option} {value}: it says how to resample: give the rate too, as --rate '1 kHz'"
             )
-    dataset = read_measurement(source, mapping, signals=list(signals) or None, progress=shown)
+    dataset, notes = read_wanted(source, mapping_of(mapping), signals, time, shown)
     report = None
     if rate is not None:
         dataset, report = _aligned(dataset, rate, method, exclude, max_gap)
     write_measurement(dataset, target, format=format, overwrite=force, progress=shown)
-    return Conversion(source, target, dataset, report)
+    return Conversion(source, target, dataset, report, notes)
 
 
 def _aligned(

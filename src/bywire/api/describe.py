@@ -31,6 +31,7 @@ from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperime
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI, StimulusKind
 from bywire.campaigns.declared import CAMPAIGNS, DeclaredCampaign
+from bywire.contracts.elements import Element, elements_by_name, parameter_classes
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.catalog import CitedSet as Set
 from bywire.core.errors import UnknownNameError, unknown_name
@@ -49,7 +50,7 @@ from bywire.synthesis.study import STUDIES, Study
 
 Object = dict[str, Any]
 
-_LINES = ("assembly", "system", "at", "unit", "range", "experiment", "records", "source",
+_LINES = ("parts", "assembly", "system", "at", "unit", "range", "experiment", "records", "source",
           "parameter sets", "experiments", "loops", "plants", "studies", "methods")  # fmt: skip
 _TABLES = ("drives", "signals", "found in", "values", "estimates", "kpis")
 
@@ -79,6 +80,7 @@ def described(name: str) -> list[Object]:
         "KPI": (definitions(), lambda kpi: described_kpi(kpi.name, kpi.definition)),
         "parameter": ({n: n for n in parameters()}, described_parameter),
         "parameter group": ({n: n for n in groups()}, described_group),
+        "element": (elements_by_name(), _element),
         "signal": (signals(), lambda rows: {"summary": rows[0]["meaning"], "found in": rows}),
     }
     objects: list[Object] = [
@@ -124,9 +126,9 @@ def describe(name: str) -> Description | Mentioned:
     Parameters
     ----------
     name
-        Name of an assembly, experiment, loop, plant, study, method, parameter set, stimulus, key
-        figure, parameter (``"motor.R_m"``), group of parameters, or signal; or words, such as
-        ``"battery"``.
+        Name of an assembly, element, experiment, loop, plant, study, method, parameter set,
+        stimulus, key figure, parameter (``"motor.R_m"``), group of parameters, or signal; or
+        words, such as ``"battery"``.
 
     Returns
     -------
@@ -170,6 +172,15 @@ def _blocks(thing: Object) -> list[str | Flat]:
     if thing.get("see"):
         blocks += ["", thing["see"]]
     return blocks
+
+
+def _element(element: Element) -> Object:
+    parts = [*element.functions, *(cls.__name__ for cls in parameter_classes(element.module))]
+    return {
+        "summary": element.summary, "source": element.module.__file__ or element.name,
+        "parts": ", ".join(parts),
+        "see": f"'bywire check {element.name}' puts it to the test",
+    }  # fmt: skip
 
 
 def _method(method: Method) -> Object:

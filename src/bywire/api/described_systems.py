@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from bywire.analysis.linear.corners import ABOVE, taking
 from bywire.analysis.linear.plant import PLANTS, Plant
 from bywire.analysis.loop import LOOPS, Loop
 from bywire.bench.experiment import EXPERIMENTS, Case, Experiment
@@ -113,7 +114,9 @@ def described_loop(loop: Loop) -> Object:
 
 def described_plant(plant: Plant) -> Object:
     """Return a plant with its inputs, outputs and states."""
-    model = plant.model(PARAMETER_SETS.find(main_set(plant.assembly)).parameters(), plant.usual)
+    par = PARAMETER_SETS.find(main_set(plant.assembly)).parameters()
+    with taking(ABOVE):  # names of signals are those of any side
+        model = plant.model(par, plant.usual)
     places = places_of(ASSEMBLIES.all()[plant.assembly]).items()
     meaning = {name: signal.label for name, signal, _ in merged_signals(places)}
     parts = (

@@ -64,6 +64,7 @@ def design(
     probability: str = "",
     seed: int = 0,
     progress: Progress | None = None,
+    side: str = "",
 ) -> LoopDesign | LoopScheduleDesign:
     """Choose a loop's gains from requirements.
 
@@ -98,6 +99,8 @@ def design(
         Of the searches.
     progress
         Called with a label and the finished share, 0 to 1.
+    side
+        Of the linear models, as of `bywire.margins`.
 
     Returns
     -------
@@ -118,9 +121,9 @@ def design(
     if schedule:
         return _scheduled(
             loop, parameters, at, overrides, requirements_of(requirements, require), over,
-            None if linear_only else amplitudes, free_derivative, seed, progress,
+            None if linear_only else amplitudes, free_derivative, seed, progress, side,
         )  # fmt: skip
-    case = loop_case(loop, parameters, at, overrides)
+    case = loop_case(loop, parameters, at, overrides, side)
     wanted = requirements_of(requirements, require)
     case, overrides, limits = for_ecu(case, overrides, free_derivative)
     tunables = left_to_choose(loop, narrowed(tunables_of(case), limits), overrides)
@@ -150,11 +153,12 @@ def _scheduled(
     free_derivative: bool,
     seed: int,
     progress: Progress | None,
+    side: str,
 ) -> LoopScheduleDesign:
-    loop = LOOPS.find(name)
-    schedule = scheduled(loop)
+    schedule = scheduled(LOOPS.find(name))
     overrides = {**overrides, **schedule.changes}
-    case = loop_case(name, parameters, "", overrides)
+    case = loop_case(name, parameters, "", overrides, side)
+    loop = case.loop
     case, overrides, limits = for_ecu(case, overrides, free_derivative)
     given = spread(at, loop.at.unit, loop.at.name) if at else []
     points = points_by_region(loop, case.par, given)

@@ -13,20 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.analysis.loop_curves import loop_curve
-from bywire.analysis.margins import figures_at
+from bywire.analysis.margins import NO_LOOP, figures_at
 from bywire.api import design_parts, schedule_parts
 from bywire.api.design_drawn import Probability
 from bywire.api.design_inputs import Spans
+from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase
-from bywire.api.verification_parts import Part
+from bywire.api.verification_parts import Part, judged_on, verdict_text
 from bywire.core.units import shown
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Attachment,
     Banner,
+    Block,
     Document,
     FigureBlock,
     Listing,
+    Paragraph,
     Section,
     TableBlock,
 )
@@ -96,6 +99,12 @@ class DesignAnswer(Answer):
         return "interrupted" if tuning is not None and tuning.interrupted else self.linear.status
 
     @property
+    def notes(self) -> list[str]:
+        """On which side of corners the linear models are."""
+        loop, par = self.case.loop, self.case.par.replace(self.gains)
+        return corner_notes([loop.closed(par, self.case.value).corners])
+
+    @property
     def partial(self) -> str:
         """What an interrupted design still shows."""
         return "what is shown is the best until then"
@@ -109,8 +118,9 @@ class DesignAnswer(Answer):
         """Return result, figures, and the gains as a bench file."""
         loop, status, tried = self.case.loop, self.linear.status, self.tried
         parts = [*self.parts(), *design_parts.limit_lines(self.case, self.limits)]
-        state = status if status != "met" or tried is None or tried.met else "not met"
-        where = "on the linear model" if tried is None else "on the nonlinear bench"
+        verdict = f"requirements {status} on the linear model"
+        if tried is not None:
+            verdict = verdict_text((*self.requirements, *self._missed_floors(tried)), tried)
         required = Listing([requirement.text for requirement in self.requirements])
         return Document(
             f"Design of loop {loop.name}",
@@ -123,24 +133,33 @@ class DesignAnswer(Answer):
             ],
             brief=[part if isinstance(part, str) else TableBlock(part) for part in parts],
             data={**self.data(), "kept_for_the_ecu": {k: list(v) for k, v in self.limits.items()}},
-            banner=Banner(f"requirements {state} {where}", "good" if self.holds else "bad"),
+            banner=Banner(verdict, "good" if self.holds else "bad"),
             attachments=[Attachment(f"{loop.name}-design.toml", self._write_bench)],
             remarks=self._remarks(),
+            changes=self.case.subject.changes,
         )
 
     def _remarks(self) -> list[str]:
         if self.status == "infeasible":
             return ["no gains meet the requirements together: see what excludes what"]
-        if self.status == "met" and not self.holds:
-            return ["the linear requirements are met, those on the nonlinear bench are not"]
+        if self.tried is not None and not self.tried.met:
+            final = self.tried.final
+            missed = [text for text, slack in final.slacks.items() if slack < 0.0]
+            texts = ", ".join(f"{text} ({judged_on(final, text)})" for text in missed)
+            return [f"the linear design meets all requirements, the tried gains do not: {texts}"]
         return []
+
+    @staticmethod
+    def _missed_floors(tried: Verification) -> list[Requirement]:
+        """Return what was to be kept and is not: the verdict counts it."""
+        return [each for each in tried.kept if tried.final.slacks[each.text] < 0.0]
 
     def _write_bench(self, path: Path) -> Path:
         """Write the gains as a bench file."""
         from bywire.report.files import write_bytes
 
         case, tried = self.case, self.tried
-        state = self.linear.status if tried is None or tried.met else "not met on the bench"
+        state = self.linear.status if tried is None or tried.met else "not met"
         text = bench_text(
             f"loop {case.loop.name} at {case.loop.at.name} = {self.points}, requirements {state}",
             case.loop.proof, case.name, self.overrides, case.par, self.gains,
@@ -154,9 +173,12 @@ class DesignAnswer(Answer):
         }  # fmt: skip
         if self.tried is not None and self.tried.tuning is not None:
             every["retuned on the bench"] = self.gains
-        return [_curve(self.case, label, gains) for label, gains in every.items()]
+        curves = [_curve(self.case, label, gains) for label, gains in every.items()]
+        return [each for each in curves if each.curve.margins.has_loop]
 
-    def _figures(self) -> list[FigureBlock]:
+    def _figures(self) -> list[Block]:
+        if not self._curves:
+            return [Paragraph(f"{NO_LOOP}.")]
         limits = {(each.figure, each.sense): each.limit for each in self.requirements}
         captions = {
             "loop-gain": "Loop gain of the nominal linear model; phase margins as the spans in "
@@ -264,9 +286,10 @@ def _curve(case: LoopCase, label: str, gains: Mapping[str, float]) -> DesignCurv
 
     figures = figures_at(case.loop, case.par.replace(gains), case.value)
     step: NDArray[np.float64] = np.zeros(1)
-    span = 0.0
-    if figures.is_stable:
+    span, period = 0.0, figures.closed.period
+    if figures.is_stable and figures.has_loop:
         step, settling = figures.step, figures.settling_time
-        span = max(_STEPS / figures.bandwidth, _SETTLED * settling if settling < np.inf else 0.0)
-    time = np.arange(step.size, dtype=float) * figures.closed.period
+        usual = _STEPS / figures.bandwidth if figures.bandwidth > 0.0 else step.size * period
+        span = max(usual, _SETTLED * settling if settling < np.inf else 0.0)
+    time = np.arange(step.size, dtype=float) * period
     return DesignCurve(label, loop_curve(case.loop, figures), time, step, span)

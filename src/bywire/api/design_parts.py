@@ -49,6 +49,7 @@ def as_object(
                  "value": binding.value, "slack": binding.slack}
                 for binding in design.binding
             ],
+            "unsound": dict(design.unsound),
             "conflicts": [
                 {"requirement": conflict.wanted.text, "best": conflict.best,
                  "with": conflict.kept.text, "excluded": conflict.excludes}
@@ -90,7 +91,7 @@ def as_parts(
         for name in FIGURES
     ]
     parts.append(text_table(["linear", "nominal", "worst", "at", "wanted"], figures))
-    parts += kept_lines(design)
+    parts += kept_lines(design) + unsound_lines(design)
     parts += [
         f"{'binds' if design.binds else 'tightest'}: {binding.requirement.text}, "
         f"{figure_text(binding.requirement.figure, binding.value)} at {binding.case}"
@@ -112,6 +113,15 @@ def kept_lines(design: Design) -> list[str]:
         return []
     texts = ", ".join(requirement.text for requirement in design.kept)
     return [f"kept besides: {texts} (require another limit of the same figure to change it)"]
+
+
+def unsound_lines(design: Design) -> list[str]:
+    """Return which models have no figures, and why, a sentence for each reason."""
+    states = dict.fromkeys(design.unsound.values())
+    return [
+        f"{state}, at {', '.join(k for k, why in design.unsound.items() if why == state)}"
+        for state in states
+    ]
 
 
 def limit_lines(case: LoopCase, limits: Mapping[str, tuple[float, float]]) -> list[str]:

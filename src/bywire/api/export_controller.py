@@ -15,11 +15,12 @@ from bywire.core.arguments import whole_number
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import unknown_name
 from bywire.core.scratch import scratch_folder
-from bywire.export.controller.c_text import PRECISIONS
+from bywire.export.controller.c_text import PRECISIONS, checked_name
 from bywire.export.controller.files import files
 from bywire.export.controller.program import program
 from bywire.export.controller.vectors import vectors as test_vectors
 from bywire.report.answer import Answer, use_case
+from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Flat, Listing, Paragraph, Section
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ class ControllerExport(Answer):
         What was translated.
     vectors
         Test vectors of each task.
+    bench
+        Whose ECU it is.
     check
         How it did on processors; None where that was not asked for.
     """
@@ -50,6 +53,7 @@ class ControllerExport(Answer):
     files: tuple[str, ...]
     program: Program
     vectors: int
+    bench: Bench
     check: ControllerCheck | None = None
 
     @property
@@ -83,6 +87,7 @@ class ControllerExport(Answer):
             brief=[what, written, *(checked or [following])],
             data=self._data(),
             is_paged=False,
+            changes=bench_changes(self.bench),
         )
 
     def _data(self) -> dict[str, Any]:
@@ -110,6 +115,7 @@ def export_controller(
     vectors: int = VECTORS,
     check: bool = False,
     dbc: bool = False,
+    name: str = "",
 ) -> ControllerExport:
     """Write the ECU of a bench's model as readable C99, with all that is needed to try it.
 
@@ -130,6 +136,9 @@ def export_controller(
         on the vectors, compared bit by bit, and measured.
     dbc
         Whether the memory is described as signals of a CAN bus, with the C that fills messages.
+    name
+        What files and symbols begin with, an identifier of C; the model's name by default. ECUs of
+        different names link into one program.
 
     Returns
     -------
@@ -138,6 +147,8 @@ def export_controller(
 
     Raises
     ------
+    ParameterError
+        When the name is no identifier of C.
     ModelError
         With file, line and operation of what cannot be translated.
     FileError
@@ -148,9 +159,11 @@ def export_controller(
     if precision not in PRECISIONS:
         raise unknown_name("precision", precision, PRECISIONS)
     whole_number("vectors", vectors, 1, 100_000)
+    if name:
+        checked_name(name)
     chosen = bench if isinstance(bench, Bench) else read(bench, {})
     case = replace(chosen, faults=()).cases()[0]
-    made = program(case.model, case.par, precision)
+    made = program(case.model, case.par, precision, name)
     cited = PARAMETER_SETS.find(chosen.parameters).values
     every = test_vectors(made, case.memory, vectors)
     texts = files(made, case.memory, cited, every, bus=dbc)
@@ -160,4 +173,4 @@ def export_controller(
         for name in texts:
             os.replace(scratch / name, folder / name)
     checked = check_controller(case, cited, vectors) if check else None
-    return ControllerExport(folder, tuple(texts), made, vectors, checked)
+    return ControllerExport(folder, tuple(texts), made, vectors, chosen, checked)

@@ -19,6 +19,7 @@ from bywire.export.fmu.binaries import PLATFORMS, this_platform
 from bywire.export.interface import KINDS, PARTS
 from bywire.export.variables import Causality
 from bywire.report.answer import Answer, use_case
+from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Paragraph, Section, TableBlock
 from bywire.report.tables import Table, text_table
 
@@ -72,8 +73,8 @@ class ExportedFmu(Answer):
         table = TableBlock(self._table())
         steps = Paragraph(_EXCHANGED if unit.faces.kind == "model-exchange" else (
             f"internal step {shown(schedule.step, 's')}, communication steps are multiples of "
-            f"{shown(schedule.frame, 's')}; time 0 is {shown(unit.made.case.settle, 's')} before "
-            "time zero of the bench"
+            f"{shown(schedule.frame, 's')}; the start time is {shown(unit.made.case.settle, 's')} "
+            "before time zero of the bench"
         ))  # fmt: skip
         written = f"written: {self.path}"
         return Document(
@@ -83,6 +84,7 @@ class ExportedFmu(Answer):
             brief=[table, steps, written],
             data=self._data(),
             is_paged=False,
+            changes=bench_changes(unit.made.bench),
         )
 
     def _table(self) -> Table:

@@ -14,6 +14,7 @@ from bywire.bench import bench_file
 from bywire.bench.bench import Bench
 from bywire.core.scratch import scratch_folder
 from bywire.report.answer import Answer, use_case
+from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Listing, Section
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ class ExportedWasm(Answer):
             brief=[listing],
             data=self._data(),
             is_paged=False,
+            changes=bench_changes(self.made.bench),
         )
 
     def _data(self) -> dict[str, Any]:

@@ -50,6 +50,7 @@ def frequency_response(
     over: str = "",
     progress: Progress | None = None,
     estimate_error: bool = True,
+    side: str = "",
 ) -> FrequencyResponse:
     """Measure a closed loop's response by amplitude on the nonlinear model.
 
@@ -70,6 +71,8 @@ def frequency_response(
     estimate_error
         Whether the response is measured in half steps too: gain, phase and bandwidths then say
         how large their error from the step is (``NAME_step_error`` in ``data``).
+    side
+        Of the linear models, as of `bywire.margins`.
 
     Returns
     -------
@@ -83,7 +86,7 @@ def frequency_response(
     """
     if excitation not in _EXCITATIONS:
         raise unknown_name("excitation", excitation, _EXCITATIONS)
-    case = loop_case(loop, parameters, at, overrides)
+    case = loop_case(loop, parameters, at, overrides, side)
     unit = case.input_unit
     wanted = case.frequencies(frequencies, _POINTS)
     sizes = spread(amplitudes, unit, "amplitudes") if amplitudes else list(case.loop.amplitudes)

@@ -22,6 +22,7 @@ from bywire.api.bandwidth_tables import (
     over_table,
     worst_line,
 )
+from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase
 from bywire.api.response_warnings import purity, response_warnings
 from bywire.report.answer import Answer
@@ -77,6 +78,12 @@ class FrequencyResponse(Answer):
     tolerance: float
 
     @property
+    def notes(self) -> list[str]:
+        """On which side of corners the linear models are."""
+        models = (case.loop.closed(case.par, case.value) for case in self.variants)
+        return corner_notes(model.corners for model in models)
+
+    @property
     def warnings(self) -> list[str]:
         """What left the brake's range, what stuck, and what never repeated."""
         return response_warnings(self.data, self.variants, self.unit, self.tolerance)
@@ -111,6 +118,7 @@ class FrequencyResponse(Answer):
                 recording_file(f"{loop.name}-frequency-response.nc", response)
             ],
             heed=[self.note] if self.note else [],
+            changes=self.case.subject.changes,
         )
 
     def _brief(self, table: TableBlock) -> list[str | Flat]:
@@ -206,5 +214,7 @@ def _table(response: xr.Dataset, linear: Any, unit: str) -> Table:
 def _cell(gain: float, phase: float) -> str:
     if not math.isfinite(gain):
         return "sticks"
+    if gain == 0.0:
+        return "no answer"
     decibel = round(20.0 * math.log10(gain), 2) + 0.0  # no negative zero
     return f"{decibel:.2f} dB {phase:.1f}°"

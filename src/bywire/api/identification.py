@@ -16,6 +16,7 @@ from bywire.identification.estimate import Estimate, as_object
 from bywire.identification.method import Identified
 from bywire.identification.parameter_file import parameter_file
 from bywire.report.answer import Answer
+from bywire.report.changes import changes_block
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -127,7 +128,7 @@ class Identification(Answer):
 
     def document(self) -> Document:
         """Return parameters, checks, curves, residuals, correlations, and how it was made."""
-        method, subject = self.chosen.method, self._subject()
+        method, subject = self.chosen.method, self.chosen.subject
         head = f"{method.name}, {self.source}: {method.summary}"
         return Document(
             f"Identification {method.name}",
@@ -140,13 +141,8 @@ class Identification(Answer):
             record=earlier_result.ESTIMATE,
             file_notes=self._file_notes(),
             prepare=self._prepare,
+            changes=self.chosen.changed,
         )
-
-    def _subject(self) -> Subject | None:
-        method, par = self.chosen.method, self.chosen.par
-        if par is None:
-            return None
-        return Subject(method.name, method.summary, self.chosen.name, par)
 
     def _sections(self, subject: Subject | None) -> list[Section]:
         from bywire.report.method_curve import method_curve
@@ -214,7 +210,8 @@ class Identification(Answer):
         rows = [r for r in parameter_rows(options) if r.name.split(".")[0] not in idle]
         chosen = Details("Options of the method", [TableBlock(parameter_table(rows))])
         if subject is None:
-            return Section("How it was made", [Paragraph(method.summary), chosen])
+            changed = changes_block(self.chosen.changed, "", method.name)
+            return Section("How it was made", [Paragraph(method.summary), changed, chosen])
         section = subject.provenance(f"Method {method.name}: {method.summary}.")
         return Section(section.title, [*section.blocks, chosen])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -18,13 +18,15 @@ from bywire.core.arguments import whole_number
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array, silent
 from bywire.core.units import difference_unit
-from bywire.life.life_file import read_life
+from bywire.life.life_file import CONDITIONS, WEAR, read_life
 from bywire.life.one_by_one import one_by_one
-from bywire.life.plan import LifePlan
+from bywire.life.plan import CONDITION, LifePlan
 from bywire.life.projection import CONFIDENCE, Projection, projected
 from bywire.report.answer import Answer, use_case
+from bywire.report.changes import defaults_of, value_changes
 from bywire.report.document import (
     Banner,
+    Change,
     Details,
     Document,
     FigureBlock,
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST = 100_000  # stops that are run one by one
+_PROJECTION = ("stops", "seed", "share", "tolerance", "longest")
 
 
 @dataclass(frozen=True, repr=False)
@@ -100,7 +103,10 @@ class LifeResult(Answer):
     def document(self) -> Document:
         """Return how long it lasts, what ends it, slow states, and how it was stepped."""
         plan = self.projection.plan
-        subject = Subject(plan.name, plan.life.summary, plan.bench.parameters, plan.bench.par)
+        subject = Subject.of_bench(
+            plan.bench, plan.name, plan.life.summary, [each.name for each in plan.varied],
+            wear_changes(plan),
+        )
         kpis, states = TableBlock(kpi_table(self._rows())), TableBlock(self._states(), width=110)
         warned = [Listing([f"Warning: {text}." for text in self.warnings])] if self.warnings else []
         wear = Details("Parameters of wear", [
@@ -116,11 +122,15 @@ class LifeResult(Answer):
                 Section("Stops", [Listing(self._population()), wear]),
                 subject.provenance(),
             ],
-            brief=[f"life {plan.name}: {plan.life.summary}", "", *spaced([kpis, states])],
+            brief=[
+                f"life {plan.name}: {plan.life.summary}", Listing(self._population()), "",
+                *spaced([kpis, states]),
+            ],
             data=self._data(),
             banner=Banner(self._outcome()),
             attachments=[recording_file("life.nc", self.data)],
             record="life.json",
+            changes=subject.changes,
         )
 
     def _outcome(self) -> str:
@@ -213,6 +223,23 @@ _CAPTION = (
     "Slow states over stops, with dots where stops were simulated, and what is left of the limits: "
     "life ends where the first one is zero."
 )
+
+
+def wear_changes(plan: LifePlan) -> tuple[Change, ...]:
+    """Return what a life file sets of wear, of the conditions of stops, and of the projection."""
+    life, wear = plan.life, plan.life.defaults()
+    origins = {name: ", ".join(filter(None, (c.kind, c.where))) for name, c in life.values.items()}
+    of = f"the life {life.name}"
+    settings = {each.name: each.default for each in fields(LifePlan) if each.name in _PROJECTION}
+    chosen = {name: getattr(plan, name) for name in settings}
+    return (
+        *value_changes(plan.wear, wear.flat(), of, WEAR, origins),
+        *value_changes(plan.conditions, CONDITIONS.flat(), defaults_of("lives"), CONDITION),
+        *(
+            Change(f"projection.{name}", f"{chosen[name]:g}", f"{default:g}", defaults_of("lives"))
+            for name, default in settings.items() if chosen[name] != default
+        ),
+    )  # fmt: skip
 
 
 @use_case

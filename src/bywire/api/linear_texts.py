@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,13 +19,12 @@ from bywire.analysis.reduction.error import ReductionError
 from bywire.analysis.reduction.reduce import TOLERANCE, Reduced, reduce
 from bywire.bench.values import number
 from bywire.core.errors import ParameterError, quoted
+from bywire.core.pairs import DIGITS, read_count
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 from bywire.report.document import Attachment, Flat, Paragraph, TableBlock
 from bywire.report.rate_table import left_out, rate_table
 from bywire.report.wording import amount
-
-_DIGITS = 9  # of an order: more is no order
 
 
 def poles_block(model: LinearModel, caption: str = "") -> list[Flat]:
@@ -99,14 +98,13 @@ def reduced(model: LinearModel, text: str, band: float | None = None) -> Reduced
         When the band has a wrong unit.
     """
     if _is_number(text):
-        if not text.strip().isdecimal() or not int(text):
+        order = read_count(text)
+        if not order:
             raise ParameterError(
-                f"--reduce {quoted(text)}: an order is a whole number >= 1; with a unit, it is a "
-                "band, for instance '150 Hz'"
+                f"--reduce {quoted(text)}: an order is a whole number >= 1 of at most "
+                f"{DIGITS} digits; with a unit, it is a band, for instance '150 Hz'"
             )
-        if len(text.strip()) > _DIGITS:
-            raise ParameterError(f"--reduce {quoted(text)}: no model has so many states")
-        return reduce(model, order=int(text), band=band)
+        return reduce(model, order=order, band=band)
     return reduce(model, band=number(text, "Hz", "--reduce"), tolerance=TOLERANCE)
 
 
@@ -128,6 +126,12 @@ def reduced_object(reduced: Reduced) -> dict[str, Any]:
         "bound": reduced.bound.tolist(),
         "error": error_object(reduced.error),
     }
+
+
+def corner_notes(corners: Iterable[Sequence[str]]) -> list[str]:
+    """Return on which side of corners linear models are, each once; nothing where on none."""
+    texts = dict.fromkeys(text for each in corners for text in each)
+    return [f"the operating point lies on a corner: the linear model is {each}" for each in texts]
 
 
 def reduced_line(reduced: Reduced) -> str:

@@ -42,6 +42,7 @@ def linearize(
     friction: str = "",
     speed: str = "",
     dither: bool = False,
+    side: str = "",
 ) -> LinearizedLoop | LinearizedPlant | PlantLocus:
     """Return the exact linear model of a closed loop or of a plant.
 
@@ -63,6 +64,8 @@ def linearize(
         Of a plant: ``"removed"``, ``"sliding"`` or ``"stuck"``, and the motor's speed of sliding.
     dither
         Of a loop: whether it is also linearized about its motion under dither, friction on.
+    side
+        As of `bywire.margins`.
 
     Returns
     -------
@@ -82,9 +85,11 @@ def linearize(
         if locus and reduce:
             raise ParameterError("--reduce and --locus exclude each other: ask for one of them")
         if locus:
-            return plant_locus(name, parameters, at, overrides, friction, speed, locus)
-        return linearize_plant(name, parameters, at, overrides, friction, speed, reduce)
-    case = _loop_case(name, parameters, at, overrides, friction, speed)
+            return plant_locus(name, parameters, at, overrides, friction, speed, locus, side)
+        return linearize_plant(
+            name, parameters, at, overrides, friction, speed, reduce, side
+        )
+    case = _loop_case(name, parameters, at, overrides, friction, speed, side)
     model = case.loop.closed(case.par, case.value)
     dithered = _dithered(case) if dither else None
     return LinearizedLoop(
@@ -98,13 +103,19 @@ def linearize(
 
 
 def linear_case(
-    name: str, parameters: str, at: str, overrides: Mapping[str, Any], friction: str, speed: str
+    name: str,
+    parameters: str,
+    at: str,
+    overrides: Mapping[str, Any],
+    friction: str,
+    speed: str,
+    side: str = "",
 ) -> LoopCase | PlantCase:
     """Return the loop or the plant that is linearized, with its parameters and operating point.
 
     Parameters
     ----------
-    name, parameters, at, overrides, friction, speed
+    name, parameters, at, overrides, friction, speed, side
         As of `linearize`.
 
     Raises
@@ -113,12 +124,18 @@ def linear_case(
         As `linearize`.
     """
     if name in PLANTS.all():
-        return plant_case(name, parameters, at, overrides, friction, speed)
-    return _loop_case(name, parameters, at, overrides, friction, speed)
+        return plant_case(name, parameters, at, overrides, friction, speed, side)
+    return _loop_case(name, parameters, at, overrides, friction, speed, side)
 
 
 def _loop_case(
-    name: str, parameters: str, at: str, overrides: Mapping[str, Any], friction: str, speed: str
+    name: str,
+    parameters: str,
+    at: str,
+    overrides: Mapping[str, Any],
+    friction: str,
+    speed: str,
+    side: str,
 ) -> LoopCase:
     if name not in LOOPS.all():
         raise LOOPS.unknown(name, PLANTS)
@@ -128,7 +145,7 @@ def _loop_case(
                 f"{option} is for plants ({', '.join(PLANTS.all())}): controllers are linearized "
                 "without dry friction; leave it out"
             )
-    return loop_case(name, parameters, at, overrides)
+    return loop_case(name, parameters, at, overrides, side)
 
 
 def _followed(case: LoopCase, range_: str) -> Locus:

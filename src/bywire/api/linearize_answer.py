@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,8 @@ from bywire.analysis.crossings import bandwidth
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.rates import rates
 from bywire.analysis.locus import Locus
+from bywire.analysis.loop_figures import LoopFigures
+from bywire.analysis.margins import NO_LOOP
 from bywire.analysis.periodic.averaged_map import PeriodicModel
 from bywire.analysis.reduction.reduce import Reduced
 from bywire.api import linear_texts as texts
@@ -68,11 +70,24 @@ class LinearizedLoop(Answer):
     dithered: PeriodicModel | None = None
     dithered_error: float = math.nan
 
+    @property
+    def notes(self) -> list[str]:
+        """On which side of corners the model is."""
+        return texts.corner_notes([self.model.corners])
+
+    @cached_property
+    def state(self) -> str:
+        """``"stable"``, ``"unstable"``, or that there is no loop."""
+        gain, closed = self.case.loop.gain_and_closed(self.case.par, self.case.value)
+        if not LoopFigures(gain, closed).has_loop:
+            return NO_LOOP
+        return "stable" if self.model.is_stable else "unstable"
+
     def document(self) -> Document:
         """Return poles, responses, locus, reduction and motion under dither."""
         loop, model = self.case.loop, self.model
         poles = texts.poles_block(model, "Poles, slowest first.")
-        stable = "stable" if model.is_stable else "UNSTABLE"
+        stable = "UNSTABLE" if self.state == "unstable" else self.state
         head = (
             f"closed loop {loop.name} of {self.case.name} at {self.case.point}: {stable}, sampled "
             f"with {model.period * 1e3:g} ms"
@@ -91,8 +106,9 @@ class LinearizedLoop(Answer):
             ],
             brief=[head, *poles, *over, *self._brief_reduced(), *self._brief_dithered()],
             data=self._data(),
-            banner=Banner("stable", "good") if model.is_stable else Banner("unstable", "bad"),
+            banner=Banner(self.state, "good" if self.state == "stable" else "bad"),
             attachments=self._attachments(),
+            changes=self.case.subject.changes,
         )
 
     def _locus_listing(self, locus: Locus) -> Listing:
@@ -162,7 +178,8 @@ class LinearizedLoop(Answer):
         transfers = shown.pop("transfer_functions")
         return {
             **self.case.heading, **shown, "rates": texts.pairs(rates(self.model)),
-            "stable": self.model.is_stable, "transfer_functions": transfers,
+            "stable": self.model.is_stable, "has_loop": self.state != NO_LOOP,
+            "transfer_functions": transfers,
         }  # fmt: skip
 
     def _data(self) -> dict[str, Any]:

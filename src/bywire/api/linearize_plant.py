@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, get_args
 
+from bywire.analysis.linear.corners import read_sides
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import Friction
 from bywire.analysis.linear.plant import PLANTS, Plant, PlantPoint
@@ -84,11 +85,15 @@ class LinearizedPlant(Answer):
     model: LinearModel
     reduced: Reduced | None = None
 
+    @property
+    def notes(self) -> list[str]:
+        """On which side of corners the model is."""
+        return texts.corner_notes([self.model.corners])
+
     @cached_property
     def exact(self) -> LinearModel | None:
         """The model that this one simplifies; None where it is exact."""
-        whole = self.case.plant.whole
-        return None if whole is None else whole(self.case.par, self.case.point)
+        return self.case.plant.exact(self.case.par, self.case.point)
 
     @cached_property
     def error(self) -> ReductionError | None:
@@ -111,6 +116,7 @@ class LinearizedPlant(Answer):
             brief=[head, *texts.poles_block(model), *self._notes(), *self._brief_reduced()],
             data=self._data(),
             attachments=[texts.json_file(f"{case.plant.name}-linear-model.json", self._data())],
+            changes=case.subject.changes,
         )
 
     def _brief_reduced(self) -> list[str | Flat]:
@@ -199,6 +205,7 @@ class PlantLocus(Answer):
             brief=[head, listing],
             data=data,
             attachments=[texts.json_file(f"{name}-locus.json", data)],
+            changes=case.subject.changes,
         )
 
 
@@ -210,10 +217,11 @@ def linearize_plant(
     friction: str,
     speed: str,
     reduce: str,
+    side: str = "",
 ) -> LinearizedPlant:
     """Return the linear model of a plant; see `bywire.api.linearize.linearize`."""
-    case = plant_case(name, parameters, at, overrides, friction, speed)
-    model = case.plant.model(case.par, case.point)
+    case = plant_case(name, parameters, at, overrides, friction, speed, side)
+    model = case.plant.linear(case.par, case.point)
     reduced = texts.reduced(model, reduce, case.plant.band) if reduce else None
     return LinearizedPlant(case, model, reduced)
 
@@ -226,16 +234,17 @@ def plant_locus(
     friction: str,
     speed: str,
     range_: str,
+    side: str = "",
 ) -> PlantLocus:
     """Return the poles of a plant over a range; see `bywire.api.linearize.linearize`."""
-    case = plant_case(name, parameters, at, overrides, friction, speed)
+    case = plant_case(name, parameters, at, overrides, friction, speed, side)
     quantity = case.point.quantity
     over, unit, values = range_of(range_, quantity, case.par, "--locus")
 
     def model(value: float) -> LinearModel:
         if over == quantity.name:
-            return case.plant.model(case.par, replace(case.point, value=value))
-        return case.plant.model(case.par.replace({over: value}), case.point)
+            return case.plant.linear(case.par, replace(case.point, value=value))
+        return case.plant.linear(case.par.replace({over: value}), case.point)
 
     return PlantLocus(case, locus_of(model, over, unit, sorted(values)))
 
@@ -247,6 +256,7 @@ def plant_case(
     overrides: Mapping[str, Any],
     friction: str,
     speed: str,
+    side: str = "",
 ) -> PlantCase:
     """Return a plant with its parameters and its operating point.
 
@@ -262,13 +272,16 @@ def plant_case(
         Parameters by dotted name, with units.
     friction, speed
         What dry friction does, and how fast the motors turn; empty: removed, at rest.
+    side
+        As of `loop_case`.
 
     Raises
     ------
     InputError
         For names that are unknown, values out of range, and sets of another brake.
     """
-    plant = PLANTS.find(name)
+    read_sides(side)
+    plant = replace(PLANTS.find(name), side=side)
     chosen_set, par = parameters_for(f"plant {plant.name!r}", plant.assembly, parameters, overrides)
     quantity, value = _operating_point(plant, at)
     kind, omega = _friction(friction, speed)

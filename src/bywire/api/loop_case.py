@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bywire.analysis.linear.corners import read_sides
 from bywire.analysis.loop import LOOPS, Loop, Quantity
 from bywire.api.parameter_choice import parameters_for
 from bywire.bench.values import number
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.core.pairs import read_count
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
 
@@ -84,7 +86,11 @@ class LoopCase:
 
 
 def loop_case(
-    name: str, parameters: str = "", at: str = "", changes: Mapping[str, Any] = MappingProxyType({})
+    name: str,
+    parameters: str = "",
+    at: str = "",
+    changes: Mapping[str, Any] = MappingProxyType({}),
+    side: str = "",
 ) -> LoopCase:
     """Return a loop with its parameters and its operating point.
 
@@ -98,13 +104,16 @@ def loop_case(
         Operating point with its unit; empty for the loop's own.
     changes
         Parameters by dotted name, with units.
+    side
+        Side on which linear models are taken at a corner, see `read_sides`.
 
     Raises
     ------
     InputError
         For names that are unknown, values out of range, and sets of another brake.
     """
-    loop = LOOPS.find(name)
+    read_sides(side)
+    loop = replace(LOOPS.find(name), side=side)
     name, par = parameters_for(f"loop {loop.name!r}", loop.assembly, parameters, changes)
     value = number(at, loop.at.unit, loop.at.name) if at else loop.at.default
     return LoopCase(loop, name, par, value)
@@ -123,24 +132,26 @@ def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> lis
     parts = [part.strip() for part in text.split(":")]
     if len(parts) == 1:
         return [number(part.strip(), unit, name) for part in text.split(",")]
-    if len(parts) != 3 or not parts[2].isdecimal() or not 2 <= int(parts[2]) <= _MOST:
+    count = read_count(parts[2]) if len(parts) == 3 else None
+    if count is None or not 2 <= count <= _MOST:
         raise ParameterError(
-            f"{name} = {text!r}: write LOW:HIGH:COUNT with 2 to {_MOST} values, or values with "
-            "commas"
+            f"{name} = {quoted(text)}: write LOW:HIGH:COUNT with 2 to {_MOST} values, or "
+            "values with commas"
         )
     low, high = (number(part, unit, name) for part in parts[:2])
     if logarithmic and low <= 0:
         raise ParameterError(
-            f"{name} = {text!r}: the range is logarithmic, and must start above 0 {unit}"
+            f"{name} = {quoted(text)}: the range is logarithmic, and must start above 0 {unit}"
         )
     if low == high:
         raise ParameterError(
-            f"{name} = {text!r}: the range is a single value: write it alone, {name}={parts[0]}"
+            f"{name} = {quoted(text)}: the range is a single value: write it alone, "
+            f"{name}={quoted(parts[0])[1:-1]}"
         )
     if not low < high:
-        raise ParameterError(f"{name} = {text!r}: the first value must be below the second")
+        raise ParameterError(f"{name} = {quoted(text)}: the first value must be below the second")
     between = np.geomspace if logarithmic else np.linspace
-    return [float(value) for value in between(low, high, int(parts[2]))]
+    return [float(value) for value in between(low, high, count)]
 
 
 def over_range(text: str, chosen: LoopCase, option: str = "--over") -> tuple[str, str, list[float]]:

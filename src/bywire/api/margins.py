@@ -9,12 +9,16 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from bywire.analysis.linear.corners import CornerError
 from bywire.analysis.loop_curves import Family, loop_curve
-from bywire.analysis.margins import LoopMargins, figures_at, margins_of, worst
+from bywire.analysis.margins import NO_LOOP, LoopMargins, figures_at, margins_of, worst
+from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase, loop_case, over_range
+from bywire.core.parameters import ParameterSet
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
     Banner,
+    Block,
     Document,
     FigureBlock,
     Listing,
@@ -29,23 +33,25 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 UNITS = {
-    "gain": "1", "phase": "deg", "crossover": "Hz", "delay": "s", "disk": "1", "sensitivity": "1",
-    "complementary": "1", "bandwidth": "Hz",
+    "gain": "1", "lower_gain": "1", "phase": "deg", "crossover": "Hz", "delay": "s", "disk": "1",
+    "sensitivity": "1", "complementary": "1", "bandwidth": "Hz",
 }  # fmt: skip
 """unit of each margin"""
 TITLES = {
-    "gain": "gain margin", "phase": "phase margin", "delay": "delay margin", "disk": "disk margin",
+    "gain": "gain margin", "lower_gain": "lower gain margin", "phase": "phase margin",
+    "delay": "delay margin", "disk": "disk margin",
     "sensitivity": "max |S|", "complementary": "max |T|",
 }  # fmt: skip
 """headings that say more than the margin's name"""
 LEGEND = (
-    "Linear loop as it is sampled, dry friction left out. Gain margin as a factor; delay margin: "
-    "dead time that may be added; disk margin: 2 is the best, 0 none; S, T: sensitivity and "
-    "complementary sensitivity. Nothing is defined for an unstable loop."
+    "Linear loop as it is sampled, dry friction left out. Gain margins: factors by which the loop "
+    "gain may grow, and to which it may fall; delay margin: dead time that may be added; disk "
+    "margin: 2 is the best, 0 none; S, T: sensitivity and complementary sensitivity. An unstable "
+    "loop has no margins, nor has a loop without gain."
 )
 """what the headings mean"""
 _CAPTIONS = {
-    "loop-gain": "Loop gain as it is sampled; phase and gain margin as the spans in which they "
+    "loop-gain": "Loop gain as it is sampled; phase and gain margins as the spans in which they "
     "are read.",
     "nyquist": "Nyquist plot near -1; the shaded disk is what the disk margin keeps free.",
     "nichols": "Nichols chart with contours of |T|; shaded, what the disk margin keeps free.",
@@ -75,14 +81,21 @@ class Margins(Answer):
     unit: str = "1"
     values: tuple[float, ...] = ()
 
+    @property
+    def notes(self) -> list[str]:
+        """On which side of corners the linear models are."""
+        return corner_notes(margins.corners for margins in self.margins)
+
     @cached_property
     def family(self) -> Family:
-        """The loop gains with their margins, for figures."""
-        case, cases = self.case, [(self.case.par, self.case.value)]
+        """The loop gains with their margins, for figures; loops without gain have none."""
+        case, values = self.case, self.values or (math.nan,)
+        cases = [(self.case.par, self.case.value)]
         if self.name:
             cases = case.loop.varied(case.par, case.value, self.name, self.values)
-        curves = [loop_curve(case.loop, figures_at(case.loop, *each)) for each in cases]
-        return Family(tuple(curves), self.name, self.unit, self.values or (math.nan,))
+        kept = [k for k, margins in enumerate(self.margins) if margins.has_loop]
+        curves = [loop_curve(case.loop, figures_at(case.loop, *cases[k])) for k in kept]
+        return Family(tuple(curves), self.name, self.unit, tuple(values[k] for k in kept))
 
     def document(self) -> Document:
         """Return table, worst cases and figures."""
@@ -91,14 +104,17 @@ class Margins(Answer):
         texts = worst_texts(self.margins, self.name, self.unit, self.values) if self.name else []
         worst_of = [Listing(texts, "Worst of each:")] if self.name else []
         ranged = " Emphasized: the least disk margin, or what is unstable. Dashed: unstable loops."
-        figures = [
+        is_drawn = any(margins.has_loop for margins in self.margins)
+        figures: list[Block] = [] if is_drawn else [Paragraph(f"{NO_LOOP}.")]
+        figures += [
             FigureBlock(
                 lambda kind=kind: _drawn(kind, self.family),  # type: ignore[misc]
                 caption + (ranged if self.name else ""), f"{loop.name}-{kind}",
             )
-            for kind, caption in _CAPTIONS.items()
+            for kind, caption in _CAPTIONS.items() if is_drawn
         ]  # fmt: skip
         head = f"loop {loop.name} of {self.case.name} at {self.case.point}, cut at {loop.cut}"
+        none = [] if self.name or self.margins[0].has_loop else [NO_LOOP]
         worst_line = ["worst: " + "; ".join(texts)] if self.name else []
         provenance = self.case.subject.provenance(
             f"Exact linear model of the sampled loop, cut at {loop.cut}."
@@ -111,9 +127,10 @@ class Margins(Answer):
                 Section("Figures", figures),
                 provenance,
             ],
-            brief=[head, table, *worst_line, Paragraph(LEGEND)],
+            brief=[head, table, *none, *worst_line, Paragraph(LEGEND)],
             data=self._data(),
             banner=self._banner(),
+            changes=self.case.subject.changes,
         )
 
     def _data(self) -> dict[str, Any]:
@@ -129,11 +146,17 @@ class Margins(Answer):
         return {**shared, "over": self.name, "cases": cases, "worst": least}
 
     def _banner(self) -> Banner:
-        unstable = sum(not margins.stable for margins in self.margins)
-        if unstable:
-            count = f"{unstable} of {len(self.margins)} loops unstable"
-            return Banner(count if self.name else "unstable", "bad")
-        return Banner("stable over the whole range" if self.name else "stable", "good")
+        states = [margins.state for margins in self.margins]
+        if not self.name:
+            (state,) = states
+            text = NO_LOOP if state == "no loop" else state
+            return Banner(text, "good" if state == "stable" else "bad")
+        lost = [(states.count(state), state) for state in ("unstable", "no loop")]
+        texts = [f"{count} of {len(states)} {words}" for count, words in (
+            (lost[0][0], "loops unstable"), (lost[1][0], "values without a loop")) if count]
+        if texts:
+            return Banner(", ".join(texts), "bad")
+        return Banner("stable over the whole range", "good")
 
 
 @use_case
@@ -143,6 +166,8 @@ def margins(
     at: str = "",
     overrides: Mapping[str, Any] = MappingProxyType({}),
     over: str = "",
+    *,
+    side: str = "",
 ) -> Margins:
     """Return margins and bandwidth of a loop as it is sampled.
 
@@ -158,11 +183,15 @@ def margins(
         Other parameters by dotted name: SI numbers, or texts with units.
     over
         Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"``, or ``"at=5 bar:35 bar:7"``.
+    side
+        Side of the corners of operations on which the operating point lies: ``"above"``,
+        ``"below"``, or of single operations ``"FILE:LINE=above"``, with commas. Without, a point
+        on a corner whose sides have different linear models is refused.
 
     Returns
     -------
     Margins
-        Gain margin as a factor, phase margin in degree, crossover and bandwidth in Hz, delay margin
+        Gain margins as factors, phase margin in degree, crossover and bandwidth in Hz, delay margin
         in s: at the operating point, or at each value of the range with the worst.
 
     Raises
@@ -177,13 +206,24 @@ def margins(
     >>> round(found.margins[0].phase)  # degree
     76
     """
-    case = loop_case(loop, parameters, at, overrides)
+    case = loop_case(loop, parameters, at, overrides, side)
     if not over:
         return Margins(case, (margins_of(figures_at(case.loop, case.par, case.value)),))
     name, unit, values = over_range(over, case)
     cases = case.loop.varied(case.par, case.value, name, values)
-    each = tuple(margins_of(figures_at(case.loop, *point)) for point in cases)
+    each = tuple(
+        _margins_at(case, point, f"{name} = {amount(at, unit)}")
+        for point, at in zip(cases, values, strict=True)
+    )
     return Margins(case, each, name, unit, tuple(values))
+
+
+def _margins_at(case: LoopCase, point: tuple[ParameterSet, float], label: str) -> LoopMargins:
+    """Return the margins at one value of a range; an error says at which."""
+    try:
+        return margins_of(figures_at(case.loop, *point))
+    except CornerError as error:
+        raise CornerError(f"{label}: {error}") from None
 
 
 def margins_table(
@@ -201,13 +241,19 @@ def margins_table(
     heading = [*(TITLES.get(k, k) for k in UNITS), "stable"]
     rows = [
         (*(_cell(getattr(margins, k), unit, 3) for k, unit in UNITS.items()),
-         Cell("yes", value=True) if margins.stable else Cell("NO", "bad", value=False))
+         _state_cell(margins))
         for margins in margins_at
     ]  # fmt: skip
     if name:
         heading = [clean(name), *heading]
         rows = [(_cell(v, unit), *row) for v, row in zip(values, rows, strict=True)]
     return Table(tuple(map(Column, heading)), tuple(rows))
+
+
+def _state_cell(margins: LoopMargins) -> Cell:
+    if margins.is_sound:
+        return Cell("yes", value=True)
+    return Cell("NO" if margins.has_loop else "no loop", "bad", value=False)
 
 
 def _cell(value: float, unit: str, digits: int = 4) -> Cell:
@@ -217,14 +263,16 @@ def _cell(value: float, unit: str, digits: int = 4) -> Cell:
 def worst_texts(
     margins_at: Sequence[LoopMargins], name: str, unit: str, values: Sequence[float]
 ) -> list[str]:
-    """Return where the loop is unstable, and the worst of each margin where it is stable."""
+    """Return where there is no stable loop, and the worst of each margin where there is one."""
     pairs = list(zip(values, margins_at, strict=True))
-    lost = [amount(value, unit) for value, margins in pairs if not margins.stable]
-    kept = [(margins, value) for value, margins in pairs if margins.stable]
+    kept = [(margins, value) for value, margins in pairs if margins.is_sound]
     texts = []
-    if lost:
-        where = lost[0] if len(lost) == 1 else f"{lost[0]} to {lost[-1]}"
-        texts.append(f"unstable at {len(lost)} of {len(margins_at)} values of {name} ({where})")
+    for state in ("unstable", "no loop"):
+        lost = [amount(value, unit) for value, margins in pairs if margins.state == state]
+        if lost:
+            where = lost[0] if len(lost) == 1 else f"{lost[0]} to {lost[-1]}"
+            count = f"{len(lost)} of {len(margins_at)} values of {name} ({where})"
+            texts.append(f"{state} at {count}")
     if kept:
         least = worst([margins for margins, _ in kept], [value for _, value in kept])
         texts += [

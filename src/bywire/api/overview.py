@@ -16,9 +16,9 @@ from bywire.report.document import Document, Section, TableBlock
 from bywire.report.tables import Table, text_table
 
 TOPICS = (
-    "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "loops",
-    "plants", "studies", "lives", "methods", "stimuli", "faults", "campaigns", "residuals", "kpis",
-    "kpis_of_experiments",
+    "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "elements",
+    "loops", "plants", "studies", "lives", "methods", "stimuli", "faults", "campaigns", "residuals",
+    "kpis", "kpis_of_experiments",
 )  # fmt: skip
 """kinds of things that have a name"""
 _WIDTH = 80  # characters of a line of the index

@@ -13,6 +13,7 @@ from bywire.bench.bench import Bench
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import leaf_fields
 from bywire.report.answer import Answer, use_case
+from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Listing, Section
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ class BenchPage(Answer):
             data={"file": str(self.file), "case": self.made.case.label, "bytes": self.size,
                   "compressed": self.compressed},
             is_paged=False,
+            changes=bench_changes(self.made.bench),
         )  # fmt: skip
 
 

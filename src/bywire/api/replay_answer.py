@@ -82,10 +82,7 @@ class Replay(Answer):
     def document(self) -> Document:
         """Return how well it fits, stretch by stretch, with figures and tracked parameters."""
         bench, inputs = self.bench, ", ".join(map(str, self.replayed.inputs.data_vars))
-        subject = Subject(
-            bench.name or bench.experiment, bench.summary(), bench.parameters,
-            self.replayed.run.par,
-        )  # fmt: skip
+        subject = Subject.of_bench(bench)
         table = TableBlock(fit_table(self.fits), width=110)
         definitions = [f"{k.name}: {k.definition}" for k in self.fits[0].kpis] if self.fits else []
         head = f"{self.source} drives {bench.experiment} of {bench.parameters} by {inputs}"
@@ -104,6 +101,7 @@ class Replay(Answer):
             banner=self._banner(),
             attachments=[Attachment("replay.nc", self._write_signals)],
             record="replay.json",
+            changes=subject.changes,
         )  # fmt: skip
 
     def _figures(self) -> list[FigureBlock]:
@@ -169,7 +167,10 @@ class Replay(Answer):
                     "name": fit.segment.name, "signal": fit.signal,
                     "start": fit.segment.start, "stop": fit.segment.stop,
                     "figures": {
-                        k.name: {"value": k.value, "unit": k.unit, "error": k.error}
+                        k.name: {
+                            "value": k.value, "unit": k.unit, "error": k.error,
+                            "converges": k.converges,
+                        }
                         for k in fit.kpis
                     },
                     "tolerances": [
@@ -214,9 +215,9 @@ def fit_table(fits: Sequence[SegmentFit]) -> Table:
 
 
 def _figure(kpi: Kpi) -> Cell:
-    if kpi.unit == "s" and math.isfinite(kpi.value) and not kpi.error > 0.0:
+    if kpi.unit == "s" and math.isfinite(kpi.value) and not kpi.bound > 0.0:
         return Cell(duration(kpi.value), value=kpi.value)
-    return Cell(measured_amount(kpi.value, kpi.unit, kpi.error, 3), value=kpi.value)
+    return Cell(measured_amount(kpi.value, kpi.unit, kpi.bound, 3), value=kpi.value)
 
 
 def _tracked(track: Track) -> dict[str, Any]:

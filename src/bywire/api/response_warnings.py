@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.analysis.margins import NO_LOOP
 from bywire.analysis.response.large_signal import Variant, leaving
 from bywire.report.wording import amount
 
@@ -29,6 +30,10 @@ def response_warnings(
         Share within which a window had to repeat the one before.
     """
     texts = []
+    empty = [variant for variant in variants if not variant.has_loop]
+    if empty:
+        count = f" at {len(empty)} of {len(variants)} values" if len(variants) > 1 else ""
+        texts.append(f"{NO_LOOP}{count}; crossover and margins are not defined")
     for k, size in enumerate(response["amplitude"].values):
         row = response.isel(amplitude=k)
         label = f"amplitude {amount(float(size), unit, 3)}"

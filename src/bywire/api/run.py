@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, overload
 
-from bywire.api.run_remarks import remarks, unexpected
+from bywire.api.run_remarks import remarks
 from bywire.api.run_sections import energy, how_it_was_made, outcome, schematic_section, source_says
 from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
@@ -21,6 +21,7 @@ from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Progress
 from bywire.bench.stated import stated_figures
 from bywire.report.answer import Answer, use_case
+from bywire.report.changes import bench_changes
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -40,6 +41,13 @@ from bywire.report.wording import amount, measured_amount
 if TYPE_CHECKING:
     from bywire.api.run_over import BenchRange
     from bywire.report.bench_figures import Shown
+
+_SCATTERED = (
+    "Errors \"up to\" belong to figures that do not converge: over double, single and half steps, "
+    "their differences do not shrink as the scheme's order 2 demands. Their errors are not known: "
+    "what is given bounds 95 % of such errors, by the scatter of the figure over all steps."
+)
+
 
 @dataclass(frozen=True)
 class BenchResult(Result, Answer):
@@ -65,9 +73,10 @@ class BenchResult(Result, Answer):
                 f"{kpi.definition} ({kpi.note})" if kpi.note else kpi.definition,
                 verdicts[kpi.name].limit if kpi.name in verdicts else "",
                 verdicts[kpi.name].outcome if kpi.name in verdicts else "",
-                kpi.error,
+                kpi.bound,
                 stated_figure(stated[kpi.name], kpi.unit) if kpi.name in stated else "",
                 stated[kpi.name].where if kpi.name in stated else "",
+                kpi.converges,
             )
             for kpi in self.kpis
         ]  # fmt: skip
@@ -93,20 +102,22 @@ class BenchResult(Result, Answer):
         narrow = TableBlock(kpi_table([replace(row, where="") for row in self.rows]))
         said = [*remarks(self), *self._unplayed()]
         notes: list[Block] = [Paragraph(f"Warning: {text}.") for text in self.warnings]
-        beside = [*unexpected(self), *self._unplayed()]  # the page has a table of changes
-        notes += [Listing(beside)] if beside else []
+        notes += [Listing(said)] if said else []
         return Document(
             bench.name or bench.experiment,
             f"{bench.summary()}; parameter set {bench.parameters}",
             sections=lambda: [
                 outcome(self, self.rows, notes),
                 Section("Figures", [*self._figures(), *source_says(self)]),
-                Section("Key figures", [table]),
+                Section("Key figures", [table, *self._scatter()]),
                 *energy(self.ledgers()),
                 *schematic_section(self.bench),
                 how_it_was_made(self, self._step_errors()),
             ],
-            brief=[*([Listing(said)] if said else []), *([narrow] if self.kpis else [])],
+            brief=[
+                *([Listing(said)] if said else []), *([narrow] if self.kpis else []),
+                *self._scatter(),
+            ],
             data={**self._data(), "remarks": said},
             banner=self._banner(),
             attachments=[
@@ -116,7 +127,14 @@ class BenchResult(Result, Answer):
             record="result.json",
             remarks=[_remark(v) for v in self.verdicts if not v.met],
             is_paged=self.status != "interrupted",
+            changes=bench_changes(bench),
         )  # fmt: skip
+
+    def _scatter(self) -> list[Paragraph]:
+        """Return what the errors of figures that do not converge are; nothing without any."""
+        if all(kpi.converges for kpi in self.kpis):
+            return []
+        return [Paragraph(_SCATTERED)]
 
     def _animations(self) -> list[Attachment]:
         if not self.animated or self.status == "interrupted":
@@ -302,6 +320,8 @@ def _remark(verdict: Verdict) -> str:
             f"requirement undecided: {verdict.kpi} is {written}, give or take "
             f"{amount(verdict.error, verdict.unit, 2)} from the step{wanted}: take a smaller step"
         )
+    if not verdict.is_decided and not math.isinf(verdict.error):
+        return f"requirement undecided: {verdict.kpi} is not defined{wanted} ({verdict.note})"
     if not verdict.is_decided:
         return (
             f"requirement undecided: {verdict.kpi} is defined with one of the steps and half of "

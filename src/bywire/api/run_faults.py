@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bywire.api.study_tested import varied_texts
 from bywire.bench.running import Progress
 from bywire.campaigns.campaign_file import read_campaign
 from bywire.campaigns.findings import CampaignFindings, FaultFinding
@@ -54,6 +55,11 @@ class FaultCampaign(Answer):
         return f"<FaultCampaign {plan.name}: {len(plan.faults)} faults, {plan.total} runs>"
 
     @property
+    def warnings(self) -> list[str]:
+        """What the reaction makes worse."""
+        return list(self.findings.harm_of_reaction())
+
+    @property
     def notes(self) -> list[str]:
         """What the figures stand for."""
         plan, findings = self.findings.plan, self.findings
@@ -74,39 +80,43 @@ class FaultCampaign(Answer):
                 f"the reaction, {plan.reaction.failing.name} {_milliseconds(plan.reaction.delay)} "
                 "after a fault is seen, is put in where the fault leaves it possible"
             )
+            said.append(findings.benefit_of_reaction())
         return said
 
     def document(self) -> Document:
         """Return the table of faults, coverage, and when each is too much and seen."""
-        plan, findings = self.findings.plan, self.findings
-        bench = plan.bench
-        varied = [each.name for each in plan.varied]
-        subject = Subject(plan.name, bench.summary(varied), bench.parameters, bench.par)
+        plan, bench, findings = self.findings.plan, self.findings.plan.bench, self.findings
+        subject = Subject.of_bench(bench, plan.name, varied=[each.name for each in plan.varied])
         table = TableBlock(self._table(), width=0)
         residuals = TableBlock(self._residual_table(), width=120)
         kinds = ", ".join(f"{n} {kind}" for kind, n in findings.kinds().most_common())
+        known = Listing([kinds, *varied_texts(plan.varied), *self.notes])
         return Document(
             f"Faults: {plan.name}",
             f"{len(plan.faults)} faults, {plan.total} runs of {subject.line}",
             sections=lambda: [
                 Section("Faults", [table]),
-                Section("What else to know", [Listing([kinds, *self.notes])]),
+                Section("What else to know", [known]),
                 Section("Figures", self._figures()),
                 Section("Residuals", [residuals]),
                 Section("Criteria", [TableBlock(self._criteria_table())]),
                 subject.provenance("" if self.folder is None else f"Outcomes: {self.folder}."),
             ],
-            brief=[table, "", residuals, "", Listing([kinds, *self.notes])],
+            brief=[table, "", residuals, "", known],
             data=self._data(),
             banner=self._banner(),
             record="report.json",
+            changes=subject.changes,
+            headline=_sentences(self.warnings),
         )  # fmt: skip
 
     def _banner(self) -> Banner:
-        coverage = self.findings.coverage
-        if math.isnan(coverage):
-            return Banner("no fault is dangerous in this maneuver")
-        return Banner(f"diagnostic coverage {100 * coverage:.3g} % ({coverage_class(coverage)})")
+        coverage, harm = self.findings.coverage, self.warnings
+        text = (
+            "no fault is dangerous in this maneuver" if math.isnan(coverage)
+            else f"diagnostic coverage {100 * coverage:.3g} % ({coverage_class(coverage)})"
+        )  # fmt: skip
+        return Banner(_sentences([*harm, text]) if harm else text, "bad" if harm else "none")
 
     def _table(self) -> Table:
         plan = self.findings.plan
@@ -146,7 +156,8 @@ class FaultCampaign(Answer):
             return "-"
         counts = {name: (int(np.sum(~np.isnan(t))), t.size) for name, t in each.reacted.items()}
         said = [f"{name} ({n}/{m})" for name, (n, m) in counts.items() if n]
-        return ", ".join(said) or "nothing"
+        worse = "worse: " if each.only_with_reaction else ""
+        return worse + ", ".join(said) if said else "nothing"
 
     def _residual_table(self) -> Table:
         findings = self.findings
@@ -211,7 +222,7 @@ class FaultCampaign(Answer):
                              "high": alarms.high},
             "thresholds": dict(findings.healthy.thresholds),
             "faults": [self._fault_data(each) for each in findings.faults],
-            "notes": self.notes,
+            "warnings": self.warnings, "notes": self.notes,
         }  # fmt: skip
 
     def _fault_data(self, each: FaultFinding) -> dict[str, Any]:
@@ -224,6 +235,12 @@ class FaultCampaign(Answer):
             "runs": each.cases, "violated": each.criteria, "tolerated_for": each.tolerance,
             "violated_after": each.violated.tolist(), "seen_after": each.seen.tolist(),
             "first_by": each.first_seen_by,
+            "with_reaction": None if not each.reacted else {
+                "runs": len(each.answered),
+                "violated_after": {n: times.tolist() for n, times in each.reacted.items()},
+                "violated_only_with_it": each.only_with_reaction,
+                "violated_sooner_with_it": each.sooner_with_reaction,
+            },
             "extremes": {name: {"least": float(sides[0].min()), "largest": float(sides[1].max()),
                                 "end": float(sides[2].mean())}
                          for name, sides in each.extremes.items()},
@@ -278,6 +295,11 @@ def run_faults(
         raise KeyboardInterrupt(
             f"{kept} of {len(plan.faults)} faults are kept: the same command goes on"
         ) from None
+
+
+def _sentences(texts: Sequence[str]) -> str:
+    """Return texts as sentences."""
+    return " ".join(f"{text[:1].upper()}{text[1:]}." for text in texts)
 
 
 def coverage_class(coverage: float) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.api.loop_case import spread
+from bywire.api.run_remarks import fault_texts
 from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed, run_benches, varied_leaf
 from bywire.bench.kpis.kpi import Kpi
@@ -106,21 +107,22 @@ class BenchRange(Answer):
         bench = self.bench
         kpis = self._kpis()
         title = bench.name or bench.experiment
-        subject = Subject(title, bench.summary([self.name]), bench.parameters, bench.par)
+        subject = Subject.of_bench(bench, varied=[self.name])
         pieces = [kpis[k : k + _COLUMNS] for k in range(0, len(kpis), _COLUMNS)]
         tables = [TableBlock(self._table(piece), width=110) for piece in pieces]
-        verdicts = list(self._verdict_texts())
-        listing = [Listing(verdicts, "Requirements:")] if verdicts else []
+        judged = list(self._judged())
+        listing = [Listing([text for _, text in judged], "Requirements:")] if judged else []
         listing += [Listing(said)] if (said := self._indistinct()) else []
+        faults = [Listing(said)] if (said := fault_texts(bench)) else []
         return Document(
             f"{title} over {self.name}",
             subject.line,
             sections=lambda: [
-                Section("Key figures", [*listing, TableBlock(self._table(kpis))]),
+                Section("Key figures", [*faults, *listing, TableBlock(self._table(kpis))]),
                 Section("Figures", self._figures()),
                 subject.provenance(f"Engine: {', '.join(self._engines())}."),
             ],
-            brief=spaced([*tables, *listing]),
+            brief=spaced([*faults, *tables, *listing]),
             data=self._data(),
             banner=self._banner(),
             attachments=[
@@ -128,7 +130,11 @@ class BenchRange(Answer):
                 for label in dict.fromkeys(n for r in self.results for n in r.recordings)
             ],
             record="range.json",
-            remarks=[f"requirement not met: {text}" for text in verdicts if ": ok " not in text],
+            remarks=[
+                f"requirement {'undecided' if outcome == 'undecided' else 'not met'}: {text}"
+                for outcome, text in judged if outcome != "met"
+            ],
+            changes=subject.changes,
         )
 
     def _write(self, label: str, path: Any) -> Any:
@@ -157,7 +163,7 @@ class BenchRange(Answer):
             for kpi in result.kpis:
                 by_name.setdefault(kpi.name, []).append(kpi)
         return {
-            name: are_distinct([kpi.value for kpi in each], [kpi.error for kpi in each])
+            name: are_distinct([kpi.value for kpi in each], [kpi.bound for kpi in each])
             for name, each in by_name.items()
         }
 
@@ -191,28 +197,38 @@ class BenchRange(Answer):
                 verdicts.setdefault(verdict.kpi, []).append((value, verdict))
         return verdicts
 
-    def _verdict_texts(self) -> Iterator[str]:
+    def _judged(self) -> Iterator[tuple[str, str]]:
+        """Yield the outcome of each requirement over all values, and a sentence on it."""
         for name, pairs in self._verdicts().items():
-            missed = [(value, verdict) for value, verdict in pairs if not verdict.met]
+            at = {
+                outcome: [(value, each) for value, each in pairs if each.outcome == outcome]
+                for outcome in ("missed", "undecided")
+            }
             head = f"{name} {pairs[0][1].limit}"
-            if not missed:
-                yield f"{head}: met {self._at([value for value, _ in pairs])}"
-                continue
-            word = "missed" if any(x.is_decided for _, x in missed) else "undecided"
-            sign = -1.0 if pairs[0][1].limit.strip().startswith("<") else 1.0
-            known = [(v, x) for v, x in missed if math.isfinite(x.value)]
-            worst = min(known, key=lambda pair: sign * pair[1].value, default=missed[0])
-            yield (
-                f"{head}: {word} {self._at([value for value, _ in missed])}, worst "
-                f"{amount(worst[1].value, worst[1].unit)} at {amount(worst[0], self.unit)}"
-            )
+            texts = [f"{outcome} {self._worst(open_)}" for outcome, open_ in at.items() if open_]
+            if texts:
+                yield ("missed" if at["missed"] else "undecided"), f"{head}: {'; '.join(texts)}"
+            else:
+                yield "met", f"{head}: met {self._at([value for value, _ in pairs])}"
+
+    def _worst(self, pairs: Sequence[tuple[float, Verdict]]) -> str:
+        """Return at which values a requirement has an outcome, and the worst figure of these."""
+        where = self._at([value for value, _ in pairs])
+        known = [(value, each) for value, each in pairs if math.isfinite(each.value)]
+        if not known:
+            return f"{where}: {pairs[0][1].note}" if pairs[0][1].note else where
+        sign = -1.0 if pairs[0][1].limit.strip().startswith("<") else 1.0
+        value, worst = min(known, key=lambda pair: sign * pair[1].value)
+        return f"{where}, worst {amount(worst.value, worst.unit)} at {amount(value, self.unit)}"
 
     def _banner(self) -> Banner:
         if not self.bench.requirements:
             return Banner(f"done for {len(self.values)} values")
-        met = sum(all(v.met for v in result.verdicts) for result in self.results)
-        text = f"all requirements met at {met} of {len(self.values)} values"
-        return Banner(text, "good" if self.holds else "bad")
+        statuses = [result.status for result in self.results]
+        text = f"all requirements met at {statuses.count('passed')} of {len(self.values)} values"
+        if open_ := statuses.count("undecided"):
+            text += f", undecided at {open_}"
+        return Banner(text, "good" if self.holds else "bad" if "failed" in statuses else "open")
 
     def _figures(self) -> list[Block]:
         from bywire.report.kpi_curves import kpi_curves
@@ -292,6 +308,7 @@ def run_over(
             f"over {over!r}: write NAME=LOW:HIGH:COUNT, for instance motor.R_m=0.2ohm:0.6ohm:9"
         )
     leaf = varied_leaf(bench, name)
+    bench.require_effect(name)
     values = spread(text, leaf.unit.symbol, name)
     if len({*values}) < 2:
         raise ParameterError(f"over {over!r}: name two different values at least")
@@ -305,7 +322,7 @@ def _cell(name: str, result: Result) -> Cell:
     if name not in known:
         return Cell("-")
     kpi = known[name]
-    text = measured_amount(kpi.value, kpi.unit, kpi.error)
+    text = measured_amount(kpi.value, kpi.unit, kpi.bound)
     for verdict in result.verdicts:
         if verdict.kpi == name and not verdict.met:
             judged = "missed" if verdict.is_decided else "undecided"

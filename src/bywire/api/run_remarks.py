@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from bywire.api.run_changes import parameter_changes
 from bywire.bench.bench import Bench
+from bywire.bench.experiment import Recordings
 from bywire.bench.kpis.registry import FAMILIES
 from bywire.bench.result import Result
 from bywire.core.model import ASSEMBLIES
@@ -13,32 +13,32 @@ from bywire.report.wording import amount
 
 _MOST = {"share_stuck": 0.5, "share_sat_current": 0.1, "share_sat_duty": 0.1}
 _MISSED = 0.05  # of the step's height
-_SHOWN = 6  # changes that are named
 
 
 def remarks(result: Result) -> list[str]:
-    """Return what was changed from the cited set, and what a run did instead of what was asked.
+    """Return what a run did instead of what was asked.
 
     A run is remarkable that is stuck more than half of its time, at a limit more than a tenth of
     it, or that ends off its set point by more than a twentieth of the step; what its model says is.
     """
-    return [*change_texts(result.bench), *unexpected(result)]
+    faults = fault_texts(result.bench, result.recordings)
+    return [*faults, *_shares(result), *_set_point(result), *_of_models(result)]
 
 
-def unexpected(result: Result) -> list[str]:
-    """Return the same without what was changed."""
-    return [*fault_texts(result), *_shares(result), *_set_point(result), *_of_models(result)]
+def fault_texts(bench: Bench, recordings: Recordings | None = None) -> list[str]:
+    """Return each fault of a bench in a sentence: how much, when, what it is.
 
-
-def fault_texts(result: Result) -> list[str]:
-    """Return each fault of a bench in a sentence: how much, when, what it is."""
+    ``recordings``: its runs, of which none may meet the fault; None where they are not looked at.
+    """
     texts = []
-    for fault in result.bench.injections:
+    for fault in bench.injections:
         mode, course = fault.mode, fault.course
         size = f" = {amount(fault.value, mode.unit)}" if mode.unit else ""
         until = f" to {amount(course.end, 's')}" if math.isfinite(course.end) else " on"
-        is_met = any(course.is_there(each["time"].values).any()
-                     for each in result.recordings.values() if "time" in each)  # fmt: skip
+        is_met = recordings is None or any(
+            course.is_there(each["time"].values).any()
+            for each in recordings.values() if "time" in each
+        )  # fmt: skip
         unmet = "" if is_met else "; no recorded row meets it"
         texts.append(
             f"fault {mode.name}{size}, from {amount(course.onset, 's')}{until}: "
@@ -63,15 +63,6 @@ def _of_models(result: Result) -> list[str]:
             par = type(result.bench.par).model_validate_json(text)
             texts |= dict.fromkeys(model().remarks(recording, par))
     return list(texts)
-
-
-def change_texts(bench: Bench) -> list[str]:
-    """Return which parameters are not those of the cited set, in one sentence if there are any."""
-    texts = [f"{each.name} = {each.now} (was {each.before})" for each in parameter_changes(bench)]
-    if not texts:
-        return []
-    more = f" and {len(texts) - _SHOWN} more" if len(texts) > _SHOWN else ""
-    return [f"changed from {bench.parameters}: {', '.join(texts[:_SHOWN])}{more}"]
 
 
 def _shares(result: Result) -> list[str]:

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from bywire.api.run_changes import change_table, option_changes, parameter_changes
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger
 from bywire.bench.result import Result
@@ -18,6 +17,7 @@ from bywire.report.document import Block, Details, Paragraph, Section, TableBloc
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.schematic.blocks import schematic_blocks
 from bywire.report.stated_levels import stated_level
+from bywire.report.subject import Subject
 from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
 from bywire.report.wording import amount
 
@@ -33,18 +33,7 @@ def outcome(result: Result, rows: Sequence[KpiRow], notes: Sequence[Block]) -> S
     blocks: list[Block] = []
     if judged := [row for row in rows if row.limit]:
         blocks.append(TableBlock(kpi_table(judged), "What was required."))
-    return Section("Outcome", [*blocks, what_was_changed(result.bench), *notes])
-
-
-def what_was_changed(bench: Bench) -> TableBlock | Paragraph:
-    """Return what a bench changes of its parameter set and its experiment, or that it does not."""
-    changes = parameter_changes(bench) + option_changes(bench)
-    if changes:
-        return TableBlock(change_table(changes), "What was changed.")
-    return Paragraph(
-        f"Nothing was changed: all parameters are those of {bench.parameters}, all options those "
-        f"of {bench.experiment}."
-    )
+    return Section("Outcome", [*blocks, Subject.of_bench(result.bench).changes_block, *notes])
 
 
 def options_in_use(bench: Bench) -> Details:

@@ -21,7 +21,10 @@ from bywire.synthesis.requirement import FIGURES, Requirement
 from bywire.synthesis.schedule_designer import scheduled
 from bywire.synthesis.verification import Verification
 
-_SEEN = ("bandwidth", "crossover", "phase_margin", "gain_margin", "disk_margin", "overshoot")
+_SEEN = (
+    "bandwidth", "crossover", "phase_margin", "gain_margin", "lower_gain_margin", "disk_margin",
+    "overshoot",
+)  # fmt: skip
 
 
 def as_object(

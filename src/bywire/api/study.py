@@ -20,6 +20,7 @@ from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import silent
 from bywire.report.answer import Answer, use_case
+from bywire.report.changes import defaults_of, value_changes
 from bywire.report.document import (
     Details,
     Document,
@@ -72,7 +73,11 @@ class StudyResult(Answer):
     def document(self) -> Document:
         """Return key figures, limits, maps, tables and assumptions."""
         study, findings = self.definition, self.findings
-        subject = Subject(study.name, study.summary, self.name, self.par)
+        defaults = study.defaults.flat()
+        subject = Subject(
+            study.name, study.summary, self.name, self.par,
+            further=value_changes(self.options, defaults, defaults_of(study.name)),
+        )  # fmt: skip
         kpis = TableBlock(kpi_table(self._rows()))
         tables = [TableBlock(cut_table(cut), f"{cut.title}.", _WIDTH) for cut in findings.cuts]
         maps = [
@@ -108,6 +113,7 @@ class StudyResult(Answer):
             ],
             data=self._data(),
             attachments=[recording_file(f"{study.name}.nc", findings.data)],
+            changes=subject.changes,
         )  # fmt: skip
 
     def _rows(self) -> list[KpiRow]:

@@ -158,7 +158,9 @@ class StudyRun(Answer):
         plan, findings = self.plan, self.findings
         if not len(self.cases):
             return self._empty()
-        subject = Subject(plan.name, tested_line(plan), plan.bench.parameters, plan.bench.par)
+        subject = Subject.of_bench(
+            plan.bench, plan.name, tested_line(plan), [each.name for each in plan.varied]
+        )
         is_rare = bool(findings.rare)
         table = failure_table(findings) if is_rare else demand_table(findings)
         demands = TableBlock(table, width=120)
@@ -181,7 +183,7 @@ class StudyRun(Answer):
             f"{len(self.cases)} cases ({plan.design}, seed {plan.seed}) of {subject.line}",
             sections=lambda: [
                 *([Section("Requirements", judged)] if judged else []),
-                tested_section(self.nominal, plan.tested),
+                tested_section(self.nominal, plan.tested, subject),
                 *([Section("What else to know", [Listing(remarks)])] if remarks else []),
                 *([Section("Key figures", figures)] if figures else []),
                 *([Section("What drives them", [*drivers, *unexplained])] if drivers or unexplained
@@ -191,10 +193,10 @@ class StudyRun(Answer):
                 *([Section(self._shown.title, [Listing(texts)])] if judged and texts else []),
                 *([Section("Cases without a result", [Listing(missing)])] if missing else []),
                 Section("What varies", [TableBlock(varied_table(plan)), *correlated(plan)]),
-                subject.provenance(f"Chunks of the study: {self.folder}."),
+                subject.provenance(f"Chunks of the study: {self.folder}.", has_changes=False),
             ],
             brief=spaced([
-                *tested_brief(self.nominal),
+                *tested_brief(self.nominal, plan),
                 *([demands] if judged else []), *figures, *drivers[:_BRIEF],
                 *(unexplained if findings.plan.sensitivity is None else []),
                 *([f"and {more} more such tables in the report"] if more > 0 else []),
@@ -208,6 +210,7 @@ class StudyRun(Answer):
                 f"requirement {each.outcome}: {each.demand.text}"
                 for each in findings.judgments if each.outcome != "met"
             ],
+            changes=subject.changes,
         )  # fmt: skip
 
     def _empty(self) -> Document:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
-from bywire.api.run_changes import option_changes, parameter_changes
-from bywire.api.run_remarks import change_texts, fault_texts
-from bywire.api.run_sections import options_in_use, what_was_changed
+from bywire.api.run_remarks import fault_texts
+from bywire.api.run_sections import options_in_use
 from bywire.bench.bench import Bench
 from bywire.bench.result import Result
+from bywire.report.changes import bench_changes
 from bywire.report.document import Block, Listing, Paragraph, Section
+from bywire.report.subject import Subject
 from bywire.report.wording import clean
-from bywire.studies.plan import StudyPlan
+from bywire.studies.plan import StudyPlan, Varied
 from bywire.studies.studied_bench import StudiedBench
 
 
@@ -25,13 +27,17 @@ def tested_line(plan: StudyPlan) -> str:
     return f"{line}, with the fault{'s' * (len(names) > 1)} {', '.join(names)}"
 
 
-def tested_brief(nominal: Result) -> list[Listing]:
-    """Return for a terminal what is changed of the parameters, and the faults, if there are any."""
-    said = [*change_texts(nominal.bench), *fault_texts(nominal)]
-    return [Listing(said)] if said else []
+def tested_brief(nominal: Result, plan: StudyPlan) -> list[Listing]:
+    """Return for a terminal the faults, if there are any, and what varies."""
+    return [Listing([*fault_texts(nominal.bench, nominal.recordings), *varied_texts(plan.varied)])]
 
 
-def tested_section(nominal: Result, source: StudiedBench | None) -> Section:
+def varied_texts(varied: Sequence[Varied]) -> list[str]:
+    """Return a sentence on each quantity that takes several values."""
+    return [clean(f"{each.name} varies: {each.distribution.text}") for each in varied]
+
+
+def tested_section(nominal: Result, source: StudiedBench | None, subject: Subject) -> Section:
     """Return where the bench comes from, its faults, what it changes, and its options.
 
     Parameters
@@ -40,11 +46,13 @@ def tested_section(nominal: Result, source: StudiedBench | None) -> Section:
         The bench itself, run.
     source
         Where it comes from; None where that is not known.
+    subject
+        The bench with what was changed of it.
     """
-    faults = fault_texts(nominal)
+    faults = fault_texts(nominal.bench, nominal.recordings)
     blocks: list[Block] = [Paragraph(f"{_source_text(source)}.")] if source is not None else []
     blocks += [Listing(faults)] if faults else []
-    blocks += [what_was_changed(nominal.bench), options_in_use(nominal.bench)]
+    blocks += [subject.changes_block, options_in_use(nominal.bench)]
     return Section("What was tested", blocks)
 
 
@@ -54,14 +62,14 @@ def tested_data(bench: Bench, source: StudiedBench | None) -> dict[str, Any]:
     Values are SI numbers, those of changes and of what the study sets texts with units; the end of
     a fault that stays is None.
     """
-    changes = parameter_changes(bench) + option_changes(bench)
     return {
         "file": None if source is None else source.bench,
         "set": {} if source is None else dict(source.changes),
         "experiment": bench.experiment,
         "parameters": bench.parameters,
         "changes": {
-            each.name: {"value": each.now, "instead_of": each.before} for each in changes
+            each.name: {"value": each.now, "instead_of": each.before}
+            for each in bench_changes(bench)
         },
         "options": bench.chosen_options.model_dump(mode="json"),
         "faults": [

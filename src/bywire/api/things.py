@@ -13,6 +13,7 @@ from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.campaigns.declared import CAMPAIGNS
 from bywire.campaigns.residual import RESIDUALS
+from bywire.contracts.elements import every_element
 from bywire.core.brake import brakes, loaded_files
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import unknown_name
@@ -40,6 +41,7 @@ def all_things() -> dict[str, Any]:
         "parameter_sets": {cited.name: cited.summary for cited in sets},
         "experiments": _of_assemblies(experiments),
         "generic_experiments": anywhere,
+        "elements": {name: each.summary for name, each in every_element().items()},
         "loops": _of_assemblies(_in_order(LOOPS)),
         "plants": _of_assemblies(_in_order(PLANTS)),
         "studies": _of_assemblies(_in_order(STUDIES)),

@@ -91,6 +91,7 @@ class TrustStudy(Answer):
             record=earlier_result.STUDY,
             prepare=lambda folder: earlier_result.require_own(folder, method.name),
             is_paged=False,
+            changes=self.chosen.changed,
         )
 
     def _blocks(self) -> Iterator[Flat]:

@@ -11,7 +11,7 @@ from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount
 from bywire.synthesis.bench_figures import BenchFigures
 from bywire.synthesis.candidate import Candidate
-from bywire.synthesis.requirement import FIGURES
+from bywire.synthesis.requirement import FIGURES, GAINS, Requirement
 from bywire.synthesis.verification import Verification
 
 Part = str | Table
@@ -35,7 +35,7 @@ def verification_parts(
         rows += _figure_rows(
             case, f" at {label}", [candidate.corners.get(label) for candidate in shown]
         )
-    for name in ("phase_margin", "gain_margin", "disk_margin"):
+    for name in ("phase_margin", "gain_margin", "lower_gain_margin", "disk_margin"):
         both = [nominal, tried.nominal][: len(columns)]
         cells = [figure_text(name, figures[name]) for figures in both]
         rows.append([f"{name}, linear model", *cells])
@@ -55,10 +55,11 @@ def verification_parts(
         )
     kept = {requirement.text for requirement in tried.kept}
     for text, slack in tried.final.slacks.items():
-        where = "kept besides" if text in kept else "on the bench"
         verdict = "met" if slack >= 0.0 else "NOT met"
         room = 100.0 * tried.final.room(text)
-        parts.append(f"{where}: {text} {verdict} ({room:+.1f} % of the limit)")
+        also = "also kept, " if text in kept else ""
+        where = judged_on(tried.final, text)
+        parts.append(f"{also}{where}: {text} {verdict} ({room:+.1f} % of the limit)")
     conflict = tried.conflict()
     if conflict is not None:
         first, other, edge = conflict
@@ -68,10 +69,38 @@ def verification_parts(
     return parts
 
 
+def judged_on(candidate: Candidate, text: str) -> str:
+    """Return where a requirement was judged, in words."""
+    shown, possible = candidate.shown[text]
+    if not shown:
+        return "on the linear model"
+    both = " and the linear model" if text.startswith("phase_margin") else ""
+    part = "" if shown == possible else f" ({shown} of {possible} sines show it)"
+    return f"on the bench{both}{part}"
+
+
+def verdict_text(requirements: Sequence[Requirement], tried: Verification) -> str:
+    """Return whether requirements are met, and which part of them the bench shows."""
+    final = tried.final
+    on_bench = [each.text for each in requirements if final.shown[each.text][0]]
+    linear = [each.text for each in requirements if not final.shown[each.text][0]]
+    parts = ((on_bench, "on the nonlinear bench"), (linear, "on the linear model alone"))
+    texts = []
+    for names, where in parts:
+        missed = sum(final.slacks[name] < 0.0 for name in names)
+        if missed:
+            texts.append(f"{missed} of {len(names)} not met {where}")
+        elif names:
+            texts.append(f"{len(names)} met {where}")
+    if len(texts) == 1 and not any(final.slacks[each.text] < 0.0 for each in requirements):
+        return f"requirements met {parts[0][1] if on_bench else parts[1][1]}"
+    return f"requirements: {', '.join(texts)}"
+
+
 def figure_text(name: str, value: float) -> str:
     """Return a figure with its unit; a gain margin as a factor and in dB."""
     text = amount(value, FIGURES[name].unit, 3)
-    if name == "gain_margin" and math.isfinite(value) and value > 0.0:
+    if name in GAINS and math.isfinite(value) and value > 0.0:
         text += f" ({20.0 * math.log10(value):.3g} dB)"
     return text
 
@@ -151,6 +180,7 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
         **_figures(candidate.figures),
         "corners": {label: _figures(corner) for label, corner in candidate.corners.items()},
         "slacks": {text: candidate.room(text) for text in candidate.slacks},
+        "judged_on": {text: judged_on(candidate, text) for text in candidate.slacks},
     }
 
 

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from bywire.bench.bench_source import usual_set
+from bywire.bench.effects import are_alike, refuse_without_effect, switches_of
 from bywire.bench.experiment import Case, Cases, Experiment, as_run
 from bywire.bench.experiment_choice import experiment_of
 from bywire.bench.extent import check_seed, checked_interval, checked_step
@@ -20,11 +22,21 @@ from bywire.bench.requirements import check
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.bench.stimulus_sections import stimulus_of, stimulus_sections
 from bywire.bench.values import parsed
-from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.errors import ModelError, ParameterError, place_of, quoted, unknown_name
-from bywire.core.parameters import ParameterSet
+from bywire.core.catalog import PARAMETER_SETS, outdated_values
+from bywire.core.errors import (
+    InputError,
+    ModelError,
+    ParameterError,
+    place_of,
+    quoted,
+    unknown_name,
+)
+from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.units import shown
 from bywire.simulation.engine import engine_names
 from bywire.simulation.run import Run
+
+_SHARE = 1e-3  # of a value, by which it is moved to see what follows it
 
 
 @dataclass(frozen=True)
@@ -36,7 +48,8 @@ class Bench:
     experiment
         Name of the experiment.
     parameters
-        Name of a parameter set of the catalog.
+        Name of a parameter set of the catalog. Where it is empty, the main set of the experiment's
+        brake; an experiment of any brake takes the only set of the brakes loaded by path.
     overrides, options
         Other parameters and options of the experiment, by dotted name: SI numbers, or texts with
         units such as ``"0.35 ohm"``. Durations below may be written so as well. Parameters may also
@@ -74,7 +87,7 @@ class Bench:
     """
 
     experiment: str
-    parameters: str
+    parameters: str = ""
     overrides: Mapping[str, Any] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
     stimulus: Mapping[str, Any] = field(default_factory=dict)
@@ -99,11 +112,14 @@ class Bench:
         check_seed(self.seed)
         if self.engine not in engine_names():
             raise unknown_name("engine", self.engine, engine_names())
+        object.__setattr__(self, "parameters", self.parameters or usual_set(self.experiment))
         known = PARAMETER_SETS.find(self.parameters)
+        written = tuple(self.overrides)
         object.__setattr__(self, "overrides", settled(known.parameters(), self.overrides))
         if self.assembly == known.assembly:
             object.__setattr__(self, "assembly", "")
         chosen = self.definition
+        object.__setattr__(self, "experiment", chosen.name)  # not an earlier name of it
         if chosen.assembly != self.system:
             raise ParameterError(
                 f"experiment {chosen.name!r} tests a {chosen.assembly}, but "
@@ -117,9 +133,9 @@ class Bench:
         self._check_names()
         check(self.requirements, chosen.kpis_with(self.chosen_options))
         if chosen.preview is None:
-            self.cases()
+            self._require_effects(written, self.cases(), chosen.cases)
         else:
-            self._made(chosen.preview)
+            self._require_effects(written, self._made(chosen.preview), chosen.preview)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a copy is made of: not what follows from it."""
@@ -138,6 +154,51 @@ class Bench:
             if name not in known:
                 raise unknown_name(f"stimulus beside {chosen.name}", name, known)
 
+    def _require_effects(
+        self, names: Sequence[str], cases: Sequence[Case], make: Cases
+    ) -> None:
+        """Refuse parameters that a choice switches off: they would be listed and do nothing.
+
+        ``names``: those that are written out; a pattern may match some that have no effect.
+        """
+        base = PARAMETER_SETS.find(self.parameters).parameters()
+        for name in filter(self.overrides.__contains__, names):
+            value, before = self.par.value(name), base.value(name)
+            if value == before or isinstance(value, (str, bool)):
+                continue
+            switches = switches_of(name, cases)
+            if switches and not self._is_used(name, before, cases, make):
+                refuse_without_effect(name, value, switches, self.par)
+
+    def _is_used(self, name: str, other: Any, cases: Sequence[Case], make: Cases) -> bool:
+        """Return whether the experiment asks for a parameter: with another value, it is another."""
+        try:
+            par, following = self.par.replace({name: other}), self.definition.following
+            if following is not None and following(par) != following(self.par):
+                return True
+            others = self.cases_with(par, self.chosen_options, make)
+            made = tuple(case.aligned(self.step, self.record) for case in others)
+        except InputError:
+            return True
+        return not are_alike(cases, made)
+
+    def require_effect(self, name: str) -> None:
+        """Refuse a parameter that is to vary and that a choice switches off.
+
+        Raises
+        ------
+        ParameterError
+            With what switches it on.
+        """
+        if name not in self.par.leaves():
+            return
+        make = self.definition.preview or self.definition.cases
+        cases, value = self._previewed, self.par.value(name)
+        switches = switches_of(name, cases)
+        moved = value + _SHARE * (abs(value) or 1.0)
+        if switches and not self._is_used(name, moved, cases, make):
+            refuse_without_effect(name, value, switches, self.par)
+
     def _check_names(self) -> None:
         """Refuse options that stand among the parameters, the likeliest mistake of all."""
         options = self.definition.defaults.flat().keys()
@@ -153,7 +214,7 @@ class Bench:
 
     @cached_property
     def definition(self) -> Experiment:
-        """The experiment behind the name: one of the brake itself goes before one of any brake."""
+        """The experiment behind the name."""
         return experiment_of(self.experiment, self.parameters, self.assembly, self.options)
 
     @cached_property
@@ -161,6 +222,22 @@ class Bench:
         """Validated parameters, overrides applied."""
         base = PARAMETER_SETS.find(self.parameters).parameters()
         return base.replace(parsed(type(base), self.overrides, "parameter"))
+
+    @cached_property
+    def outdated(self) -> list[str]:
+        """Which derived values of the set no longer match what they were derived from."""
+        cited = PARAMETER_SETS.find(self.parameters).values
+        leaves = leaf_fields(type(self.par))
+        texts = []
+        for each in outdated_values(cited, self.par, self.overrides):
+            unit = leaves[each.name].unit.symbol
+            now, then = (shown(value, unit) for value in (each.now, each.formula))
+            texts.append(
+                f"{each.name} = {now} is derived ({each.where}) from {', '.join(each.changed)}, "
+                f"which was changed, and no longer matches: its formula gives {then}, so set it "
+                "too or leave it on purpose"
+            )
+        return texts
 
     @cached_property
     def chosen_options(self) -> ParameterSet:
@@ -289,7 +366,17 @@ class Bench:
 
     def with_overrides(self, overrides: Mapping[str, Any]) -> Bench:
         """Return this bench with further parameters changed; shares are of what it has."""
-        return replace(self, overrides={**self.overrides, **settled(self.par, overrides)})
+        changes = settled(self.par, overrides)
+        matched = changes.keys() - overrides.keys()
+        silent = {name for name in matched if switches_of(name, self._previewed)}
+        kept = {name: value for name, value in changes.items() if name not in silent}
+        return replace(self, overrides={**self.overrides, **(kept or changes)})
+
+    @property
+    def _previewed(self) -> tuple[Case, ...]:
+        """The runs, without what has to run before them."""
+        preview = self.definition.preview
+        return self.cases() if preview is None else self._made(preview)
 
 
 def _check_driven(case: Case, experiment: Experiment) -> None:

@@ -41,6 +41,7 @@ def bench_text(bench: Bench, comment: str = "") -> str:
     simulation: dict[str, Any] = {"step": bench.step} if bench.step != Bench.step else {}
     simulation |= {} if bench.record is None else {"record": bench.record}
     simulation |= {"seed": bench.seed} if bench.seed else {}
+    simulation |= {} if bench.engine == "auto" else {"engine": bench.engine}
     sections: dict[str, tuple[Mapping[str, Any], Mapping[str, str]]] = {
         "options": (bench.options, _units(definition.options)),
         **_stimulus(bench),

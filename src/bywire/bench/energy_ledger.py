@@ -77,6 +77,55 @@ def role_attributes(role: Role | None) -> dict[str, str]:
     return {f"{_PREFIX}{name}": str(value) for name, value in values.items() if value}
 
 
+@dataclass(frozen=True)
+class Delivery:
+    """What a loss gave, which cannot give energy.
+
+    Parameters
+    ----------
+    name, label, book
+        Variable, what people read, and the book in which it stands, empty for the actuator's own.
+    energy
+        In J, >= 0: the most that it gave back of what it had taken, or beyond that. Of the rows of
+        several runs an array of shape (runs,).
+    turnover
+        Energy that was turned over in the book, in J.
+    """
+
+    name: str
+    label: str
+    book: str
+    energy: Any
+    turnover: Any
+
+
+def deliveries(
+    recording: xr.Dataset, among: Collection[str] | None = None
+) -> list[Delivery]:
+    """Return what every loss of a recording gave back, in all books.
+
+    Work, ``W_...``, is no loss and has either sign. Recordings of the ends alone tell what was
+    given back in all. ``among``: names of the losses that count; all by default.
+    """
+    roles = _roles(recording, _energies(recording))
+    losses = {
+        name: role for name, role in roles.items()
+        if role.side == "sink" and role.returns != "any" and name.startswith("E_")
+        and (among is None or name in among)
+    }  # fmt: skip
+    turnovers = {
+        book: _ledger(recording, book, is_split=False).turnover
+        for book in dict.fromkeys(role.book for role in losses.values())
+    }
+    made = []
+    for name, role in losses.items():
+        values = recording.variables[name].values
+        before = 0.0 if role.returns else np.maximum.accumulate(values, axis=-1)
+        most = _plain(np.max(before - values, axis=-1))
+        made.append(Delivery(name, role.label, role.book, _positive(most), turnovers[role.book]))
+    return made
+
+
 def actuator_ledger(recording: xr.Dataset, is_split: bool = True) -> Ledger:
     """Return the books of an actuator or rig, between the ends of a recording.
 
@@ -176,7 +225,10 @@ def _roles(recording: xr.Dataset, names: Collection[str]) -> dict[str, Role]:
     for name in sorted(names, key=lambda name: name != "E_stored"):
         if name.startswith("E_") and name != "E_source" and name not in roles:
             label = str(recording.variables[name].attrs.get("long_name", name))
-            roles[name] = Role("sink", "stored" if name == "E_stored" else label)
+            is_store = name == "E_stored"
+            roles[name] = (
+                Role("sink", "stored", returns="any") if is_store else Role("sink", label)
+            )
     return roles
 
 

@@ -17,7 +17,7 @@ from bywire.bench.option_names import OPTION, split_options
 from bywire.bench.result import Result
 from bywire.bench.running import Progress, judged, recording_of, static_recordings
 from bywire.bench.side_by_side import rounds
-from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, unestimated
+from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, abandoned, steps_of, unestimated
 from bywire.bench.varied_choices import choices_that_vary
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.leaf import Leaf
@@ -248,36 +248,49 @@ def run_benches(
     KeyboardInterrupt
         When interrupted.
     """
-    recordings = _recordings(benches, progress, engine, threads)
+    work: list[dict[str, float]] = [{} for _ in benches]
+    recordings = _recordings(benches, progress, engine, threads, work)
+    limits = [{label: MOST_WORK * each for label, each in done.items()} for done in work]
     others: list[dict[float, dict[str, xr.Dataset]]] = [{} for _ in benches]
     failures: list[dict[float, Exception]] = [{} for _ in benches]
-    for factor in OTHER_STEPS if estimate_error else ():
+    for factor in steps_of(benches[0].runs().values()) if estimate_error else ():
         with suppress(*NO_ESTIMATE):
             finer = [replace(bench, step=factor * bench.step) for bench in benches]
-            computed = _recordings(finer, progress, engine, threads)
+            computed = _recordings(finer, progress, engine, threads, limits=limits)
             for each, further in zip(others, computed, strict=True):
                 each[factor] = further
             continue
-        for bench, each, failed in zip(benches, others, failures, strict=True):
+        for bench, each, failed, most in zip(benches, others, failures, limits, strict=True):
             try:  # a single case may be what keeps them from running side by side
                 other = replace(bench, step=factor * bench.step)
-                (each[factor],) = _recordings([other], progress, engine, threads)
+                (each[factor],) = _recordings([other], progress, engine, threads, limits=[most])
             except NO_ESTIMATE as error:
                 failed[factor] = error
     results = map(judged, benches, recordings, others)
+    notes = [
+        abandoned(failed) if each else unestimated(failed) if failed else ""
+        for each, failed in zip(others, failures, strict=True)
+    ]
     return tuple(
-        replace(result, unestimated=unestimated(failed)) if failed and not each else result
-        for result, each, failed in zip(results, others, failures, strict=True)
+        replace(result, unestimated=note) if note else result
+        for result, note in zip(results, notes, strict=True)
     )
 
 
 def _recordings(
-    benches: Sequence[Bench], progress: Progress | None, engine: str, threads: int | None
+    benches: Sequence[Bench],
+    progress: Progress | None,
+    engine: str,
+    threads: int | None,
+    work: Sequence[dict[str, float]] = (),
+    limits: Sequence[Mapping[str, float]] = (),
 ) -> list[dict[str, xr.Dataset]]:
-    """Return the recordings of each bench by label."""
+    """Return the recordings of each bench by label, and note what work they took."""
     recordings = [static_recordings(bench) for bench in benches]
-    for made in rounds(benches, progress, engine, threads):
+    for made in rounds(benches, progress, engine, threads, limits=limits):
         given = zip(made.places, made.cases, made.runs, made.trajectories, strict=True)
         for k, case, run, trajectory in given:
             recordings[k][case.label] = recording_of(benches[k], case, run, trajectory)
+            if work:
+                work[k][case.label] = trajectory.work
     return recordings

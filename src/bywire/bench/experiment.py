@@ -191,6 +191,9 @@ class Experiment:
     named
         ``named(options)``: unit of every key figure by name, where a table among the options
         decides which there are; ``kpis`` then holds those of the defaults.
+    formerly
+        An earlier name, which is that of an experiment of any brake now. Bench files that have it
+        still work where their options tell both apart.
     """
 
     name: str
@@ -216,6 +219,7 @@ class Experiment:
     named: Callable[[Any], Mapping[str, str]] | None = None
     begins_at: Mapping[str, str] = field(default_factory=dict)
     compared: Mapping[str, str] = field(default_factory=dict)
+    formerly: str = ""
 
     def __post_init__(self) -> None:
         template = getattr(self.summary, "template", self.summary)

@@ -1,4 +1,4 @@
-"""Which experiment a name means: that of the brake itself, or one of any brake."""
+"""Which experiment a name means: one of a brake, or one of any brake; never both."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from bywire.bench.experiment import EXPERIMENTS, Experiment
-from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
+from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.errors import unknown_name
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import ASSEMBLIES
 from bywire.core.registry import pick
 
@@ -17,9 +17,6 @@ def experiment_of(
     name: str, parameters: str, assembly: str = "", options: Mapping[str, Any] | None = None
 ) -> Experiment:
     """Return the experiment of a name for a parameter set.
-
-    An experiment that a brake brings for this assembly goes before one of any brake, and that
-    before one of another assembly.
 
     Parameters
     ----------
@@ -35,7 +32,8 @@ def experiment_of(
     Raises
     ------
     InputError
-        When there is no such experiment, or its options name signals that the model lacks.
+        When there is no such experiment, when its options name signals that the model lacks, and
+        when an earlier name of a brake's own experiment leaves open which one is meant.
     """
     cited = PARAMETER_SETS.find(parameters)
     system = assembly or cited.assembly
@@ -43,14 +41,51 @@ def experiment_of(
     if likely is not None and likely.assembly == system:
         return likely
     brake = PARAMETER_SETS.owner(parameters)
-    its_own = EXPERIMENTS.of(brake).get(name)
+    its_own = EXPERIMENTS.own(brake, name)
     if its_own is not None and its_own.assembly == system:
         return its_own
     known = GENERIC_EXPERIMENTS.all()
     if name in known:
+        former = _former(name, brake, system, options or {}, known[name])
+        if former is not None:
+            return former
         models = ASSEMBLIES.of(brake)
         return known[name].bound(pick(models, system, "assembly")(), options or {})
     every = EXPERIMENTS.all()
     if name not in every:
         raise unknown_name("experiment", name, {*every, *known}, first=EXPERIMENTS.of(brake))
     return every[name]
+
+
+def former_names(name: str) -> dict[str, str]:
+    """Return the experiments that once had a name, each with its assembly."""
+    every = EXPERIMENTS.all().values()
+    return {each.name: each.assembly for each in every if each.formerly == name}
+
+
+def _former(
+    name: str, brake: str, system: str, options: Mapping[str, Any], generic: GenericExperiment
+) -> Experiment | None:
+    """Return a brake's own experiment that once had this name, if the options show it is meant.
+
+    Raises
+    ------
+    ParameterError
+        When they show neither.
+    """
+    each = (e for e in EXPERIMENTS.of(brake).values() if e.formerly == name)
+    former = next((e for e in each if e.assembly == system), None)
+    if former is None:
+        return None
+    given = set(options)
+    own, others = set(former.options.model_fields), set(generic.options.model_fields)
+    if given & (others - own):
+        return None
+    if given & (own - others):
+        return former
+    example = next(iter(generic.signals))
+    raise ParameterError(
+        f"experiment {name!r} is for any brake, and that of the {system} is called "
+        f"{former.name!r} now: write {former.name}, or say which signal {name} is about, for "
+        f"instance --set options.{example}=NAME"
+    )

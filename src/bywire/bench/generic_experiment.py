@@ -162,8 +162,7 @@ class GenericExperiment:
     Parameters
     ----------
     name
-        What bench files and the command line call it. An experiment of that name that a brake
-        brings for its own assembly goes before it.
+        What bench files and the command line call it. No experiment of a brake may have it.
     summary
         One line for listings.
     options

@@ -14,10 +14,10 @@ from bywire.bench.experiment import Case
 from bywire.bench.kpis.cases import FamilyJudge, of_cases
 from bywire.bench.kpis.kpi import Kpi, KpiOfCases
 from bywire.bench.recording import (
-    are_surely_closed,
+    are_surely_sound,
     ends_of_group,
+    energy_doubts_of_cases,
     energy_signals,
-    open_books_of_cases,
     rows_of_group,
     watch_cases,
 )
@@ -121,17 +121,17 @@ def needed(wanted: set[str], run: Run) -> Wanted | None:
 
 
 def _books(made: Round, group: RunGroup, rows: Rows, threads: int | None) -> list[list[str]]:
-    """Return what every run warns of because its books do not close.
+    """Return what every run warns of because its energies cannot be true.
 
-    Their ends tell of most runs that they do; where they do not, all rows of a group are computed.
+    Their ends tell of most runs that they can; where they do not, all rows are computed.
     """
     if group.end_names:
-        if are_surely_closed(cast(xr.Dataset, ends_of_group(group))):
+        if are_surely_sound(cast(xr.Dataset, ends_of_group(group)), made.runs):
             return [[] for _ in made.runs]
         every, first = energy_signals(made.runs[0]), group.runs[0].schedule().rows
         group = simulate_group(made.runs, every, threads, first=first - group.time.size)
         rows = rows_of_group(group, made.cases[0].settle)
-    return open_books_of_cases(cast(xr.Dataset, rows), len(made.runs))
+    return energy_doubts_of_cases(cast(xr.Dataset, rows), len(made.runs), made.runs)
 
 
 def _recorded(

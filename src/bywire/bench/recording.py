@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
 from typing import Any, cast
 
@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from bywire.bench.energy_ledger import actuator_ledger, role_attributes
+from bywire.bench.energy_ledger import Delivery, actuator_ledger, deliveries, role_attributes
 from bywire.bench.rows import Rows
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
@@ -21,7 +21,7 @@ from bywire.simulation.changes import put_in_signals
 from bywire.simulation.run import Run, Trajectory, doubts_of
 from bywire.simulation.run_group import RunGroup
 
-_OPEN = 1e-5  # of the energies, that the balance of a run may leave open
+_OPEN = 1e-5  # of the energies, that the balance of a run may leave open, and a loss may give
 _NOTHING = 1e-9  # J, that nobody misses: rounding of what is stored while nothing moves
 
 
@@ -128,7 +128,7 @@ def watch(recording: xr.Dataset, run: Run, trajectory: Trajectory) -> list[str]:
     if not recording.sizes["time"]:  # interrupted before the first row
         return []
     doubts = _solver_doubts(trajectory.doubt, trajectory.unsettled)
-    return [*doubts, *open_books(recording), *run.model.watch(recording, run.par)]
+    return [*doubts, *energy_doubts(recording, [run]), *run.model.watch(recording, run.par)]
 
 
 def watch_cases(
@@ -137,7 +137,7 @@ def watch_cases(
     """Return what `watch` says of each of several runs of one structure and plan.
 
     ``rows``: of all of them; ``unsettled``: substeps of each that hit the cap of the contacts;
-    ``books``: what `open_books` says of each.
+    ``books``: what `energy_doubts` says of each.
     """
     solver = map(_solver_doubts, doubts_of(runs), unsettled)
     model, pars = runs[0].model, [run.par for run in runs]
@@ -158,36 +158,73 @@ def _solver_doubts(doubt: str, unsettled: int) -> list[str]:
     return doubts
 
 
-def open_books(recording: xr.Dataset) -> list[str]:
-    """Return a warning where the energy balance is open by more than the step can explain.
+def energy_doubts(recording: xr.Dataset, runs: Sequence[Run] = ()) -> list[str]:
+    """Return warnings where the energies of a recording cannot be true.
 
-    The scheme closes it to a few parts in 1e8, the remainder of nonlinear elements. Where
-    parameters are so extreme that numbers cancel, it does not.
+    The energy balance is open by more than the step can explain, or a loss gives energy. The scheme
+    closes the balance to a few parts in 1e8, the remainder of nonlinear elements, and a loss grows
+    in every substep. Where parameters are so extreme that numbers cancel, or an element's equations
+    leave their range, they do not.
+
+    ``runs``: the one whose recording it is, where that is known.
     """
-    return open_books_of_cases(recording, 1)[0]
+    return energy_doubts_of_cases(recording, 1, runs)[0]
 
 
-def open_books_of_cases(recording: xr.Dataset, cases: int) -> list[list[str]]:
-    """Return what `open_books` says of each of several runs, of the rows of all."""
-    if are_surely_closed(recording):
-        return [[] for _ in range(cases)]
+def energy_doubts_of_cases(
+    recording: xr.Dataset, cases: int, runs: Sequence[Run] = ()
+) -> list[list[str]]:
+    """Return what `energy_doubts` says of each of several runs, of the rows of all."""
+    doubts: list[list[str]] = [[] for _ in range(cases)]
+    for each in deliveries(recording, _losses(runs)):
+        if not np.any(_is_delivered(each)):
+            continue
+        where = f" of the book {each.book!r}" if each.book else ""
+        energies, totals = (np.broadcast_to(e, cases) for e in (each.energy, each.turnover))
+        is_said = np.broadcast_to(_is_delivered(each), cases)
+        for k in np.flatnonzero(is_said).tolist():
+            doubts[k].append(
+                f"the loss {each.label!r}{where} ({each.name}) gives {energies[k]:.3g} J of "
+                f"{totals[k]:.3g} J that were turned over, and a loss cannot give energy: do not "
+                "believe this run, take a smaller step, and look for a parameter that is extreme"
+            )
+    if _are_surely_closed(recording):
+        return doubts
     books = actuator_ledger(recording)
     error, turned = (
         np.broadcast_to(each, cases) for each in (books.closing_error, books.turnover)
     )
-    return [
-        []
-        if abs(left) <= _OPEN * total + _NOTHING
-        else [
-            f"the energy balance is open by {abs(left):.3g} J of {total:.3g} J that were turned "
-            "over: do not believe this run, take a smaller step, and look for a parameter that is "
-            "extreme"
-        ]
-        for left, total in zip(error.tolist(), turned.tolist(), strict=True)
-    ]
+    for k, (left, total) in enumerate(zip(error.tolist(), turned.tolist(), strict=True)):
+        if abs(left) > _OPEN * total + _NOTHING:
+            doubts[k].append(
+                f"the energy balance is open by {abs(left):.3g} J of {total:.3g} J that were "
+                "turned over: do not believe this run, take a smaller step, and look for a "
+                "parameter that is extreme"
+            )
+    return doubts
 
 
-def are_surely_closed(recording: xr.Dataset) -> bool:
+def _losses(runs: Sequence[Run]) -> Collection[str] | None:
+    """Return the losses that grow whatever happens; None for all.
+
+    In the loss of a contact stands what a change of its parameters does, see `simulation.changes`.
+    """
+    return runs[0].model.Flow._fields if any(run.changes for run in runs) else None
+
+
+def _is_delivered(delivery: Delivery) -> Any:
+    """Return whether a loss gave more than numbers explain, of several runs in which of them."""
+    return np.greater(delivery.energy, _OPEN * delivery.turnover + _NOTHING)
+
+
+def are_surely_sound(recording: xr.Dataset, runs: Sequence[Run] = ()) -> bool:
+    """Return whether the ends of a recording, or of several runs', tell of no `energy_doubts`."""
+    given = deliveries(recording, _losses(runs))
+    is_quiet = not any(np.any(_is_delivered(each)) for each in given)
+    return is_quiet and _are_surely_closed(recording)
+
+
+def _are_surely_closed(recording: xr.Dataset) -> bool:
     """Return whether the ends of a recording, or of several runs', tell that no books are open."""
     books = actuator_ledger(recording, is_split=False)
     if not (books.sources and books.sinks):
@@ -205,14 +242,14 @@ def energy_signals(run: Run) -> tuple[str, ...]:
     )
 
 
-def open_books_of(run: Run, trajectory: Trajectory) -> list[str]:
-    """Return what `open_books` says of a run of which the `energy_signals` were computed."""
+def energy_doubts_of(run: Run, trajectory: Trajectory) -> list[str]:
+    """Return what `energy_doubts` says of a run of which the `energy_signals` were computed."""
     if not trajectory.time.size:
         return []
     attributes = _attributes_of(run.model.Output)
     energies = {name: trajectory[name] for name in energy_signals(run)}
     rows = Rows(trajectory.time, energies, {name: attributes[name] for name in energies})
-    return open_books(cast(xr.Dataset, rows))
+    return energy_doubts(cast(xr.Dataset, rows), [run])
 
 
 def energy_residual(recording: xr.Dataset) -> xr.DataArray:

@@ -44,9 +44,10 @@ class Verdict(EqualWhereUndefined):
     note
         Why the KPI is not defined.
     error
-        Estimated error of the value, in ``unit``; NaN where it was not estimated.
+        How far the value may be off, in ``unit``; NaN where that was not estimated.
     is_decided
-        Whether the value is further from the limit than it may be wrong.
+        Whether the recording shows what the value is, and this is further from the limit than it
+        may be wrong.
     """
 
     kpi: str
@@ -87,18 +88,19 @@ def check(requirements: Mapping[str, str], kpis: Mapping[str, str]) -> None:
 def judge(requirements: Mapping[str, str], kpis: Sequence[Kpi]) -> tuple[Verdict, ...]:
     """Compare KPIs with their limits, which :func:`check` has admitted.
 
-    Undecided is what lies no further from its limit than its error; a KPI without an error
-    estimate is taken as it is.
+    Undecided is what lies no further from its limit than its error, and what the recording leaves
+    open; a KPI without an error estimate is taken as it is.
     """
     by_name = {kpi.name: kpi for kpi in kpis}
     verdicts = []
     for name, text in requirements.items():
         kpi = by_name[name]
         compare, bound = limit_of(name, text, kpi.unit)
-        is_decided = not (abs(kpi.value - bound) <= kpi.error or math.isinf(kpi.error))
+        is_close = abs(kpi.value - bound) <= kpi.bound or math.isinf(kpi.bound)
+        is_decided = not (is_close or kpi.is_open)
         met = is_decided and not math.isnan(kpi.value) and bool(_COMPARE[compare](kpi.value, bound))
         verdicts.append(
-            Verdict(name, text, kpi.value, kpi.unit, met, kpi.note, kpi.error, is_decided)
+            Verdict(name, text, kpi.value, kpi.unit, met, kpi.note, kpi.bound, is_decided)
         )
     return tuple(verdicts)
 

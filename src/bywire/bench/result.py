@@ -60,7 +60,8 @@ class Result:
     @property
     def warnings(self) -> list[str]:
         """What the user should know of the runs."""
-        said = [
+        said = [*self.bench.outdated]
+        said += [
             f"{label}: {text}" if len(self.recordings) > 1 else text
             for label, recording in self.recordings.items()
             for text in str(recording.attrs.get("warnings", "")).split("; ")

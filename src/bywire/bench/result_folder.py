@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,8 @@ class FolderResult:
         ``passed`` or ``failed``.
     warnings
         What its run warned of.
+    changes
+        What was changed, by name: its value, what it is instead of, and of what.
     """
 
     name: str
@@ -46,6 +48,7 @@ class FolderResult:
     verdicts: tuple[Verdict, ...]
     status: str
     warnings: tuple[str, ...] = ()
+    changes: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
 
 def is_result_folder(path: Path) -> bool:
@@ -72,6 +75,10 @@ def read_result(folder: Path) -> FolderResult:
         files = [folder / Path(str(text)).name for text in record["files"]]
         name = str(record["bench"])
         warned = tuple(map(str, record.get("warnings", ())))
+        changes = {
+            str(name): {key: str(each[key]) for key in ("value", "instead_of", "of")}
+            for name, each in record.get("changes", {}).items()
+        }
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise FileError(
             f"{folder / RECORD} is damaged ({type(error).__name__}: {error}); {_AGAIN}"
@@ -79,7 +86,7 @@ def read_result(folder: Path) -> FolderResult:
     recordings = {path.stem: _recording(path) for path in files if path.suffix == ".nc"}
     if not recordings:
         raise FileError(f"{folder / RECORD} names no recording; {_AGAIN}")
-    return FolderResult(name, recordings, kpis, verdicts, status, warned)
+    return FolderResult(name, recordings, kpis, verdicts, status, warned, changes)
 
 
 def kpi_record(kpi: Kpi) -> dict[str, Any]:
@@ -87,6 +94,7 @@ def kpi_record(kpi: Kpi) -> dict[str, Any]:
     return {
         "value": kpi.value, "unit": kpi.unit, "note": kpi.note,
         "error": kpi.error, "error_estimated": not math.isnan(kpi.error),
+        "converges": kpi.converges, "open": kpi.is_open,
     }  # fmt: skip
 
 
@@ -134,7 +142,10 @@ def _kpi(name: str, record: Mapping[str, Any]) -> Kpi:
     if math.isnan(error) and record.get("error_estimated"):
         error = math.inf
     value, unit = _number(record["value"]), str(record["unit"])
-    return Kpi(name, value, unit, "", str(record.get("note", "")), error)
+    return Kpi(
+        name, value, unit, "", str(record.get("note", "")), error,
+        bool(record.get("open", False)), bool(record.get("converges", True)),
+    )  # fmt: skip
 
 
 def _verdict(record: Mapping[str, Any]) -> Verdict:

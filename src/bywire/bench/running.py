@@ -21,9 +21,11 @@ from bywire.bench.requirements import judge, status_of
 from bywire.bench.result import Result
 from bywire.bench.rows import Rows
 from bywire.bench.step_error import (
+    MOST_WORK,
     NO_ESTIMATE,
-    OTHER_STEPS,
+    abandoned,
     note_step_errors,
+    steps_of,
     unestimated,
     with_step_errors,
 )
@@ -53,11 +55,12 @@ def run(
     engine
         As of `Bench`; ``auto`` is what the bench says.
     estimate_error
-        Whether all runs are made again in half steps, and in double ones where these divide the
-        sample times: key figures and recorded signals then say how large their error from the
-        step is, and a requirement closer to its limit than that is undecided. It takes 2.5 times
-        as many substeps more. Steps in which a run fails are left out; where none is left, the
-        result warns of it.
+        Whether all runs are made again in half steps, in slightly shorter ones, and in double ones
+        where these divide the sample times: key figures and recorded signals then say how large
+        their error from the step is, and a requirement closer to its limit than they may be off is
+        undecided. It takes 3.6 times as many substeps more. Steps in which a run fails are left
+        out; where none is left, or one takes five times the work of the run, the result warns of
+        it.
 
     Raises
     ------
@@ -70,14 +73,15 @@ def run(
     others: dict[float, dict[str, xr.Dataset]] = {}
     failures: dict[float, Exception] = {}
     is_complete = False
+    work: dict[str, float] = {}
     try:
-        _make_runs(bench, recordings, progress, engine)
+        _make_runs(bench, recordings, progress, engine, work)
         is_complete = True
-        for factor in OTHER_STEPS if estimate_error else ():
+        for factor in steps_of(bench.runs().values()) if estimate_error else ():
             try:
                 other = replace(bench, step=factor * bench.step)
                 made: dict[str, xr.Dataset] = {}
-                _make_runs(other, made, progress, engine, f", {factor:g} of the step")
+                _make_runs(other, made, progress, engine, {}, f", {factor:g} of the step", work)
                 others[factor] = made
             except NO_ESTIMATE as error:
                 failures[factor] = error
@@ -86,7 +90,8 @@ def run(
         kpis = judged(bench, recordings).kpis if is_complete else ()
         return Result(bench, recordings, kpis, (), "interrupted")
     result = judged(bench, recordings, others)
-    return result if others or not failures else replace(result, unestimated=unestimated(failures))
+    note = abandoned(failures) if others else unestimated(failures)
+    return replace(result, unestimated=note) if failures and note else result
 
 
 def _make_runs(
@@ -94,18 +99,26 @@ def _make_runs(
     recordings: dict[str, xr.Dataset],
     progress: Progress | None,
     engine: str,
+    work: dict[str, float],
     remark: str = "",
+    compared: Mapping[str, float] | None = None,
 ) -> None:
-    """Make all recordings of a bench, each kept as soon as it is there."""
+    """Make all recordings of a bench, each kept as soon as it is there, and what work they took.
+
+    ``compared``: the work of the same runs in the bench's own step, of which these may take some.
+    """
     engine = bench.engine if engine == "auto" else engine
     recordings |= static_recordings(bench)
     for number, case in enumerate(bench.cases()):
         computed = run_of(bench, case, number)
+        if compared is not None:
+            computed = replace(computed, most_work=MOST_WORK * compared[case.label])
         report = None if progress is None else partial(progress, case.label + remark)
         with interrupts_deferred():
             prepare(computed.model, computed.par).engine(engine)
         trajectory = simulate(computed, engine=engine, progress=report)
         is_complete = trajectory.status != "interrupted"
+        work[case.label] = trajectory.work
         begins = case.settle - case.keep
         if is_complete or np.count_nonzero(trajectory.time >= begins - 1e-9) > 1:
             recordings[case.label] = recording_of(bench, case, computed, trajectory)

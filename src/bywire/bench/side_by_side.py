@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -59,6 +59,7 @@ def rounds(
     engine: str = "auto",
     threads: int | None = None,
     signals: Callable[[Run], Wanted | None] = lambda _: None,
+    limits: Sequence[Mapping[str, float]] = (),
 ) -> Iterator[Round]:
     """Yield the first run of all benches, the second one, and so on.
 
@@ -73,6 +74,8 @@ def rounds(
         As of `bywire.bench.ensemble.run_benches`.
     signals
         ``signals(run)``: outputs to record of runs side by side; None for all.
+    limits
+        Of each bench the work that its runs may take, by label; without end by default.
 
     Raises
     ------
@@ -88,6 +91,11 @@ def rounds(
         places = [k for k, each in enumerate(every) if number < len(each)]
         cases = [every[k][number] for k in places]
         runs = [run_of(benches[k], case, number) for k, case in zip(places, cases, strict=True)]
+        if limits:
+            runs = [
+                replace(run, most_work=limits[k][case.label])
+                for k, case, run in zip(places, cases, runs, strict=True)
+            ]
         wanted = signals(runs[0])
         outputs = runs[0].model.Output._fields if wanted is None else wanted.signals
         ends = () if wanted is None else wanted.ends

@@ -1,10 +1,14 @@
 """How far a run's results are from those of ever shorter steps: the same runs in other steps.
 
 The scheme is of second order: a figure of steps h is off by c h^2, and differs from that of steps
-f h by c h^2 |1 - f^2|. Half the step tells c, and so does twice the step where that divides the
-sample times. Where friction and contacts make c depend on where in a step things happen, one of
-both differences may be small by chance: the larger estimate counts. And where the two do not grow
-as squares do, a figure is taken to be off by c h.
+f h by c h^2 |1 - f^2|. Half and double steps show whether a figure does converge so: both
+differences then have the same sign, and one is four times the other. Then each tells the error, and
+the larger estimate counts.
+
+Where friction, contacts and chaos decide, the differences show no order, and any of them may be
+small by chance. The figures of all steps are then draws of one scatter: about as far as they are
+apart, the run is off. So that chance needs more draws to deceive, the bench also runs in a step
+close to its own. The error is the scale of which 95 % of the true errors are within three.
 """
 
 from __future__ import annotations
@@ -17,16 +21,23 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.kpis.kpi import Kpi
-from bywire.core.errors import RunError, StepError
+from bywire.core.errors import RunError, StepError, WorkLimitError
 from bywire.core.typing import Array
+from bywire.simulation.run import Run
 
 OTHER_STEPS = (0.5, 2.0)
-"""other steps over that of the run"""
+"""other steps over that of the run, which show an order"""
+MOST_WORK = 5.0
+"""work of a run in other steps, over that of the run, at which its estimate is abandoned"""
 NO_ESTIMATE = (StepError, RunError)
 """what runs in other steps may end with: no divisor of a sample time, or too coarse"""
 ROUNDING = 1e-11
 """rounding of many steps, over the largest value of a signal"""
-_REGULAR = 2.0**1.5  # least ratio of the differences to double and half steps at second order
+_STEPS = {0.5: "half the step", 2.0: "twice the step"}
+_ORDER, _OFF = 2.0, 0.3  # of the scheme; what an observed order may differ by
+SPREAD = {3: 1.72, 4: 1.29}
+"""draws -> a third of the 0.95 quantile of |x_1 - x| / s, of equal normal draws x_1 ... x_n with
+standard deviation s, and one more, x"""
 _SAME = 1e-10  # s, between a time and that of the row where it was read
 
 
@@ -47,6 +58,21 @@ def unestimated(failures: Mapping[float, Exception]) -> str:
     return (
         "how far the figures are off by the step is not known: the bench runs in neither half nor "
         f"double steps ({because})"
+    )
+
+
+def abandoned(failures: Mapping[float, Exception]) -> str:
+    """Return the note that the run in some other step was given up; empty where none was."""
+    steps = [
+        _STEPS.get(factor, f"{factor:.3g} of the step")
+        for factor, error in failures.items()
+        if isinstance(error, WorkLimitError)
+    ]
+    if not steps:
+        return ""
+    return (
+        f"the error estimate from {' and '.join(steps)} was abandoned: it took more than "
+        f"{MOST_WORK:g} times the work of the run itself"
     )
 
 
@@ -95,13 +121,23 @@ def with_step_errors(
     by_name = {factor: {each.name: each.value for each in made} for factor, made in others.items()}
 
     def estimated(kpi: Kpi) -> Kpi:
-        apart = {f: _apart(kpi.value, values[kpi.name]) for f, values in by_name.items()}
-        order = 2 if apart.get(2.0, math.inf) >= _REGULAR * apart.get(0.5, 0.0) else 1
-        errors = [of_difference(factor, order) * each for factor, each in apart.items()]
+        values = {factor: known[kpi.name] for factor, known in by_name.items()}
+        least = rounding.get(kpi.unit, 0.0)
+        error, converges = _estimate(kpi.value, values, max(least, ROUNDING * abs(kpi.value)))
         reading = _reading(kpi.value, intervals) if kpi.unit == "s" else 0.0
-        return replace(kpi, error=max(errors) + rounding.get(kpi.unit, 0.0) + reading)
+        return replace(kpi, error=error + least + reading, converges=converges)
 
     return tuple(map(estimated, kpis))
+
+
+def steps_of(runs: Iterable[Run]) -> tuple[float, ...]:
+    """Return other steps over that of some runs: those that show an order, and one close to it.
+
+    The latter has one substep more in the longest interval that divides all sample times; there is
+    none where that interval has a single substep.
+    """
+    count = math.gcd(*(run.schedule().substeps for run in runs))
+    return (*OTHER_STEPS, count / (count + 1)) if count > 1 else OTHER_STEPS
 
 
 def note_step_errors(
@@ -118,7 +154,8 @@ def note_step_errors(
     recordings
         The runs, by label; their signals' attributes are set.
     others
-        The same in other steps, by their length over that of the runs.
+        The same in other steps, by their length over that of the runs; those close to one tell
+        too little.
     """
     for label, recording in recordings.items():
         for name, signal in recording.items():
@@ -127,10 +164,38 @@ def note_step_errors(
             y = signal.values.astype(float)
             errors = [
                 of_difference(factor) * (y - made[label][name].values)
-                for factor, made in others.items()
+                for factor, made in others.items() if factor in OTHER_STEPS
             ]
             signal.attrs["step_error_rms"] = max(map(_rms, errors))
             signal.attrs["step_error_max"] = max(float(np.max(np.abs(e))) for e in errors)
+
+
+def _estimate(
+    value: float, others: Mapping[float, float], rounding: float
+) -> tuple[float, bool]:
+    """Return the error of a figure, and whether it converges.
+
+    ``others``: the figure in other steps, by their length over that of ``value``; ``rounding``:
+    differences that mean nothing.
+    """
+    apart = {factor: _apart(value, other) for factor, other in others.items()}
+    if any(not math.isfinite(each) for each in apart.values()):
+        return (math.inf if math.inf in apart.values() else math.nan), True
+    ordered = [of_difference(factor) * apart[factor] for factor in OTHER_STEPS if factor in apart]
+    if max(apart.values()) <= rounding or _shows_order(value, others):
+        return max(ordered, default=0.0), True
+    draws = [value, *others.values()]
+    if len(draws) not in SPREAD:
+        return max(of_difference(factor) * each for factor, each in apart.items()), False
+    return SPREAD[len(draws)] * float(np.std(draws, ddof=1)), False
+
+
+def _shows_order(value: float, others: Mapping[float, float]) -> bool:
+    """Return whether differences to half and double steps are those of the scheme's order."""
+    if not all(factor in others for factor in OTHER_STEPS):
+        return False
+    fine, coarse = others[0.5] - value, value - others[2.0]
+    return fine * coarse > 0.0 and abs(math.log2(coarse / fine) - _ORDER) <= _OFF
 
 
 def _rms(error: Array) -> float:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from bywire.core.child_process import find_program
 from bywire.core.errors import RunError
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -30,7 +30,7 @@ def browser() -> Iterator[Any]:
         from playwright.sync_api import Error, sync_playwright
     except ImportError:
         raise RunError("playwright drives the browser: pip install playwright") from None
-    path = next(filter(None, map(shutil.which, _NAMES)), None)
+    path = next(filter(None, map(find_program, _NAMES)), None)
     if path is None:
         raise RunError("no Chromium: install the package chromium")
     with sync_playwright() as driver:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -12,12 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bywire.benchmark.result import Result, at_most, failed
+from bywire.core import child_process
+from bywire.core.child_process import python_command
 from bywire.core.registry import Kind, instances
 from bywire.simulation.kernel_cache import usable_folder
 
 LIBRARIES = "import numpy, casadi, xarray, pydantic, pint, typer, rich"
 """what L, the unit of these figures, is the time of: absolute times differ twofold by machine"""
-_UNIT = [sys.executable, "-c", LIBRARIES]
+_UNIT = python_command("-c", LIBRARIES)
 _ANSWERED = (0, 1)  # 1: a requirement is missed, which takes as long
 _SLOW = 8.0  # goals from which a command is run once
 
@@ -84,7 +84,7 @@ def _measured(command: Command, folder: Path) -> Result:
 
 def _line(arguments: Sequence[str], folder: Path) -> list[str]:
     filled = [each.replace("{folder}", str(folder)) for each in arguments]
-    return [sys.executable, "-m", "bywire.cli", *filled]
+    return python_command("-m", "bywire.cli", *filled)
 
 
 def _kernels() -> set[str]:
@@ -117,4 +117,4 @@ def _seconds(line: Sequence[str]) -> float:
 
 def environment() -> dict[str, str]:
     """Return the environment of a user, whose Python keeps what it compiled of the sources."""
-    return {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+    return {k: v for k, v in child_process.environment().items() if k != "PYTHONDONTWRITEBYTECODE"}

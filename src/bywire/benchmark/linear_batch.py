@@ -81,7 +81,7 @@ def linearize_many(
     *matrices, d = _mapped(functions.contacts, count, (states, repeated))
     K = _stiffness([matrix[0] for matrix in matrices], d[:, :, 0])
     frictions = np.zeros((count, len(model.frictions)))
-    A, B, C, D, rate = _mapped(
+    A, B, C, D, rate, _ = _mapped(
         functions.plant, count, (states, memories, repeated, K, frictions, frictions + 1.0)
     )
     columns = [model.Memory._fields.index(name) for name in inputs]

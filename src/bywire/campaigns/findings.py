@@ -18,6 +18,7 @@ from bywire.studies.statistics import Share, share
 
 CONFIDENCE = 0.95
 _AT = FACTORS.index(1.0)
+_SAME = 1e-9  # s, between two times of rows
 Class = Literal["covered", "too late", "undetected", "harmless, seen", "latent"]
 
 
@@ -37,6 +38,8 @@ class FaultFinding:
         By signal: how far it comes off the healthy run, least, largest and at the end.
     reacted
         What is reached with the reaction, by criterion, of the runs in which it could be taken.
+    answered
+        Which runs these are.
     delay
         From detection until the reaction takes effect [s]; 0 where there is none.
     """
@@ -46,6 +49,7 @@ class FaultFinding:
     detected: Mapping[str, Array]
     extremes: Mapping[str, Sequence[Array]]
     reacted: Mapping[str, Array]
+    answered: Sequence[int] = ()
     delay: float = 0.0
 
     @property
@@ -87,6 +91,45 @@ class FaultFinding:
         """How many runs violate each criterion, of those that any does."""
         counts = {name: int(np.sum(~np.isnan(times))) for name, times in self.reached.items()}
         return {name: count for name, count in counts.items() if count}
+
+    @cached_property
+    def only_with_reaction(self) -> dict[str, int]:
+        """How many runs violate each criterion because of the reaction alone."""
+        counts = {
+            name: int(np.sum(np.isnan(self._unanswered(name)) & ~np.isnan(times)))
+            for name, times in self.reacted.items()
+        }
+        return {name: count for name, count in counts.items() if count}
+
+    @cached_property
+    def sooner_with_reaction(self) -> dict[str, int]:
+        """How many runs violate each criterion in any case, and sooner with the reaction."""
+        counts = {
+            name: int(np.sum(times < self._unanswered(name) - _SAME))
+            for name, times in self.reacted.items()
+        }
+        return {name: count for name, count in counts.items() if count}
+
+    @cached_property
+    def prevented_by_reaction(self) -> dict[str, int]:
+        """How many runs violate each criterion without the reaction, and not with it."""
+        counts = {
+            name: int(np.sum(~np.isnan(self._unanswered(name)) & np.isnan(times)))
+            for name, times in self.reacted.items()
+        }
+        return {name: count for name, count in counts.items() if count}
+
+    @property
+    def is_relieved(self) -> bool:
+        """Whether the reaction keeps every dangerous run from violating anything."""
+        dangerous = set(np.flatnonzero(~np.isnan(self.violated)).tolist())
+        if not dangerous or not dangerous <= set(self.answered):
+            return False
+        return all(np.isnan(times).all() for times in self.reacted.values())
+
+    def _unanswered(self, criterion: str) -> Array:
+        """Return when the runs that are answered violate a criterion without the reaction [s]."""
+        return np.asarray(self.reached[criterion])[list(self.answered)]
 
     @property
     def first_seen_by(self) -> str:
@@ -151,6 +194,34 @@ class CampaignFindings:
         """Return how many faults are of each class."""
         return Counter(each.kind for each in self.faults)
 
+    def harm_of_reaction(self) -> tuple[str, ...]:
+        """Return what the reaction makes worse, a sentence each; none where it harms no fault."""
+        if self.plan.reaction is None:
+            return ()
+        groups = {
+            "harmless, seen": [each for each in self.faults if each.kind == "harmless, seen"],
+            "latent": [each for each in self.faults if each.kind == "latent"],
+            "dangerous": [each for each in self.faults if each.dangerous],
+        }
+        caused = _harm({k: [f.only_with_reaction for f in each] for k, each in groups.items()})
+        sooner = _harm({k: [f.sooner_with_reaction for f in each] for k, each in groups.items()})
+        named = f"the reaction, {self.plan.reaction.failing.name},"
+        worse = f"{named} makes things worse: it alone causes {'; '.join(caused)}"
+        return (
+            *([worse] if caused else []),
+            *([f"{named} hastens {'; '.join(sooner)}"] if sooner else []),
+        )
+
+    def benefit_of_reaction(self) -> str:
+        """Return what the reaction prevents, and how many faults it makes harmless."""
+        dangerous = [each for each in self.faults if each.dangerous]
+        prevented = _harm({"dangerous": [each.prevented_by_reaction for each in dangerous]})
+        relieved = sum(each.is_relieved for each in dangerous)
+        return (
+            f"the reaction prevents {'; '.join(prevented) or 'nothing'}, and makes {relieved} of "
+            f"{len(dangerous)} dangerous faults harmless"
+        )
+
     def curve(self, residual: str) -> list[tuple[float, int, float, int]]:
         """Return factor of the threshold, false alarms, median delay [s], runs in which it sees.
 
@@ -175,8 +246,18 @@ def finding(plan: CampaignPlan, number: int, outcome: Mapping[str, Any]) -> Faul
         {name: _numbers(times) for name, times in outcome["detected"].items()},
         {name: [_numbers(each) for each in sides] for name, sides in outcome["extremes"].items()},
         {name: _numbers(times) for name, times in reacted.items()},
+        outcome.get("reacted", {}).get("cases", ()),
         0.0 if plan.reaction is None else plan.reaction.delay,
     )
+
+
+def _harm(groups: Mapping[str, Sequence[Mapping[str, int]]]) -> list[str]:
+    """Return which criteria suffer in how many faults of each group, where any does."""
+    return [
+        f"{', '.join(dict.fromkeys(name for counts in worse for name in counts))} in {len(worse)} "
+        f"of {len(each)} {kind} faults"
+        for kind, each in groups.items() if (worse := [counts for counts in each if counts])
+    ]
 
 
 def _numbers(values: Any) -> Array:

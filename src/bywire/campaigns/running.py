@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import as_completed
 
 from bywire.bench.running import Progress
 from bywire.campaigns.findings import CampaignFindings, finding
@@ -11,6 +10,7 @@ from bywire.campaigns.judging import judge_fault, judge_healthy
 from bywire.campaigns.plan import CampaignPlan
 from bywire.campaigns.simulating import healthy_traces
 from bywire.campaigns.store import CampaignStore
+from bywire.core.interrupts import thread_pool
 
 
 def complete(plan: CampaignPlan, store: CampaignStore, progress: Progress) -> CampaignFindings:
@@ -37,20 +37,16 @@ def complete(plan: CampaignPlan, store: CampaignStore, progress: Progress) -> Ca
     missing = [k for k in range(len(plan.faults)) if k not in outcomes]
 
     # A few lanes each: faults side by side use the cores better than the runs of one.
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+    with thread_pool() as pool:
         made = {
             pool.submit(judge_fault, plan, plan.faults[number], healthy): number
             for number in missing
         }
-        try:
-            for future in as_completed(made):  # here alone files are written, one at a time
-                number = made[future]
-                outcomes[number] = future.result()
-                store.keep(number, outcomes[number])
-                progress(plan.faults[number].name, len(outcomes) / len(plan.faults))
-        except BaseException:
-            pool.shutdown(wait=True, cancel_futures=True)
-            raise
+        for future in as_completed(made):  # here alone files are written, one at a time
+            number = made[future]
+            outcomes[number] = future.result()
+            store.keep(number, outcomes[number])
+            progress(plan.faults[number].name, len(outcomes) / len(plan.faults))
     progress("judged", 1.0)
     findings = (finding(plan, k, outcomes[k]) for k in range(len(plan.faults)))
     return CampaignFindings(plan, healthy, tuple(findings))

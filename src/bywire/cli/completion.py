@@ -92,6 +92,6 @@ SIZING = names_of("studies")
 LIVES = names_of("lives", ending=".toml")
 CAMPAIGNS = names_of("campaigns", ending=".toml")
 ANYTHING = names_of(
-    "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "loops",
-    "plants", "studies", "lives", "methods", "stimuli", "campaigns", "residuals", "kpis",
+    "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "elements",
+    "loops", "plants", "studies", "lives", "methods", "stimuli", "campaigns", "residuals", "kpis",
 )  # fmt: skip

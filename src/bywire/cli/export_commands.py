@@ -40,6 +40,11 @@ def export_controller_command(
     dbc: Annotated[
         bool, typer.Option("--dbc", help="Describe its memory for a CAN bus, too.")
     ] = False,
+    name: Annotated[
+        str,
+        typer.Option(help="What files and symbols begin with, so that several ECUs link into one "
+                     "program.", show_default="the model's name"),
+    ] = "",
     set_: BenchChanges = None,
     json: JsonFlag = False,
 ) -> None:
@@ -50,7 +55,7 @@ def export_controller_command(
     show(
         lambda _: export_controller(
             read(bench, changes(set_)), out, precision=precision, vectors=vectors, check=check,
-            dbc=dbc,
+            dbc=dbc, name=name,
         ),
         None, json,
     )  # fmt: skip

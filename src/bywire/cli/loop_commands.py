@@ -16,6 +16,7 @@ from bywire.cli.options import (
     LoopName,
     OutFolder,
     Parameters,
+    Side,
     changes,
 )
 from bywire.cli.show import show
@@ -40,6 +41,7 @@ def linearize_command(
     friction: Annotated[str, typer.Option(help=texts.FRICTION)] = "",
     speed: Annotated[str, typer.Option(help=texts.SPEED)] = "",
     dither: Annotated[bool, typer.Option("--dither", help=texts.DITHER)] = False,
+    side: Side = "",
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -49,7 +51,7 @@ def linearize_command(
     show(
         lambda _: linearize(
             loop, parameters, at, changes(set_), locus=locus, reduce=reduce, friction=friction,
-            speed=speed, dither=dither,
+            speed=speed, dither=dither, side=side,
         ),
         out, json,
     )  # fmt: skip
@@ -65,6 +67,7 @@ def frequency_response_command(
     excitation: Annotated[str, typer.Option(help=texts.EXCITATION)] = "sine",
     over: Annotated[str, typer.Option(help=texts.BANDWIDTH_OVER)] = "",
     error_estimate: ErrorEstimate = True,
+    side: Side = "",
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -75,6 +78,7 @@ def frequency_response_command(
         lambda progress: frequency_response(
             loop, parameters, at, changes(set_), frequencies=frequencies, amplitudes=amplitudes,
             excitation=excitation, over=over, progress=progress, estimate_error=error_estimate,
+            side=side,
         ),
         out, json,
     )  # fmt: skip
@@ -87,6 +91,7 @@ def agreement_command(
     set_: Changes = None,
     frequencies: Frequencies = "",
     amplitudes: Annotated[str, typer.Option(help=texts.AGREEMENT_AMPLITUDES)] = "",
+    side: Side = "",
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -96,7 +101,7 @@ def agreement_command(
     show(
         lambda progress: agreement(
             loop, parameters, at, changes(set_), frequencies=frequencies, amplitudes=amplitudes,
-            progress=progress,
+            progress=progress, side=side,
         ),
         out, json,
     )  # fmt: skip
@@ -108,10 +113,11 @@ def margins_command(
     at: At = "",
     set_: Changes = None,
     over: Annotated[str, typer.Option(help=texts.MARGINS_OVER)] = "",
+    side: Side = "",
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Show margins and bandwidth of a loop as it is sampled, and the worst case over a range."""
     from bywire.api.margins import margins
 
-    show(lambda _: margins(loop, parameters, at, changes(set_), over), out, json)
+    show(lambda _: margins(loop, parameters, at, changes(set_), over, side=side), out, json)

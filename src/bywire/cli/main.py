@@ -19,8 +19,10 @@ from typing import Any
 
 from bywire.cli.output import INTERRUPTED, flush, message, open_streams
 from bywire.core.blas import keep_one_thread
+from bywire.core.child_process import leave_out_working_folder
 from bywire.core.errors import BywireError, ModelError, ParameterError
 from bywire.core.interrupts import interrupts_noted
+from bywire.core.machine_memory import address_space
 from bywire.core.unneeded import leave_out_dask
 
 FAILED = 3
@@ -42,6 +44,7 @@ def process() -> None:
             os._exit(status[0] if isinstance(status[0], int) else 0)
 
     atexit.register(leave)  # the first, and so the last that is called
+    leave_out_working_folder()
     leave_out_dask()
     keep_one_thread()
     try:
@@ -135,13 +138,16 @@ def _status(was_interrupted: Callable[[], bool]) -> int | str | None:
     return status
 
 
+_OURS = ("BrakeWarning", "MeasurementWarning")
+
+
 def _warned() -> int | str:
     """Run the command; a brake's warnings are messages of ours."""
     with warnings.catch_warnings():
         show_otherwise = warnings.showwarning
 
         def show(text: Warning | str, category: type[Warning], *place: Any) -> None:
-            if category.__name__ == "BrakeWarning":  # its module is loaded only where brakes are
+            if category.__name__ in _OURS:  # their modules are loaded only where they are needed
                 message(f"warning: {text}")
             else:
                 show_otherwise(text, category, *place)
@@ -179,6 +185,14 @@ def _explained(error: BaseException) -> int:
     if isinstance(error, BywireError):
         message(f"error: {error}")
         return error.exit_status
+    if isinstance(error, MemoryError):
+        limit = address_space()
+        why = (
+            f"the address space of this process is limited to {limit / 2**30:.3g} GiB (ulimit -v): "
+            "raise that limit" if limit else "free some, or ask for less at a time"
+        )  # fmt: skip
+        message(f"error: out of memory: {why}")
+        return FAILED
     if isinstance(error, OSError):
         message(f"error: {_system_error(error)}")
         return FAILED

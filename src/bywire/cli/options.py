@@ -48,11 +48,13 @@ BenchChanges = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help=texts.BENCH_CHANGES,
                  autocompletion=completion.changeable),
 ]
+Side = Annotated[str, typer.Option("--side", help=texts.SIDE)]
 ErrorEstimate = Annotated[bool, typer.Option(help=texts.ERROR_ESTIMATE)]
 Frequencies = Annotated[str, typer.Option(help=texts.FREQUENCIES)]
 Map = Annotated[Path | None, typer.Option("--map", metavar="PATH", help=texts.MAP)]
 Inputs = Annotated[
     list[str] | None,
-    typer.Option("--input", metavar="STIMULUS=SIGNAL", help=texts.INPUTS),
+    typer.Option("--input", metavar="STIMULUS=COLUMN", help=texts.INPUTS),
 ]
+Time = Annotated[str, typer.Option("--time", metavar="COLUMN", help=texts.TIME)]
 CaseName = Annotated[str, typer.Option("--case", help=texts.CASE)]

@@ -7,12 +7,11 @@ import io
 import os
 import sys
 
+from bywire.core.clean_text import shortened
 from bywire.core.errors import FileError
 
 INTERRUPTED = 130
 """exit status after Ctrl-C"""
-
-_WORD, _PATH, _MESSAGE = 120, 600, 3000  # characters that are shown of each
 
 
 def open_streams() -> None:
@@ -55,22 +54,6 @@ def message(text: str) -> None:
 
     with contextlib.suppress(OSError):
         print(f"bywire: {shortened(clean(text))}", file=sys.stderr, flush=True)
-
-
-def shortened(text: str) -> str:
-    """Return a message of a length that can be read, with its beginning and its end.
-
-    Examples
-    --------
-    >>> len(shortened("unknown parameter '" + 400 * "x" + "': known are a, b"))
-    156
-    """
-    words = [_cut(word, _WORD if "/" not in word else _PATH) for word in text.split(" ")]
-    return _cut(" ".join(words), _MESSAGE)
-
-
-def _cut(text: str, most: int) -> str:
-    return text if len(text) <= most else f"{text[: 2 * most // 3]}...{text[-most // 3 :]}"
 
 
 def flush() -> None:

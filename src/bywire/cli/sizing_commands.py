@@ -15,6 +15,7 @@ from bywire.cli.options import (
     LoopName,
     OutFolder,
     Parameters,
+    Side,
     changes,
 )
 from bywire.cli.show import show
@@ -85,6 +86,7 @@ def design_command(
         str, typer.Option(help="Of all requirements together, e.g. '99 %'; needs --vary.")
     ] = "",
     seed: Annotated[int, typer.Option(help="Seed of the searches.", min=0)] = 0,
+    side: Side = "",
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:  # fmt: skip
@@ -96,7 +98,7 @@ def design_command(
             loop, parameters, at, changes(set_), require=require or (), requirements=requirements,
             over=over or (), amplitudes=amplitudes, schedule=schedule, linear_only=linear_only,
             free_derivative=free_derivative, vary=vary, drawn=drawn, probability=probability,
-            seed=seed, progress=progress,
+            seed=seed, progress=progress, side=side,
         ),
         out, json,
     )  # fmt: skip

@@ -8,7 +8,8 @@ from collections.abc import Callable
 from typing import Any, Self
 
 from bywire.core import ops
-from bywire.core.units import registry
+from bywire.core.dimensions import BASE, DimensionError
+from bywire.core.units import base_powers, si_value
 
 PURE = ("exp", "log", "sin", "cos", "arctan", "floor", "power")  # functions of pure numbers only
 
@@ -22,17 +23,20 @@ class Dimensioned:
     __array_ufunc__ = None  # NumPy's scalars hand operations over to this class
 
     def __init__(self, value: float, unit: str = "1") -> None:
-        self.quantity = registry().Quantity(value, "" if unit == "1" else unit).to_base_units()
+        self.value, self.powers = si_value(value, unit), base_powers(unit, BASE)
 
     @classmethod
-    def of(cls, quantity: Any) -> Self:
-        """Wrap a quantity of pint."""
+    def of(cls, value: float, powers: tuple[float, ...]) -> Self:
+        """Return a number in SI with the exponents of its base units."""
         self = cls.__new__(cls)
-        self.quantity = quantity
+        self.value, self.powers = value, powers
         return self
 
     def __repr__(self) -> str:
-        return f"{self.quantity:~}"
+        named = (
+            f"{name}**{power:g}" for name, power in zip(BASE, self.powers, strict=True) if power
+        )
+        return " ".join((f"{self.value:g}", "*".join(named))).strip()
 
     def __add__(self, other: Any) -> Any:
         return _combined(operator.add, self, other)
@@ -59,13 +63,13 @@ class Dimensioned:
         return _combined(operator.truediv, other, self)
 
     def __pow__(self, exponent: float) -> Dimensioned:
-        return Dimensioned.of(self.quantity**exponent)
+        return Dimensioned.of(self.value**exponent, tuple(exponent * p for p in self.powers))
 
     def __neg__(self) -> Dimensioned:
-        return Dimensioned.of(-self.quantity)
+        return Dimensioned.of(-self.value, self.powers)
 
     def __abs__(self) -> Dimensioned:
-        return Dimensioned.of(abs(self.quantity))
+        return Dimensioned.of(abs(self.value), self.powers)
 
     def __lt__(self, other: Any) -> Condition:
         return Condition(operator.lt, self, other)
@@ -84,18 +88,18 @@ class Dimensioned:
 
     def has_unit(self, unit: str) -> bool:
         """Tell whether the dimension is that of a unit."""
-        return bool(self.quantity.is_compatible_with("" if unit == "1" else unit))
+        return self.powers == base_powers(unit, BASE)
 
     def _bywire_op(self, name: str, *args: Any) -> Any:
         if name in PURE:
-            return Dimensioned(getattr(ops, name)(*(float(_quantity(a).to("")) for a in args)))
+            return Dimensioned(getattr(ops, name)(*map(_pure, args)))
         if name == "sqrt":
             return self**0.5
         if name == "fabs":
             return abs(self)
         if name in ("fmax", "fmin"):
-            x, y = _alike(*args)
-            return Dimensioned.of(max(x, y) if name == "fmax" else min(x, y))
+            x, y, powers = _alike(*args)
+            return Dimensioned.of(max(x, y) if name == "fmax" else min(x, y), powers)
         raise TypeError(f"ops.{name} says no dimension: give it one in Dimensioned._bywire_op")
 
 
@@ -103,15 +107,15 @@ class Condition:
     """Outcome of a comparison: chooses in ``ops.where``, refuses to steer an ``if``."""
 
     def __init__(self, compare: Callable[[Any, Any], bool], left: Any, right: Any) -> None:
-        self.holds = bool(compare(*_alike(left, right)))
+        self.holds = bool(compare(*_alike(left, right)[:2]))
 
     def __bool__(self) -> bool:
         raise TypeError("the flow of an equation must not hang on a value: use ops.where")
 
     def _bywire_op(self, name: str, *args: Any) -> Any:
         condition, then, otherwise = args  # of ops.where, the only one that takes a condition
-        x, y = _alike(then, otherwise)
-        return Dimensioned.of(x if condition.holds else y)
+        x, y, powers = _alike(then, otherwise)
+        return Dimensioned.of(x if condition.holds else y, powers)
 
 
 def fits(value: Any, unit: str) -> bool:
@@ -122,18 +126,31 @@ def fits(value: Any, unit: str) -> bool:
     return plain or Dimensioned(value).has_unit(unit)
 
 
-def _quantity(value: Any) -> Any:
-    return value.quantity if isinstance(value, Dimensioned) else registry().Quantity(value)
+def _parts(value: Any) -> tuple[float, tuple[float, ...]]:
+    if isinstance(value, Dimensioned):
+        return value.value, value.powers
+    return value, (0.0,) * len(BASE)
+
+
+def _pure(value: Any) -> float:
+    number, powers = _parts(value)
+    if any(powers):
+        raise DimensionError(f"{value!r} is not a pure number")
+    return float(number)
 
 
 def _combined(operation: Callable[[Any, Any], Any], left: Any, right: Any) -> Any:
     if operation in (operator.add, operator.sub):
-        return Dimensioned.of(operation(*_alike(left, right)))
+        x, y, powers = _alike(left, right)
+        return Dimensioned.of(operation(x, y), powers)
     if _is_unknown(left) or _is_unknown(right):
         return float("nan")
     if _is_nothing(left) or (operation is operator.mul and _is_nothing(right)):
         return 0.0  # nothing goes with every unit, times anything too
-    return Dimensioned.of(operation(_quantity(left), _quantity(right)))
+    (x, of_left), (y, of_right) = _parts(left), _parts(right)
+    sign = 1.0 if operation is operator.mul else -1.0
+    powers = tuple(a + sign * b for a, b in zip(of_left, of_right, strict=True))
+    return Dimensioned.of(operation(x, y), powers)
 
 
 def _is_nothing(value: Any) -> bool:
@@ -144,11 +161,11 @@ def _is_unknown(value: Any) -> bool:
     return not isinstance(value, Dimensioned) and math.isnan(value)
 
 
-def _alike(left: Any, right: Any) -> tuple[Any, Any]:
-    """Return two quantities of one dimension; zero and unknown ones take that of the other."""
-    x, y = _quantity(left), _quantity(right)
+def _alike(left: Any, right: Any) -> tuple[float, float, tuple[float, ...]]:
+    """Return two numbers and their common dimension; zero and unknown ones take the other's."""
+    (x, powers), (y, others) = _parts(left), _parts(right)
     if _is_nothing(left) or _is_unknown(left):
-        x = float(left) * y
-    elif _is_nothing(right) or _is_unknown(right):
-        y = float(right) * x
-    return x, y.to(x.units)
+        return x, y, others
+    if powers != others and not (_is_nothing(right) or _is_unknown(right)):
+        raise DimensionError(f"{left!r} and {right!r} measure different quantities")
+    return x, y, powers

@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-from annotated_types import Ge, Gt, Le, Lt
-
 from bywire.core.brake import Brake
 from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.registry import Kind
-from bywire.core.signals import Signal
+from bywire.core.signals import signal_in
 
 
 @dataclass(frozen=True)
@@ -45,6 +43,11 @@ class Element:
     module: ModuleType
 
     @property
+    def summary(self) -> str:
+        """The first line of what its file says of it."""
+        return (self.module.__doc__ or "").strip().partition("\n")[0]
+
+    @property
     def functions(self) -> dict[str, Callable[..., Any]]:
         """Its public functions."""
         return functions(self.module)
@@ -65,6 +68,14 @@ LAWS = Kind("control law", ("laws",), _declared, "bywire.control")
 def every_element() -> dict[str, Element]:
     """Return all elements and control laws by name."""
     return {**ELEMENTS.all(), **LAWS.all()}
+
+
+def elements_by_name() -> dict[str, Element]:
+    """Return all elements and control laws by each of their names: the last part may be enough."""
+    every = every_element()
+    ends = [name.rpartition(".")[2] for name in every]
+    short = {name.rpartition(".")[2]: element for name, element in every.items()}
+    return {name: each for name, each in short.items() if ends.count(name) == 1} | every
 
 
 def elements_of(brake: Brake) -> dict[str, Element]:
@@ -166,17 +177,10 @@ def numbers(name: str, annotation: Any) -> dict[str, Number]:
 
 
 def _signal(name: str, annotation: Any) -> Number:
-    notes = getattr(annotation, "__metadata__", ())
-    signal = next((note for note in notes if isinstance(note, Signal)), None)
+    signal = signal_in(annotation)
     if signal is None:
         raise TypeError(f"{name}: {annotation} says no unit: Annotated[float, Signal(...)] does")
-    bounds: dict[str, Any] = {}
-    for note in notes:
-        if isinstance(note, (Gt, Ge)):
-            bounds["low"] = note.gt if isinstance(note, Gt) else note.ge
-        elif isinstance(note, (Lt, Le)):
-            bounds["high"] = note.lt if isinstance(note, Lt) else note.le
-    return Number(signal.unit, signal.nominal, **bounds)
+    return Number(signal.unit, signal.nominal, signal.low, signal.high)
 
 
 def flat(value: Any) -> list[Any]:

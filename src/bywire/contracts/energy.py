@@ -32,6 +32,7 @@ from bywire.contracts.sampling import (
     Sampler,
     call,
     combinations,
+    described,
     flattened,
     samples_of,
     symbolic,
@@ -53,7 +54,7 @@ def has_rates_of_its_states(module: ModuleType) -> Iterator[Evidence]:
         for (name, number), (top, bottom) in zip(states.items(), rates, strict=True):
             rate, unit = top / bottom, f"({number.unit})/s"
             yield Evidence(
-                fits(rate, unit), f"rate of {name} is {rate}, wanted {unit}; {choices}",
+                fits(rate, unit), f"rate of {name} is {rate}, wanted {unit}{described(choices)}",
                 place=place_of(balance),
             )  # fmt: skip
 
@@ -88,15 +89,18 @@ def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
         compiled = ca.Function("E", [column], [ca.vertcat(*terms), ca.vertcat(0.0, *unmoved)])
         powers, hidden = (out.full() for out in compiled(samples))
         if hidden.any():
-            text = f"the energy depends on inputs without input_rate; {choices}"
+            text = f"the energy depends on inputs without input_rate{described(choices)}"
             yield Evidence(False, text, place=place)
             return
         off, scale = np.abs(powers.sum(axis=0)), np.abs(powers).sum(axis=0)
         if not scale.any():  # the choices may switch it off
             continue
         is_alive = True
-        share = float((off / np.where(scale > 0, scale, 1.0)).max())
-        text = f"d(energy)/dt is off by {share:.1e} of the powers; {choices}"
+        shares = off / np.where(scale > 0, scale, 1.0)
+        at = int(np.argmax(shares))
+        share = float(shares[at])
+        where = described(choices, structure, samples[:, at], share > BALANCE)
+        text = f"d(energy)/dt is off by {share:.1e} of the powers{where}"
         yield measured(share, BALANCE, text, place)
     if not is_alive:
         yield Evidence(False, "no power ever flows", place=place)
@@ -118,8 +122,10 @@ def loses_what_it_says(module: ModuleType) -> Iterator[Evidence]:
         column, sample = symbolic(structure)
         heat = call(loss, _consistent(module, arguments, sample))
         values = ca.Function("P", [column], [heat])(samples).full()
-        least = float(values.min())
-        yield Evidence(least >= 0.0, f"power_loss falls to {least:g} W; {choices}", place=place)
+        at = int(np.argmin(values))
+        least = float(values.flat[at])
+        where = described(choices, structure, samples[:, at], not least >= 0.0)
+        yield Evidence(least >= 0.0, f"power_loss falls to {least:g} W{where}", place=place)
 
 
 def _consistent(module: ModuleType, known: dict[str, Any], sample: Arguments) -> Arguments:

@@ -17,6 +17,7 @@ from bywire.contracts.sampling import (
     call,
     carrying,
     combinations,
+    described,
     evaluate,
     flattened,
     samples_of,
@@ -51,9 +52,8 @@ def has_annotated_units(function: Function) -> Iterator[Evidence]:
     for choices in combinations(arguments):
         got = flat(call(function, with_units(Sampler(arguments, choices))))
         for (name, number), value in zip(expected.items(), got, strict=True):
-            yield Evidence(
-                fits(value, number.unit), f"{name} is {value}, wanted {number.unit}; {choices}"
-            )
+            text = f"{name} is {value}, wanted {number.unit}{described(choices)}"
+            yield Evidence(fits(value, number.unit), text)
 
 
 def is_in_SI(function: Function) -> Iterator[Evidence]:
@@ -61,7 +61,7 @@ def is_in_SI(function: Function) -> Iterator[Evidence]:
     arguments, returns = signature_of(function)
     for argument, annotation in (*arguments.items(), ("result", returns)):
         for name, number in numbers(argument, annotation).items():
-            factor = float(Dimensioned(1.0, number.unit).quantity.magnitude)
+            factor = Dimensioned(1.0, number.unit).value
             yield measured(
                 abs(factor - 1.0), PREFIX, f"{name} [{number.unit}] is {factor:g} of SI"
             )
@@ -80,8 +80,11 @@ def has_agreeing_back_ends(function: Function) -> Iterator[Evidence]:
         # A difference of large terms is as good as the terms: the row's largest value is scale.
         scale = np.abs(floats).max(axis=1, keepdims=True)
         for name, other in (("arrays", arrays), ("symbols", symbols)):
-            off = _relative(np.abs(other - floats), scale)
-            yield measured(off, BACK_ENDS, f"{name} differ from floats by {off:.1e}; {choices}")
+            apart = np.abs(other - floats)
+            off = _relative(apart, scale)
+            at = int(np.argmax((apart / np.where(scale > 0, scale, 1)).max(axis=0)))
+            where = described(choices, structure, samples[:, at], off > BACK_ENDS)
+            yield measured(off, BACK_ENDS, f"{name} differ from floats by {off:.1e}{where}")
 
 
 def has_its_slopes(function: Function) -> Iterator[Evidence]:
@@ -95,7 +98,9 @@ def has_its_slopes(function: Function) -> Iterator[Evidence]:
         compiled = ca.Function("J", [column], [ca.vec(ca.densify(ca.jacobian(results, column)))])
         exact = compiled(samples).full().reshape(shape, order="F")
         if not np.all(np.isfinite(exact)):
-            yield Evidence(False, f"the Jacobian is not finite; {choices}")
+            at = int(np.argmax(~np.isfinite(exact).all(axis=(0, 1))))
+            where = described(choices, structure, samples[:, at])
+            yield Evidence(False, f"the Jacobian is not finite{where}")
             return
         largest = np.abs(evaluate(function, structure, samples)).max(axis=1)[:, None]
         names = list(flattened(structure))
@@ -109,11 +114,13 @@ def has_its_slopes(function: Function) -> Iterator[Evidence]:
             # Where the two differences disagree there is a kink or a jump between their ends.
             smooth = np.abs(wide - narrow) <= 1e-3 * scale
             if not np.all(smooth.mean(axis=1) > 0.5):
-                yield Evidence(False, f"kinks everywhere along {name}; {choices}")
+                yield Evidence(False, f"kinks everywhere along {name}{described(choices)}")
                 return
             off = np.abs(narrow - exact[:, j]) / np.where(scale > 0, scale, 1)
             share = float(off[smooth].max())
-            yield measured(share, SLOPE, f"slope along {name} is off by {share:.1e}; {choices}")
+            at = int(np.argmax(np.where(smooth, off, -1.0).max(axis=0)))
+            where = described(choices, structure, samples[:, at], share > SLOPE)
+            yield measured(share, SLOPE, f"slope along {name} is off by {share:.1e}{where}")
 
 
 def _slopes(function: Function, structure: Arguments, matrix: Array, steps: Array) -> Array:

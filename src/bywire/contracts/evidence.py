@@ -43,6 +43,8 @@ class Evidence:
         Measure and the largest that is admissible; None where the contract has none.
     place
         Line to look at, where it is another than that of the subject.
+    is_error
+        Whether an error kept the contract from being tried.
     """
 
     holds: bool
@@ -50,6 +52,7 @@ class Evidence:
     figure: float | None = None
     limit: float | None = None
     place: Place | None = None
+    is_error: bool = False
 
 
 def measured(figure: float, limit: float, text: str, place: Place | None = None) -> Evidence:
@@ -99,7 +102,8 @@ def examine(contract: Contract, subject: Any, place: Place | None = None) -> Evi
     except Exception as error:  # whatever a user's equations raise
         text = " ".join(str(error).split())
         at = place or place_of(subject)
-        return Evidence(False, f"{type(error).__name__}: {text}", place=_raised_at(error, at.file))
+        said = f"{type(error).__name__}: {text}"
+        return Evidence(False, said, place=_raised_at(error, at.file), is_error=True)
 
 
 def place_of(subject: Any) -> Place:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from bywire.contracts.evidence import Contract, NotCheckedError, Place, examine, place_of
@@ -29,6 +29,8 @@ class Finding:
         Measure and the largest that is admissible; None where the contract has none.
     place
         Line to look at.
+    is_error
+        Whether an error of the subject kept the contract from being tried.
     """
 
     subject: str
@@ -38,6 +40,7 @@ class Finding:
     place: Place
     figure: float | None = None
     limit: float | None = None
+    is_error: bool = False
 
     def __str__(self) -> str:
         return f"{self.subject}: {self.contract}: {self.outcome}: {self.text} ({self.place})"
@@ -63,8 +66,23 @@ class Demand:
         outcome: Outcome = "holds" if evidence.holds else "broken"
         return Finding(
             self.subject, self.name, outcome, evidence.text, evidence.place or place,
-            evidence.figure, evidence.limit,
+            evidence.figure, evidence.limit, evidence.is_error,
         )  # fmt: skip
+
+
+def one_by_cause(findings: Iterable[Finding]) -> Iterator[Finding]:
+    """Yield findings in their order, an error as broken once: what else it stops is not checked.
+
+    A parameter that was renamed keeps every contract of a model from being tried, at one line.
+    """
+    seen: dict[tuple[str, Place], Finding] = {}
+    for each in findings:
+        first = seen.setdefault((each.text, each.place), each) if each.is_error else each
+        if first is each:
+            yield each
+        else:
+            text = f"the error of {first.subject}: {first.contract} comes up here too"
+            yield replace(each, outcome="not checked", text=text)
 
 
 Demands = Iterator[Demand]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from bywire.contracts.evidence import Contract
+from collections.abc import Iterator
+
+from bywire.bench.faults.modes import modes_of
+from bywire.contracts.evidence import Contract, Evidence
 from bywire.contracts.finding import Demand, Demands
 from bywire.contracts.model_units import has_its_units
 from bywire.contracts.rest import hides_no_friction, rests_exactly
 from bywire.contracts.run_derivatives import has_its_derivatives
 from bywire.contracts.run_energy import closes_its_energy
-from bywire.contracts.small_signal import is_its_linear_model
+from bywire.contracts.small_signal import is_its_linear_model, is_linear_beside_its_corners
 from bywire.contracts.stepping import (
     has_agreeing_engines,
     has_agreeing_lanes,
@@ -24,6 +27,22 @@ OF_A_SET: dict[str, Contract] = {
 }
 """what every parameter set has to keep"""
 
+
+def has_faults_of_what_is_there(trial: Trial) -> Iterator[Evidence]:
+    """Find whether what may fail in a model names signals, tasks and parameters that it has."""
+    start = trial.start
+    modes = modes_of(start.model, start.par)
+    yield Evidence(True, f"{len(modes)} ways to fail name what is there")
+    for mode in modes.values():
+        if mode.changes is not None and not mode.lacks(start.par):
+            for name in mode.changes(start.par, mode.value):
+                try:
+                    start.par.value(name)
+                except (AttributeError, LookupError, ValueError):
+                    text = f"the fault {mode.name} changes {name}, which is no parameter here"
+                    yield Evidence(False, text)
+
+
 OF_A_MODEL: dict[str, Contract] = {
     "units": has_its_units,
     "order of the step": is_of_second_order,
@@ -33,7 +52,9 @@ OF_A_MODEL: dict[str, Contract] = {
     "engines": has_agreeing_engines,
     "lanes": has_agreeing_lanes,
     "linear model": is_its_linear_model,
+    "linear model on corners": is_linear_beside_its_corners,
     "derivatives of a run": has_its_derivatives,
+    "faults": has_faults_of_what_is_there,
 }
 """what every model has to keep, where it starts with a parameter set"""
 

@@ -66,7 +66,7 @@ def with_units(par: ParameterSet) -> ParameterSet:
 def _moved(signals: Any) -> Any:
     kind: Any = type(signals)
     known = signals_of(kind)
-    values = {name: getattr(signals, name) + OFF * s.nominal for name, s in known.items()}
+    values = {n: s.within(getattr(signals, n) + OFF * s.nominal) for n, s in known.items()}
     return _carrying(kind, values)
 
 

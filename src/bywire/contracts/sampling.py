@@ -6,7 +6,7 @@ import inspect
 import itertools
 import math
 import typing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -16,9 +16,11 @@ import numpy as np
 from bywire.contracts.elements import Number, flat, is_parameters, is_signals, numbers
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.typing import Array
 
 NODES = 4  # of every table
 ATTEMPTS = 2000
+_SHOWN = 24  # values in a message
 MANY = 64
 """combinations of choices above which not all are tried"""
 
@@ -181,6 +183,28 @@ def carrying(arguments: Arguments, values: Mapping[str, Any]) -> Arguments:
         else:
             renewed[name] = values[name]
     return renewed
+
+
+def described(
+    choices: Choices, structure: Arguments | None = None, values: Sequence[float] | Array = (),
+    is_broken: bool = True,
+) -> str:
+    """Return with which choices and values a contract was tried, as messages end; with units.
+
+    Parameters
+    ----------
+    structure, values
+        A sample, and the numbers in it, in the order of `flattened`; none where all were alike.
+    is_broken
+        Whether the values matter, as they broke the contract.
+    """
+    texts = [f"{name} = {value}" for name, value in choices.items()]
+    if structure is not None and is_broken:
+        pairs = zip(flattened(structure), values, strict=True)
+        texts += [f"{name} = {value:.6g}" for name, value in pairs]
+    more = len(texts) - _SHOWN
+    shown = texts[:_SHOWN] + ([f"and {more} more"] if more > 0 else [])
+    return f"; with {', '.join(shown)}" if texts else ""
 
 
 def symbolic(arguments: Arguments) -> tuple[ca.SX, Arguments]:

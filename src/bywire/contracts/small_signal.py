@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any, NamedTuple, cast
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from bywire.analysis.linear.corners import (
+    ABOVE,
+    BELOW,
+    REACH,
+    CornerError,
+    Kink,
+    beside_point,
+    kinks_at,
+    magnitudes,
+    taking,
+)
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.linearize import Friction, linearize
+from bywire.analysis.linear.linearize import Friction, free_signals, linearize, smooth_point
+from bywire.analysis.linear.smooth_functions import SmoothPoint
 from bywire.contracts.evidence import Evidence, NotCheckedError, measured
 from bywire.contracts.probe import states
 from bywire.contracts.trial import Trial
@@ -32,7 +46,11 @@ def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
     has friction held fast.
     """
     start = trial.start
-    linear, removed = _linear(trial)
+    try:
+        linear, removed = _linear(trial)
+    except CornerError as error:
+        yield Evidence(False, f"at {start.known}: {error}", place=trial.place("balance", "wire"))
+        return
     names = start.state._fields
     period, step = start.period, start.step / 4
     place = trial.place("balance", "wire")
@@ -72,6 +90,8 @@ def _linear(trial: Trial) -> tuple[LinearModel, bool]:
                 trial.model, start.par, start.state, start.memory,
                 inputs=start.memory._fields, outputs=(), friction=friction,
             )  # fmt: skip
+        except CornerError:
+            raise
         except InputError as error:
             reasons.append(str(error))
             continue
@@ -94,3 +114,104 @@ def _response(linear: LinearModel, inputs: Array, period: float) -> Array:
     for held in inputs[:-1]:
         rows.append(ahead @ rows[-1] + driven @ held)
     return np.array(rows)
+
+
+MOST = 40
+"""operations of a model that are put on their corners, one place in the source each"""
+ONE_SIDED = 1e-3
+"""by how much a linear model may differ from differences on its side, of the largest effect"""
+ROUNDING = 1e-14
+"""of rates: what differences of them may be off"""
+_NEWTON = 8
+
+
+def is_linear_beside_its_corners(trial: Trial) -> Iterator[Evidence]:
+    """Find whether linear models hold, or are refused, where operations are on their corners.
+
+    The plant's operating point is driven to the corner of each limit, choice and magnitude in its
+    equations. There, a model that is returned without a word must hold on both sides; where it is
+    refused, those of the two sides must be what the equations do beside the corner.
+    """
+    start = trial.start
+    try:
+        at = smooth_point(trial.model, start.par, (start.state, start.memory, None))
+    except InputError as error:
+        raise NotCheckedError(f"at {start.known}: {error}") from error
+    free = free_signals(at, trial.model.State._fields, trial.model.Memory._fields, ())
+    usual = magnitudes(at)
+    kinks = kinks_at(at, free, usual, outputs=False, ticks=False)
+    places = {kink.place: kink.order for kink in kinks}
+    count = 0
+    for place, order in [*places.items()][:MOST]:
+        corner = _driven(at, free, usual, order)
+        if corner is not None:
+            count += 1
+            yield _beside(trial, corner, free, place)
+    if not count:
+        raise NotCheckedError(f"no operation of the plant has a corner near {start.known}")
+
+
+def _driven(
+    at: SmoothPoint, free: NDArray[np.bool_], usual: Array, order: int
+) -> SmoothPoint | None:
+    """Return the nearest point at which an operation is on its corner; None where none is found."""
+    for _ in range(_NEWTON):
+        kink = _kink(kinks_at(at, free, usual, outputs=False, ticks=False), order)
+        if kink is None or not np.isfinite(kink.excess):
+            return None
+        c = kink.slope
+        if abs(kink.excess) <= 1e-3 * REACH * float(np.abs(c).sum()):
+            return _with_its_contacts(at)
+        by = np.zeros(free.size)
+        by[free] = -kink.excess * c / (c @ c) * usual[free]
+        at = at.moved(by)
+    return None
+
+
+def _with_its_contacts(at: SmoothPoint) -> SmoothPoint | None:
+    """Return a point with the contacts that are closed there; None where one just touches."""
+    model = at.model
+    state = cast(NamedTuple, cast(Any, model.State)(*at.state.tolist()))
+    memory = cast(NamedTuple, cast(Any, model.Memory)(*at.memory.tolist()))
+    try:
+        return smooth_point(model, at.par, (state, memory, None))
+    except InputError:
+        return None
+
+
+def _kink(kinks: list[Kink], order: int) -> Kink | None:
+    return next((each for each in kinks if each.order == order), None)
+
+
+def _beside(trial: Trial, at: SmoothPoint, free: NDArray[np.bool_], place: str) -> Evidence:
+    """Return whether the linear models at a corner are what the equations do beside it."""
+    model = trial.model
+    n, m = at.state.size, at.memory.size
+    state = cast(NamedTuple, cast(Any, model.State)(*at.state.tolist()))
+    memory = cast(NamedTuple, cast(Any, model.Memory)(*at.memory.tolist()))
+
+    def linear() -> Array:
+        made = linearize(model, at.par, state, memory, inputs=memory._fields, outputs=())
+        return np.hstack([made.A, made.B])
+
+    try:
+        sides, how = [linear()], "without a side"
+    except CornerError:
+        sides, how = [], "on a stated side"
+        for side in (ABOVE, BELOW):
+            with taking(side):
+                sides.append(linear())
+    by = beside_point(at, free)
+    most = 0.0
+    for away in (by, -by):
+        once, twice = (at.moved(share * away).plant()[4][:, 0] for share in (0.5, 1.0))
+        if not (np.isfinite(once).all() and np.isfinite(twice).all()):
+            return Evidence(True, f"{place} is on its corner beside what has no numbers")
+        wanted, step = twice - once, 0.5 * away[: n + m]
+        size = np.maximum(np.abs(sides[0]), np.abs(sides[-1])) @ np.abs(step)
+        rounding = ROUNDING * (np.abs(once) + np.abs(twice))
+        # A slope whose effect takes more than a second for a usual magnitude needs no precision.
+        size = np.maximum(size, rounding / ONE_SIDED + REACH * magnitudes(at)[:n])
+        most = max(most, min(float(np.max(np.abs(J @ step - wanted) / size)) for J in sides))
+    text = f"with {place} on its corner the linear model {how} is off by {most:.1e}"
+    return measured(most, ONE_SIDED, text, trial.place("balance", "wire"))

@@ -74,9 +74,12 @@ class Start:
         signals = signals_of(type(self.stimulus))
         reach = np.array([0.0 if n.startswith("noise_") else s.nominal for n, s in signals.items()])
 
+        low = np.array([s.low for s in signals.values()])
+        high = np.array([s.high for s in signals.values()])
+
         def stimulus(t: Array) -> Array:
             wave = np.where(t < ACTIVE, np.sin(2.0 * np.pi / ACTIVE * t), 0.0)
-            return np.asarray(base + share * wave[:, None] * reach)
+            return np.clip(base + share * wave[:, None] * reach, low, high)
 
         return Run(
             self.model, self.par, self.state, self.memory, stimulus, duration, self.step,

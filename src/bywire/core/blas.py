@@ -30,10 +30,9 @@ VARIABLES = (*_DEFAULTS, "OMP_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_
 """environment variables by which a user chooses"""
 
 
-def one_thread_environment() -> dict[str, str]:
-    """Environment of a child process whose libraries start no threads of their own."""
-    chosen = {**dict.fromkeys(_DEFAULTS, "1"), "OMP_NUM_THREADS": "1", **_IDLE_THREADS}
-    return {**os.environ, **chosen}
+def one_thread_variables() -> dict[str, str]:
+    """Environment variables of a child process whose libraries start no threads of their own."""
+    return {**dict.fromkeys(_DEFAULTS, "1"), "OMP_NUM_THREADS": "1", **_IDLE_THREADS}
 
 
 def keep_one_thread() -> None:

@@ -21,6 +21,7 @@ _WORDS = re.compile(
     r"(?P<command>\bbywire [a-z-]+(?: [^\s',;:)]+)*)"  # a command that is quoted stays one
     r"|(?P<system>--system PATH, or )"
     r"|(?<![\w-])--(?P<pair>set|input|option|prior) (?P<key>[\w.*]+)=(?P<value>[^\s,;)]+)"
+    r"|(?<![\w-])--(?P<text>side) (?P<side>[^\s,;]+)"
     r"|(?<![\w-])--(?P<flag>[a-z]+(?:-[a-z]+)*)"
 )
 _commands: list[None] = []
@@ -59,4 +60,6 @@ def _argument(match: re.Match[str]) -> str:
         return ""
     if match["pair"]:
         return f'{_ARGUMENTS[match["pair"]]}={{"{match["key"]}": "{match["value"]}"}}'
+    if match["text"]:
+        return f'{match["text"]}="{match["side"]}"'
     return _ARGUMENTS.get(match["flag"], match["flag"].replace("-", "_"))

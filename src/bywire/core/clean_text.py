@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import unicodedata
 
+_WORD, _PATH, _MESSAGE = 120, 600, 3000  # characters that are shown of each
+
 
 def clean(text: object) -> str:
     """Return text without what could disturb a page, a figure or a terminal.
@@ -25,3 +27,19 @@ def _clean_character(character: str) -> str:
     if character in "\t\r" or unicodedata.category(character) == "Zs":
         return " "
     return "\N{REPLACEMENT CHARACTER}"
+
+
+def shortened(text: str) -> str:
+    """Return a message of a length that can be read, with its beginning and its end.
+
+    Examples
+    --------
+    >>> len(shortened("unknown parameter '" + 400 * "x" + "': known are a, b"))
+    156
+    """
+    words = [_cut(word, _WORD if "/" not in word else _PATH) for word in text.split(" ")]
+    return _cut(" ".join(words), _MESSAGE)
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: 2 * most // 3]}...{text[-most // 3 :]}"

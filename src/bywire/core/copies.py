@@ -22,6 +22,7 @@ from typing import Any
 from bywire.core.blas import keep_one_thread
 from bywire.core.brake import load_brakes, loaded_files
 from bywire.core.callers import is_command_line
+from bywire.core.child_process import safe_start
 from bywire.core.errors import RunError
 
 _ENDING = 0.05  # s for which a thread that was joined may still be there
@@ -47,30 +48,6 @@ def _thread_count() -> int:
     return len(os.listdir("/proc/self/task"))
 
 
-# A new process, and the one of Python's that tidies up behind it, begin as ``python -c``: a module
-# in the working folder would run in place of one of Python's own. The other one complains on
-# standard error of what a killed command could not tidy up itself.
-_ENVIRONMENT = {
-    "PYTHONSAFEPATH": "1",
-    "PYTHONWARNINGS": "ignore:resource_tracker:UserWarning",
-}  # fmt: skip
-
-
-@contextmanager
-def _safe_environment() -> Iterator[None]:
-    """Have Python processes that start in this block begin safely, and in silence."""
-    before = {name: os.environ.get(name) for name in _ENVIRONMENT}
-    os.environ.update(_ENVIRONMENT)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
 class _WithoutMain(SpawnProcess):
     """A process that loads what it computes, and not the program that asked for it.
 
@@ -85,7 +62,7 @@ class _WithoutMain(SpawnProcess):
         vars(nameless).update(vars(main), __spec__=None, __file__=None)
         sys.modules["__main__"] = nameless
         try:
-            with _safe_environment():
+            with safe_start():
                 super().start()
         finally:
             sys.modules["__main__"] = main
@@ -115,7 +92,7 @@ def processes(
         Whether they are copies of this process, which begin with all that it has loaded and
         computed; others load what they need anew.
     """
-    with nullcontext() if is_copied else _safe_environment():
+    with nullcontext() if is_copied else safe_start():
         pool = ProcessPoolExecutor(
             count, get_context("fork") if is_copied else _Anew(), initializer=_begin,
             initargs=(prepare, *arguments) if is_copied else

@@ -25,6 +25,7 @@ from difflib import SequenceMatcher, get_close_matches
 from typing import Any
 
 from bywire.core.callers import in_callers_words
+from bywire.core.clean_text import shortened
 
 _SHOWN = 60  # characters of a value in a message
 _NEAR = 0.7  # resemblance of a name that was meant, where all are listed anyway
@@ -37,7 +38,7 @@ class BywireError(Exception):
     exit_status = 3
 
     def __str__(self) -> str:
-        return in_callers_words(super().__str__())
+        return in_callers_words(shortened(super().__str__()))
 
 
 class InputError(BywireError):
@@ -76,6 +77,10 @@ class RunError(BywireError):
 
 class SolverError(RunError):
     """A trajectory that left the numbers or did not settle."""
+
+
+class WorkLimitError(RunError):
+    """A run that takes more work than it may."""
 
 
 class CompilerError(RunError):

@@ -13,7 +13,7 @@ from bywire.core.wires import Integral, Port, Shown, Wire
 
 AnyPart = Part[Any, Any, Any, Any]
 
-STORED = Signal("J", "stored energy", role=Role("sink", "stored"))
+STORED = Signal("J", "stored energy", role=Role("sink", "stored", returns="any"))
 """what every assembly can record as ``E_stored``"""
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import _thread
+import os
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from types import FrameType
 
@@ -116,3 +118,49 @@ def interrupts_deferred() -> Iterator[None]:
         if arrived:
             previous(signal.SIGINT, None)  # notes it, where somebody does
             raise KeyboardInterrupt
+
+
+class _Stops(threading.local):
+    """Events of which any ends what a thread does; the main thread has none, it is interrupted."""
+
+    events: tuple[threading.Event, ...] = ()
+
+
+_stops = _Stops()
+
+
+def _take(events: tuple[threading.Event, ...]) -> None:
+    _stops.events = events
+
+
+def raise_if_stopped() -> None:
+    """Raise KeyboardInterrupt in a thread of `thread_pool` whose results nobody waits for any more.
+
+    For loops that take long; between two calls of a kernel they ask.
+    """
+    if any(event.is_set() for event in _stops.events):
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def thread_pool(threads: int | None = None) -> Iterator[ThreadPoolExecutor]:
+    """Yield a pool of threads that end within a moment where an exception leaves the block.
+
+    Ctrl-C reaches the main thread alone. Threads that a thread of a pool starts end with it, too.
+
+    Parameters
+    ----------
+    threads
+        How many, >= 1; all cores by default.
+    """
+    stop = threading.Event()
+    pool = ThreadPoolExecutor(
+        threads or os.cpu_count() or 1, initializer=_take, initargs=((*_stops.events, stop),)
+    )
+    try:
+        yield pool
+    except BaseException:
+        stop.set()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)

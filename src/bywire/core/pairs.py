@@ -6,6 +6,8 @@ from collections.abc import Iterable
 
 from bywire.core.errors import ParameterError
 
+DIGITS = 9
+"""digits of a whole number that counts something"""
 _INPUT = ("--input", "Inputs")  # of a command, and of a form
 _CHANGE = "KEY=VALUE, for instance motor.R_m=0.4ohm"
 _FORMS = {
@@ -57,3 +59,16 @@ def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
             raise ParameterError(f"{flag} {text}: {key} is set twice: leave one of them out")
         values[key] = value
     return values
+
+
+def read_count(text: str) -> int | None:
+    """Return the whole number >= 0 that a text is, of at most `DIGITS` digits; None for another.
+
+    Examples
+    --------
+    >>> read_count(" 12 "), read_count("1.5"), read_count("9" * 400)
+    (12, None, None)
+    """
+    digits = text.strip()
+    is_whole = digits.isascii() and digits.isdecimal() and len(digits) <= DIGITS
+    return int(digits) if is_whole else None

@@ -42,6 +42,7 @@ class Named(Protocol):
 
 T = TypeVar("T", bound=Named)
 Thing = TypeVar("Thing")
+_KINDS: list[Kind[Any]] = []
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,10 @@ class Kind(Generic[T]):
     declared
         How a brake declares one, for instance ``"a Loop"``: said where a name is unknown and a
         brake has none of them.
+
+    Notes
+    -----
+    Kinds that are called alike share their names: a name means one thing of all of them.
     """
 
     name: str
@@ -68,6 +73,9 @@ class Kind(Generic[T]):
     read: Callable[[ModuleType], Iterable[T]]
     home: str = ""
     declared: str = ""
+
+    def __post_init__(self) -> None:
+        _KINDS.append(self)
 
     def all(self) -> Mapping[str, T]:
         """Return every thing of this kind by its name: the general ones, then brake by brake."""
@@ -129,6 +137,7 @@ class Kind(Generic[T]):
             for module in modules_below(file) if _is_folder(file) is not None else ():
                 for thing in self.read(module):
                     if thing.name == name:
+                        _require_new(self, ((thing, module),), _of_others(self))
                         return thing
         return None
 
@@ -136,6 +145,22 @@ class Kind(Generic[T]):
         """Return the things that the brake of a module brings."""
         owner = next((brake for brake in brakes().values() if brake.module == module), None)
         return {thing.name: thing for thing, _ in _declared(self, owner)} if owner else {}
+
+    def own(self, module: str, name: str) -> T | None:
+        """Return the thing of a name that the brake of a module brings; None where it has none.
+
+        Raises
+        ------
+        ModelError
+            When a general thing has the name.
+        """
+        owner = next((brake for brake in brakes().values() if brake.module == module), None)
+        for thing, where in _declared(self, owner) if owner else ():
+            if thing.name == name:
+                _require_new(self, ((thing, where),), _of_others(self))
+                found: T = thing
+                return found
+        return None
 
     def beside(self, cls: type) -> Mapping[str, T]:
         """Return the things of the brake in which a class stands; all, if it stands in none.
@@ -227,6 +252,7 @@ def _gathered(kind: Kind[Any], known: tuple[Brake, ...]) -> tuple[tuple[Any, str
         try:
             new = _declared(kind, owner)
             _require_new(kind, new, places)
+            _require_new(kind, new, _of_others(kind, *known))
         except ModelError as error:
             if owner is None or not is_foreign(owner):
                 raise
@@ -237,6 +263,16 @@ def _gathered(kind: Kind[Any], known: tuple[Brake, ...]) -> tuple[tuple[Any, str
         for thing, module in new:
             places.setdefault(thing.name, (thing, brake, module))
     return tuple((thing, brake) for thing, brake, _ in places.values())
+
+
+def _of_others(kind: Kind[Any], *owners: Brake) -> dict[str, tuple[Any, str, ModuleType]]:
+    """Return what kinds of the same name declare, generally and in some brakes, by name."""
+    return {
+        thing.name: (thing, "", module)
+        for other in _KINDS if other is not kind and other.name == kind.name
+        for owner in (None, *owners)
+        for thing, module in _declared(other, owner)
+    }
 
 
 def _require_new(

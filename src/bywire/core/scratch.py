@@ -15,7 +15,7 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -53,6 +53,41 @@ def replacing(target: Path) -> Iterator[Path]:
         fresh = folder / target.name
         yield fresh
         os.replace(fresh, target)
+
+
+def claim(fresh: Path, names: Iterable[Path]) -> Path | None:
+    """Give a written file the first of some names that nothing has yet, whoever else asks for it.
+
+    Parameters
+    ----------
+    fresh
+        The file, in a temporary folder beside the names.
+    names
+        Where it may go.
+
+    Returns
+    -------
+    pathlib.Path or None
+        Where it is; None where all names are taken.
+
+    Raises
+    ------
+    OSError
+        When the folder cannot be written to.
+    """
+    for path in names:
+        try:
+            os.link(fresh, path)
+        except FileExistsError:
+            continue
+        except OSError:  # a file system without links: an empty file holds the name meanwhile
+            try:
+                os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
+            except FileExistsError:
+                continue
+            os.replace(fresh, path)
+        return path
+    return None
 
 
 @contextmanager
@@ -173,8 +208,8 @@ def _locked(parent: Path) -> tuple[Path, int | None]:
         folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
         try:
             lock = _lock(folder)
-        except BlockingIOError:
-            continue  # another process is about to remove it
+        except (BlockingIOError, FileNotFoundError):
+            continue  # another process is about to remove it, or has done so
         except OSError:
             return folder, None
         if folder.exists():

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import typing
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar
+
+from annotated_types import Ge, Gt, Le, Lt
 
 from bywire.core.errors import ModelError, place_of
 
@@ -23,6 +26,10 @@ class Role:
     side
         Whether it is given (``"source"``) or taken (``"sink"``: losses and stores). A time in which
         all stands still is ``"standstill"``.
+    returns
+        Of a sink: what it may give back. A loss gives nothing back, and a run in which one does
+        warns of it; ``"taken"``: at most what it took, like a spring that begins slack; ``"any"``:
+        like a store that begins full, or air that may be warmer.
     label
         What the books call it.
     split
@@ -38,6 +45,7 @@ class Role:
     side: Literal["source", "sink", "standstill"]
     label: str = ""
     split: bool = False
+    returns: Literal["", "taken", "any"] = ""
     whole: str = ""
     rest: str = ""
     rest_label: str = ""
@@ -51,7 +59,7 @@ class Signal:
     Parameters
     ----------
     unit
-        SI unit in the syntax of pint; ``"1"`` for a pure number.
+        SI unit; ``"1"`` for a pure number.
     label
         What an axis of a figure says.
     nominal
@@ -60,6 +68,10 @@ class Signal:
         Name of the signal whose set point this is, for figures; empty for none.
     role
         What it is in the books, of an energy or of a power whose integral is one.
+    low, high
+        Ends of its admissible range, in that unit: a gauge pressure is not below the vacuum, an
+        opening not negative. `bywire.check` tries nothing beyond. ``Ge(0)`` behind the Signal of
+        an annotation says the same.
     """
 
     unit: str
@@ -67,6 +79,26 @@ class Signal:
     nominal: float = 1.0
     set_point_of: str = ""
     role: Role | None = None
+    low: float = -math.inf
+    high: float = math.inf
+
+    def within(self, value: float) -> float:
+        """Return a value, or the end of the range that is nearest to it."""
+        return min(max(value, self.low), self.high)
+
+
+@dataclass(frozen=True)
+class Limited:
+    """Limit of a command, beside the Signal of a field of the memory.
+
+    Parameters
+    ----------
+    by
+        Dotted name of the parameter that the command's magnitude never exceeds; or the name of the
+        stimulus that the command never exceeds.
+    """
+
+    by: str
 
 
 Power = Annotated[float, Signal("W", "power")]
@@ -74,7 +106,7 @@ Energy = Annotated[float, Signal("J", "energy")]
 Torque = Annotated[float, Signal("N*m", "torque", 0.01)]
 Speed = Annotated[float, Signal("rad/s", "shaft speed", 10.0)]
 Angle = Annotated[float, Signal("rad", "shaft angle", 20.0)]
-Pressure = Annotated[float, Signal("Pa", "pressure", 2e6)]
+Pressure = Annotated[float, Signal("Pa", "pressure", 2e6, low=-101_325.0)]
 EnthalpyDensity = Annotated[float, Signal("J/m**3", "flow energy per volume", 2e6)]
 PressureEnergy = Annotated[float, Signal("Pa**2", "integral of pressure", 4e12)]
 FluidCompliance = Annotated[float, Signal("m**3/Pa", "compliance", 1e-15)]
@@ -104,9 +136,54 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
 
 
 def signal_in(annotation: Any) -> Signal | None:
-    """Return the Signal of an annotation; None where it has none."""
+    """Return the Signal of an annotation, with the bounds that stand behind it; None for none."""
     notes = getattr(annotation, "__metadata__", ())
-    return next((note for note in notes if isinstance(note, Signal)), None)
+    signal = next((note for note in notes if isinstance(note, Signal)), None)
+    for note in notes if signal is not None else ():
+        if isinstance(note, (Gt, Ge)):
+            low: Any = note.gt if isinstance(note, Gt) else note.ge
+            signal = replace(signal, low=float(low))
+        elif isinstance(note, (Lt, Le)):
+            high: Any = note.lt if isinstance(note, Lt) else note.le
+            signal = replace(signal, high=float(high))
+    return signal
+
+
+@cache
+def ranges_of(tuple_type: type[NamedTuple]) -> dict[str, tuple[float, float]]:
+    """Return the admissible range of the signals that declare one, both ends included.
+
+    A field declares it beside its Signal: ``Annotated[float, Signal(...), Ge(0), Le(1)]``.
+    """
+    found: dict[str, tuple[float, float]] = {}
+    for name, hint in typing.get_type_hints(tuple_type, include_extras=True).items():
+        low, high = -math.inf, math.inf
+        for note in getattr(hint, "__metadata__", ()):
+            if isinstance(note, Ge):
+                low = max(low, _number(note.ge))
+            elif isinstance(note, Gt):
+                low = max(low, math.nextafter(_number(note.gt), math.inf))
+            elif isinstance(note, Le):
+                high = min(high, _number(note.le))
+            elif isinstance(note, Lt):
+                high = min(high, math.nextafter(_number(note.lt), -math.inf))
+        if (low, high) != (-math.inf, math.inf):
+            found[name] = (low, high)
+    return found
+
+
+@cache
+def limits_of(tuple_type: type[NamedTuple]) -> dict[str, Limited]:
+    """Return what limits the commands among the signals of a NamedTuple class."""
+    hints = typing.get_type_hints(tuple_type, include_extras=True)
+    return {
+        name: note for name, hint in hints.items()
+        for note in getattr(hint, "__metadata__", ()) if isinstance(note, Limited)
+    }  # fmt: skip
+
+
+def _number(end: Any) -> float:
+    return float(end)
 
 
 def without_noise(stimuli: Iterable[str]) -> list[str]:

@@ -1,70 +1,34 @@
-"""Quantities at the edges: text with units to SI numbers and back. The only home of pint."""
+"""Quantities at the edges: text with units to SI numbers and back."""
 
 from __future__ import annotations
 
 import math
 import re
-from functools import cache
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import Self, TypeVar
 
 from bywire.core.clean_text import clean
 from bywire.core.errors import ParameterError, UnitError, quoted
 from bywire.core.quantities import display_unit
-
-if TYPE_CHECKING:
-    import pint
+from bywire.core.unit_list import (
+    BASES,
+    Scale,
+    UnknownUnitError,
+    UnreadableUnitError,
+    meanings_of,
+)
 
 F = TypeVar("F")
 
 
-# The common units, and all that the edges show: most commands then need no pint, whose loading
-# takes half as long as a run.
-_COMMON: dict[str, tuple[float, str]] = {
-    "bar": (1e5, "Pa"),
-    "Pa": (1.0, "Pa"),
-    "mm": (1e-3, "m"),
-    "um": (1e-6, "m"),
-    "m": (1.0, "m"),
-    "s": (1.0, "s"),
-    "ms": (1e-3, "s"),
-    "us": (1e-6, "s"),
-    "A": (1.0, "A"),
-    "mA": (1e-3, "A"),
-    "V": (1.0, "V"),
-    "W": (1.0, "W"),
-    "J": (1.0, "J"),
-    "N": (1.0, "N"),
-    "Hz": (1.0, "Hz"),
-    "ohm": (1.0, "ohm"),
-    "rad": (1.0, "rad"),
-    "deg": (math.pi / 180.0, "rad"),
-    "mm/rad": (1e-3, "m/rad"),
-    "mm**2": (1e-6, "m**2"),
-    "ml": (1e-6, "m**3"),
-    "bar/A": (1e5, "Pa/A"),
-    "A*bar": (1e5, "A*Pa"),
-    "N/bar": (1e-5, "N/Pa"),
-    "K": (1.0, "delta_degC"),
-    "%": (1e-2, "1"),
-    "": (1.0, "1"),
-}
-# Further ones that texts are written in; they are read by pint, whose last digits stay.
-_WRITTEN: dict[str, tuple[float, str]] = {"km/h": (1.0 / 3.6, "m/s"), "kN": (1e3, "N")}
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*", re.DOTALL)
-# Names, products, quotients and small powers; nothing that would make pint compute. A separator
-# between two names is required: without one, a long word could be split in a billion ways.
-_POWER = r"[A-Za-zµμΩ%°]+(?:(?:\*\*|\^)-?\d|[²³])?"
-_FACTOR = rf"(?:{_POWER}|\({_POWER}(?: *[*·] *{_POWER})*\))"
-_UNIT = re.compile(rf"(?:1? */ *)?{_FACTOR}(?:(?: *[*/·] *| +){_FACTOR})*")
-_MOMENT = re.compile(r"(?<=N)m(s?)(?![A-Za-z])")  # Nm, kNm, Nms: pint knows N*m alone
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SIGNS = {"ohm": "Ω", "percent": "%", "degree": "°", "deg": "°", "degC": "°C"}
 _LONGEST = 100  # characters: no quantity is longer, and patterns stay quick on hostile text
 _WORDS = {"1": "a pure number", "delta_degC": "a temperature difference in K"}
 ICE = 273.15
 """0 degC [K]"""
-# pint takes rad as a pure number: it would turn 60 rpm into 6.28 Hz, 1 into 57 degrees, and 2 mm
-# into 2 mm/rad where 2 mm/rev may be meant.
+# Elsewhere a radian counts as a pure number: N*m is N*m/rad. Here 60 rpm would become 6.28 Hz, 1
+# would become 57 degrees, and 2 mm would become 2 mm/rad where 2 mm/rev may be meant.
 _NO_MATTER_OF_RAD = ("Hz", "rad/s", "rad", "1", "m/rad")
 
 
@@ -90,18 +54,6 @@ class Written(float):
     def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]
         """Return what a copy is made of."""
         return float(self), self.text
-
-
-@cache
-def registry() -> pint.UnitRegistry[Any]:
-    """Return the one registry of units; loading pint takes a moment, so only on demand."""
-    import pint
-
-    # No cache folder: pint's is a pickle that an interrupted or parallel process leaves damaged.
-    known: pint.UnitRegistry[Any] = pint.UnitRegistry()
-    known.define("percent = 0.01 = %")
-    known.define("@alias turn = rev")
-    return known
 
 
 def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> float:
@@ -150,35 +102,45 @@ def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> f
 
 def _number(text: str, symbol: str, name: str, nominal: float) -> float:
     match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
-    if match is None or (match[2] and not _UNIT.fullmatch(match[2])):
-        raise UnitError(
-            f"{name} = {quoted(text)} is not a quantity: write for instance "
-            f"{example(symbol, nominal)!r}"
-        )
+    write = f"write for instance {example(symbol, nominal)!r}"
+    if match is None:
+        raise UnitError(f"{name} = {quoted(text)} is not a quantity: {write}")
     size, unit = float(match[1]), match[2]
-    common = _COMMON.get(unit)
-    if common is not None and common[1] == symbol:
-        return _converted(size, size * common[0])
-    if (unit, symbol) == ("degC", "K"):
-        return _converted(size, size + ICE)
-    import pint
-
     try:
-        quantity = registry().Quantity(size, _as_pint(unit))
-        wanted = registry().Quantity(1.0, "" if symbol == "1" else symbol)
-        if symbol in _NO_MATTER_OF_RAD and _base(quantity) != _base(wanted):
-            raise pint.DimensionalityError(unit, symbol)
-        return _converted(size, float(quantity.to(wanted.units).magnitude))
-    except pint.DimensionalityError:
+        meanings = meanings_of(unit or "1")
+    except UnreadableUnitError:
+        raise UnitError(f"{name} = {quoted(text)} is not a quantity: {write}") from None
+    except UnknownUnitError as error:
+        raise UnitError(f"{name} = {text!r}: {error}; {write}") from None
+    scale = next((each for each in meanings if _measures(each, symbol)), None)
+    if scale is None:
         raise UnitError(
             f"{name} = {text!r} has the wrong unit: {unit or 'a pure number'} cannot be "
-            f"{_wanted(symbol)}; write for instance {example(symbol, nominal)!r}"
-        ) from None
-    except (pint.PintError, ValueError, TypeError, ArithmeticError, AttributeError):
+            f"{_wanted(symbol)}; {write}"
+        )
+    if scale.reference == "absolute":
         raise UnitError(
-            f"{name} = {text!r}: the unit {unit!r} is not known; "
-            f"write for instance {example(symbol, nominal)!r}"
-        ) from None
+            f"{name} = {text!r}: bywire cannot tell whether {name} is absolute or relative to "
+            f"ambient pressure: convert it to that of the two which is wanted, and {write}"
+        )
+    return _converted(size, _in_si(size, scale))
+
+
+def _measures(scale: Scale, symbol: str) -> bool:
+    """Return whether a unit can be that of a quantity with an SI unit."""
+    wanted = _of_symbol(symbol)
+    if scale.zero and symbol != "K":  # 20 degC are no difference of temperatures
+        return False
+    if symbol in _NO_MATTER_OF_RAD:
+        return scale.powers == wanted.powers
+    return scale.powers[:-1] == wanted.powers[:-1]
+
+
+def _in_si(number: float, scale: Scale) -> float:
+    ratio = scale.ratio
+    if ratio.denominator == 1 and not scale.turns:
+        return number * ratio.numerator + scale.zero
+    return number * scale.factor + scale.zero
 
 
 def split(text: str) -> tuple[str, str]:
@@ -199,22 +161,20 @@ def base_powers(unit: str, bases: tuple[str, ...]) -> tuple[float, ...]:
     Raises
     ------
     UnitError
-        When nobody knows the unit.
+        When it is no unit of the list, nor a product of them.
 
     Examples
     --------
     >>> base_powers("bar", ("kg", "m", "s"))
     (1.0, -1.0, -2.0)
     """
-    import pint
+    powers = dict(zip(BASES, _of_symbol(unit).powers, strict=True))
+    return tuple(float(powers[name]) for name in bases)
 
-    try:
-        base = registry().Quantity(1.0, _as_pint(unit)).to_base_units()
-        known = {name: registry().Quantity(1.0, name).dimensionality for name in bases}
-    except (pint.PintError, ValueError, TypeError, ArithmeticError, AttributeError):
-        raise UnitError(f"the unit {unit!r} is not known: write it as N*m/rad or m**3/s") from None
-    powers = {str(dimension): float(str(p)) for dimension, p in base.dimensionality.items()}
-    return tuple(powers.get(next(iter(known[name])), 0.0) for name in bases)
+
+def si_value(number: float, unit: str) -> float:
+    """Return a number of a declared unit in SI."""
+    return _in_si(number, _of_symbol(unit))
 
 
 def has_own_zero(unit: str, symbol: str) -> bool:
@@ -222,16 +182,9 @@ def has_own_zero(unit: str, symbol: str) -> bool:
     return parse(f"0 {unit}", symbol, unit) != 0.0
 
 
-def _base(quantity: Any) -> Any:
-    """Return the base units of a quantity, radians among them."""
-    return quantity.to_base_units().units
-
-
-def _as_pint(unit: str) -> str:
-    """Return a unit as pint reads it."""
-    spelled = unit.replace("%", "percent").replace("·", "*")
-    spelled = f"1{spelled}" if spelled.startswith("/") else spelled
-    return _MOMENT.sub(lambda m: "*m*s" if m[1] else "*m", spelled)
+def _of_symbol(symbol: str) -> Scale:
+    """Return what an SI unit is, or a unit that is declared: C is coulomb there."""
+    return meanings_of(symbol)[0]
 
 
 def _converted(size: float, number: float) -> float:
@@ -275,13 +228,18 @@ def convert(value: F, symbol: str, unit: str) -> F:
     """Return a value, or an array, given in one unit in another of the same dimension."""
     if symbol == unit:
         return value
-    if {symbol, unit} == {"K", "degC"}:
-        return value - ICE if unit == "degC" else value + ICE  # type: ignore[operator,return-value]
-    common = _COMMON.get(unit, _WRITTEN.get(unit))
-    if common is not None and common[1] == symbol:
-        return value / common[0]  # type: ignore[operator,return-value]
-    factor: float = registry().Quantity(1.0, symbol).to(unit).magnitude
-    return value * factor  # type: ignore[operator,return-value]
+    before, after = _of_symbol(symbol), _of_symbol(unit)
+    if before.powers[:-1] != after.powers[:-1]:
+        raise UnitError(f"{symbol} cannot be converted to {unit}")
+    ratio, turns = before.ratio / after.ratio, before.turns - after.turns
+    number = value + before.zero / before.factor if before.zero else value  # type: ignore[operator]
+    if turns:
+        number = number * (float(ratio) * math.pi**turns)  # type: ignore[operator]
+    elif ratio.numerator == 1:
+        number = number / ratio.denominator  # type: ignore[operator]
+    else:
+        number = number * float(ratio)  # type: ignore[operator]
+    return number - after.zero / after.factor if after.zero else number  # type: ignore[operator,return-value]
 
 
 def difference_unit(symbol: str) -> str:

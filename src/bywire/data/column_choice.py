@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -12,19 +12,62 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import FileError, UnitError, quoted, unknown_name
-from bywire.data.column_units import (
-    convert_in_place,
-    converted,
-    measures,
-    si_symbol,
-    split_title,
-    unit_of,
-)
+from bywire.core.unit_list import Scale
+from bywire.data.column_units import convert_in_place, measures, si_symbol, split_title, unit_of
 from bywire.data.file_format import Column, Source
 from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
 
-_CLOCKS = ("time", "t")
+_CLOCKS = ("time", "t", "zeit", "timestamp", "time stamp", "date time", "datetime", "x_value")
 _SHOWN = 12
+_NO_VALUE = (9.9e37, -9.9e37, 9.91e37)
+"""what instruments send where they have no value, by SCPI: infinite, and not a number"""
+
+
+class MissingUnitsError(UnitError):
+    """Columns that have no unit, all of those that are to be read.
+
+    Parameters
+    ----------
+    file
+        Where they stand.
+    signals
+        Name of the signal -> its column.
+    clock
+        Column of the instants, where it has none either.
+    """
+
+    def __init__(self, file: Path, signals: Mapping[str, str], clock: str = "") -> None:
+        self.signals, self.clock = dict(signals), clock
+        columns = [*map(quoted, self.signals.values()), *([quoted(clock)] if clock else [])]
+        each = "it has" if self.signals else "the time has"
+        self.lacking = (
+            f"{file}, columns {', '.join(columns)}: they have no unit"
+            if len(columns) > 1
+            else f"{file}, column {columns[0]}: {each} no unit"
+        )
+        title, inside = f"{clock} [ms]", f'time = {{ column = "{clock}", unit = "ms" }}'
+        for name, column in self.signals.items():
+            title, inside = f"{column} [mm]", f"[signals.{name}] unit = 'mm'"
+        super().__init__(
+            f"{self.lacking}: write it behind the title, as '{title}', or in a mapping, as "
+            f"{inside}, or '1' for none"
+        )
+
+
+class NoClockError(FileError):
+    """A file that does not say when it was measured.
+
+    Parameters
+    ----------
+    text
+        What to do about it.
+    signals
+        Name of the signal -> its column, of those to be read that have no unit either.
+    """
+
+    def __init__(self, text: str, signals: Mapping[str, str]) -> None:
+        self.text, self.signals = text, dict(signals)
+        super().__init__(text)
 
 
 @dataclass(frozen=True)
@@ -47,6 +90,8 @@ class Chosen:
         Description.
     meanings
         What its numbers stand for, where they are numbers of something.
+    missing
+        Numbers in the file that say that nothing was measured.
     """
 
     mapping: SignalMapping
@@ -56,15 +101,41 @@ class Chosen:
     symbol: str
     label: str
     meanings: str = ""
+    missing: tuple[float, ...] = ()
 
-    def to_si(self, values: NDArray[np.float64]) -> None:
-        """Turn numbers of the file into the signal, where they lie."""
+    def to_si(self, values: NDArray[np.float64]) -> list[str]:
+        """Turn numbers of the file into the signal, where they lie; return what to note of it."""
+        notes = self._without_marks(values)
         factor = self.mapping.sign * (1.0 if self.mapping.scale is None else self.mapping.scale)
         if factor != 1.0:
             values *= factor
         convert_in_place(values, unit_of(self.unit), self.symbol)
         if self.mapping.offset:
             values += self.mapping.offset
+        if unit_of(self.unit).reference == "absolute":
+            notes.append(
+                f"{self.mapping.name}: its unit {self.unit!r} says absolute pressure, while "
+                "pressures of brakes are relative to ambient: offset = '-1.013 bar' in the mapping "
+                "subtracts a usual one"
+            )
+        return notes
+
+    def _without_marks(self, values: NDArray[np.float64]) -> list[str]:
+        """Have NaN where a number says that nothing was measured, and return a note on it."""
+        found, total = [], 0
+        for mark in dict.fromkeys((*_NO_VALUE, *self.missing)):
+            is_mark = (values == mark) | (values == np.float32(mark))
+            if count := int(np.count_nonzero(is_mark)):
+                values[is_mark] = np.nan
+                total += count
+                found.append(f"{count} x {mark:g}")
+        is_infinite = np.isinf(values)
+        if count := int(np.count_nonzero(is_infinite)):
+            values[is_infinite] = np.nan
+            total += count
+            found.append(f"{count} x infinite")
+        name = self.mapping.name
+        return [f"{name}: missing samples: {total} ({', '.join(found)})"] if found else []
 
     def attributes(self) -> dict[str, Any]:
         """Return what a dataset says of the signal."""
@@ -101,8 +172,33 @@ def choose(
                 raise unknown_name("signal", name, wanted)
         wanted = {name: wanted[name] for name in signals}
     if not wanted:
-        raise FileError(f"{file} holds no signal: {_listing(source.columns)}")
-    return [_chosen(file, source, meaning, signal) for signal in wanted.values()]
+        why = "; ".join(left_out_note(source.left_out))
+        raise FileError(
+            f"{file} holds no signal: {_listing(source.columns)}" + (f"; {why}" if why else "")
+        )
+    chosen: list[Chosen] = []
+    lacking: dict[str, str] = {}
+    clock, timeless = "", ""
+    for signal in wanted.values():
+        try:
+            unit = signal.unit or _title_unit(source, signal.column)
+            chosen.append(_chosen(file, source, meaning, replace(signal, unit=unit)))
+        except MissingUnitsError as error:
+            lacking |= error.signals
+            clock = clock or error.clock
+        except NoClockError as error:
+            lacking |= error.signals
+            timeless = error.text
+    if timeless:
+        raise NoClockError(timeless, lacking)
+    if lacking or clock:
+        raise MissingUnitsError(file, lacking, clock)
+    return chosen
+
+
+def _title_unit(source: Source, column: str) -> str:
+    """Return the unit that stands in brackets behind the name of a column, if it is not its own."""
+    return "" if column in source.columns else split_title(column)[1]
 
 
 def every_signal(
@@ -111,7 +207,7 @@ def every_signal(
     """Return every column that is no clock under its own name."""
     clocks = {c.clock for c in source.columns.values()}
     if meaning.clock is not None and meaning.clock.column:
-        clocks |= {meaning.clock.column}
+        clocks |= {_column(file, source, meaning.clock.column, "time.column").name}
     elif clocks == {None} or meaning.clock is not None:
         clocks |= {_usual_clock(source)}
     names = [name for name in source.columns if name not in clocks]
@@ -121,38 +217,44 @@ def every_signal(
 def _chosen(
     file: Path, source: Source, meaning: MeasurementMapping, signal: SignalMapping
 ) -> Chosen:
-    column = _column(file, source, signal.column, f"signals.{signal.name}.column")
-    clock = _clock(file, source, column, signal.clock or meaning.clock)
+    column = _column(
+        file, source, signal.column, f"signals.{signal.name}.column", signal.number
+    )
     unit = signal.unit or column.unit
+    lacking = {} if unit else {signal.name: column.name}
+    try:
+        clock = _clock(file, source, column, signal.clock or meaning.clock)
+    except MissingUnitsError as error:
+        raise MissingUnitsError(file, lacking, error.clock) from None
+    except NoClockError as error:
+        raise NoClockError(error.text, lacking) from None
     where = f"{file}, column {quoted(column.name)}"
-    if not unit:
-        raise UnitError(
-            f"{where}: it has no unit: write it behind the title, as '{signal.name} [mm]', or in a "
-            f"mapping, as [signals.{signal.name}] unit = 'bar', or '1' for none"
-        )
-    known_unit = _known_unit(unit, where)
+    if lacking:
+        raise MissingUnitsError(file, lacking)
+    symbol = si_symbol(_known_unit(unit, where))
     if signal.unit and column.unit and signal.scale is None:
         _require_same(signal, column, where)
-    # A unit that is SI already keeps its name, for instance Pa*s.
-    plain = float(converted(np.array([1.0]), known_unit, si_symbol(known_unit))[0]) == 1.0
-    keeps = plain and si_symbol(known_unit) != "1" and unit.isascii() and unit[0].isalpha()
-    symbol = _plain(unit) if keeps else si_symbol(known_unit)
     label = signal.label or column.label or signal.name
-    return Chosen(signal, column.name, clock, unit, symbol, label, column.meanings)
+    missing = tuple(_as_numbers((*meaning.missing, *signal.missing)))
+    return Chosen(signal, column.name, clock, unit, symbol, label, column.meanings, missing)
 
 
-def _plain(unit: str) -> str:
-    """Return the SI unit as the dataset writes it."""
-    return {"Nm": "N*m"}.get(unit, unit)
+def _as_numbers(marks: Sequence[float | str]) -> Iterator[float]:
+    """Yield the marks of missing values that are numbers, also those written as texts."""
+    for mark in marks:
+        try:
+            yield float(mark)
+        except ValueError:
+            continue
 
 
-def _known_unit(unit: str, where: str) -> Any:
+def _known_unit(unit: str, where: str) -> Scale:
     try:
         return unit_of(unit)
-    except ValueError:
+    except UnitError as error:
         raise UnitError(
-            f"{where}: {quoted(unit)} is no known unit: write it in a mapping, for instance "
-            "unit = 'bar', or '1' for none"
+            f"{where}: {error}: write the unit in a mapping, for instance unit = 'bar', or '1' for "
+            "a pure number"
         ) from None
 
 
@@ -160,10 +262,7 @@ def _require_same(signal: SignalMapping, column: Column, where: str) -> None:
     """Refuse a mapping whose unit is another one than the file's."""
     unit = _known_unit(column.unit, where)
     said = unit_of(signal.unit)
-    two = np.array([1.0, 2.0])
-    if measures(unit, si_symbol(said)) and np.array_equal(
-        converted(two, unit, si_symbol(said)), converted(two, said, si_symbol(said))
-    ):
+    if (unit.factor, unit.zero, unit.powers) == (said.factor, said.zero, said.powers):
         return
     raise UnitError(
         f"{where}: the file says {column.unit!r} and the mapping {signal.unit!r}: leave "
@@ -176,28 +275,29 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
     if given is not None and given.rate:
         return given
     if given is not None:
-        clock = _column(file, source, given.column, "time.column")
+        given = replace(given, unit=given.unit or _title_unit(source, given.column))
+        clock = _column(file, source, given.column, "time.column", given.number)
     else:
         name = column.clock or _usual_clock(source)
         if name is None:
             before = (
                 "; where other lines stand before the table, a mapping's skip_lines tells how many"
             )
-            raise FileError(
+            why = "; ".join(("", *left_out_note(source.left_out)))
+            raise NoClockError(
                 f"{file} does not say when it was measured: call a column 'time [s]', or write in "
                 "a mapping "
                 'time = { column = "t", unit = "ms" } or rate = "1 kHz"; '
                 + _listing(source.columns)
                 + (before if len(source.columns) == 1 else "")
+                + why,
+                {},
             )
         clock = source.columns[name]
     unit = (given.unit if given is not None else "") or clock.unit
     where = f"{file}, column {quoted(clock.name)}"
     if not unit:
-        raise UnitError(
-            f"{where}: the time has no unit: write in a mapping "
-            f'time = {{ column = "{clock.name}", unit = "ms" }}'
-        )
+        raise MissingUnitsError(file, {}, clock.name)
     if not measures(_known_unit(unit, where), "s"):
         raise UnitError(f"{where}: {unit!r} is no unit of time: choose another column")
     if given is not None and given.unit and clock.unit:
@@ -207,8 +307,9 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
 
 def _usual_clock(source: Source) -> str | None:
     """Return the column that is called time or t; T in kelvin is no time."""
+    columns = source.columns
     for usual in _CLOCKS:
-        for name, column in source.columns.items():
+        for name, column in columns.items():
             if name.casefold() == usual and (not column.unit or _is_time(column.unit)):
                 return name
     return None
@@ -217,20 +318,47 @@ def _usual_clock(source: Source) -> str | None:
 def _is_time(unit: str) -> bool:
     try:
         return measures(unit_of(unit), "s")
-    except ValueError:
+    except UnitError:
         return False
 
 
-def _column(file: Path, source: Source, name: str, key: str) -> Column:
-    """Return a column by its name, or by its title with the unit behind it."""
-    column = source.columns.get(name) or source.columns.get(split_title(name)[0])
+def _column(file: Path, source: Source, name: str, key: str, number: int = 0) -> Column:
+    """Return a column by its name, by its title with the unit behind it, or by its number."""
+    columns, order = source.columns, source.order
+    title = split_title(name)[0]
+    if not number and title.isdecimal() and not {name, title} & {*columns, *source.left_out}:
+        number = int(title[:9])
+    if number:
+        if number > len(order):
+            raise FileError(
+                f"{file} has no column {number} ({key}): it has {len(order)} columns"
+            )
+        name = order[number - 1]
+    title = split_title(name)[0]
+    column = columns.get(name) or columns.get(title)
+    column = column or next((c for c in columns.values() if c.path == name), None)
     if column is not None:
         return column
-    many = [other for other in source.columns if other.rpartition("@")[0] == name]
-    near = many or get_close_matches(name, source.columns, n=3, cutoff=0.5)
+    reason = source.left_out.get(name) or source.left_out.get(title)
+    if reason is not None:
+        raise FileError(f"{file}: the column {quoted(name)} ({key}) is not read: {reason}")
+    many = [other for other in columns if other.rpartition("@")[0] == name]
+    near = many or get_close_matches(name, columns, n=3, cutoff=0.5)
     hint = f"is it {' or '.join(map(repr, near))}? " if near else ""
-    there = _listing(source.columns)
-    raise FileError(f"{file} has no column {quoted(name)} ({key}): {hint}{there}")
+    raise FileError(f"{file} has no column {quoted(name)} ({key}): {hint}{_listing(columns)}")
+
+
+def left_out_note(left_out: Mapping[str, str]) -> list[str]:
+    """Return a note for each reason for which something in a file is not read."""
+    by_reason: dict[str, list[str]] = {}
+    for name, reason in left_out.items():
+        by_reason.setdefault(reason, []).append(quoted(name))
+    return [
+        f"not read: {', '.join(names[:_SHOWN])}"
+        + (f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else "")
+        + f": {reason}"
+        for reason, names in by_reason.items()
+    ]
 
 
 def _listing(columns: Mapping[str, Column]) -> str:

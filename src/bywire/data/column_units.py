@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core import units
+from bywire.core.unit_list import Scale, meanings_of, scale_of
 
-_POWER = r"[A-Za-zµμΩ°%_]+(?:(?:\*\*|\^)-?[0-9])?"
-_UNIT = re.compile(rf"(?:1|(?:1/)?{_POWER}(?:[*/· ]{_POWER})*)")
-_LONGEST = 60  # characters: no unit is longer, and the pattern stays quick on hostile text
-_SI = (
-    "1", "s", "m", "rad", "m/s", "rad/s", "N", "Pa", "N*m", "A", "V", "W", "ohm", "Hz",
-    "m/s**2", "m**2", "m**3", "m**3/s", "kg", "K",
-)  # fmt: skip
-_WHOLE = {**{symbol: symbol for symbol in _SI}, "J": "N*m"}
-"""units that are SI as they stand, and what `si_symbol` calls them"""
-
-
-class Whole(str):
-    """A unit that is SI as it stands: most files hold no other, and pint takes long to load."""
-
-    __slots__ = ()
+_PAIRS = {"]": "[", ")": "("}
+_PURE = ("-", "--", "[-]")
+"""what a column of pure numbers may have in the place of a unit"""
 
 
 def split_title(title: str) -> tuple[str, str]:
@@ -33,83 +19,56 @@ def split_title(title: str) -> tuple[str, str]:
 
     Examples
     --------
-    >>> split_title("p_mc [bar]"), split_title("pedal")
-    (('p_mc', 'bar'), ('pedal', ''))
+    >>> split_title("p_mc [bar]"), split_title("pedal"), split_title("p (bar(g))")
+    (('p_mc', 'bar'), ('pedal', ''), ('p', 'bar(g)'))
     """
-    cut = max(title.rfind("["), title.rfind("("))
-    if cut >= 0 and title[-1] in "])":
-        return title[:cut].rstrip(), title[cut + 1 : -1].strip()
+    end = title[-1:]
+    depth = 0
+    for place in range(len(title) - 1, -1, -1) if end in _PAIRS else ():
+        depth += (title[place] == end) - (title[place] == _PAIRS[end])
+        if not depth:
+            return title[:place].rstrip(), title[place + 1 : -1].strip()
     return title, ""
 
 
 @cache
-def unit_of(text: str) -> Any:
-    """Return the unit that a text names: a product of names, nothing that is computed.
+def unit_of(text: str) -> Scale:
+    """Return the unit that a text names: of the list, or a product of such units.
 
     Raises
     ------
-    ValueError
-        When it is no known unit.
+    UnknownUnitError
+        When it is no such unit, or one of two meanings; the message says why.
     """
-    plain = re.sub(r"(?<=N)(?=m\b)", "*", "1" if text == "-" else text)
-    if len(text) > _LONGEST or not _UNIT.fullmatch(plain):
-        raise ValueError(text)
-    if plain in _WHOLE:
-        return Whole(plain)
-    try:
-        unit = unit_of_symbol(plain.replace("%", "percent").replace("·", "*").replace(" ", "*"))
-        base_of(unit)
-    except Exception:  # pint has many ways to refuse a name
-        raise ValueError(text) from None
-    return unit
+    return scale_of("1" if text in _PURE else text)
 
 
-def unit_of_symbol(symbol: str) -> Any:
-    """Return the unit of a symbol that is known to be one; ``"1"`` is a pure number's."""
-    return Whole(symbol) if symbol in _WHOLE else _of_pint(symbol)
+def unit_of_symbol(symbol: str) -> Scale:
+    """Return the unit of a symbol that is declared to be one; ``"1"`` is a pure number's."""
+    return meanings_of(symbol)[0]
 
 
-def _of_pint(unit: Any) -> Any:
-    """Return a unit as pint has it, also of its symbol."""
-    if not isinstance(unit, str):
-        return unit
-    return units.registry().Unit("" if unit == "1" else str(unit))
-
-
-def base_of(unit: Any) -> Any:
-    """Return the base units; radians stay, so that rpm is no frequency in Hz."""
-    return units.registry().Quantity(1.0, _of_pint(unit)).to_base_units().units
-
-
-@cache
-def si_symbol(unit: Any) -> str:
+def si_symbol(unit: Scale) -> str:
     """Return the SI unit of a unit's quantity."""
-    if isinstance(unit, Whole):
-        return _WHOLE[unit]
-    base = base_of(unit)
-    return next((s for s in _SI if base_of(unit_of_symbol(s)) == base), f"{base:~C}")
+    return unit.symbol
 
 
-def measures(unit: Any, symbol: str) -> bool:
-    """Return whether a unit measures the quantity of an SI unit."""
-    if isinstance(unit, Whole) and symbol in _WHOLE:
-        return _WHOLE[unit] == _WHOLE[symbol]
-    return bool(base_of(unit) == base_of(unit_of_symbol(symbol)))
+def measures(unit: Scale, symbol: str) -> bool:
+    """Return whether a unit measures the quantity of an SI unit; radians count."""
+    return unit.powers == unit_of_symbol(symbol).powers
 
 
-def converted(values: NDArray[np.float64], unit: Any, symbol: str) -> NDArray[np.float64]:
+def converted(values: NDArray[np.float64], unit: Scale, symbol: str) -> NDArray[np.float64]:
     """Return values in an SI unit."""
-    if isinstance(unit, Whole) and symbol in _WHOLE and measures(unit, symbol):
-        return np.array(values, dtype=np.float64)
-    quantity = units.registry().Quantity(values, _of_pint(unit))
-    return np.asarray(quantity.to(_of_pint(unit_of_symbol(symbol))).magnitude)
+    numbers = np.array(values, dtype=np.float64)
+    convert_in_place(numbers, unit, symbol)
+    return numbers
 
 
-def convert_in_place(values: NDArray[np.float64], unit: Any, symbol: str) -> None:
+def convert_in_place(values: NDArray[np.float64], unit: Scale, symbol: str) -> None:
     """Turn values into an SI unit where they lie, for arrays of which there is no room for two."""
-    zero, unity = converted(np.array([0.0, 1.0]), unit, symbol)
-    slope = float(f"{unity - zero:.15g}")  # 0.001 for mm, and not its neighbor
+    slope = unit.factor / unit_of_symbol(symbol).factor
     if slope != 1.0:
         values *= slope
-    if zero:
-        values += zero
+    if unit.zero:
+        values += unit.zero

@@ -41,6 +41,8 @@ class Column:
         Description, where the file gives one.
     meanings
         What its numbers 0, 1, ... stand for, blank between them, where the file says so.
+    path
+        Where it lies in the file, as in ``ScopeData.signals(1).values``: another name of it.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Column:
     clock: str | None = None
     label: str = ""
     meanings: str = ""
+    path: str = ""
 
 
 class Source(Protocol):
@@ -57,6 +60,21 @@ class Source(Protocol):
     @property
     def columns(self) -> Mapping[str, Column]:
         """Every column of numbers by its name, clocks among them."""
+        ...
+
+    @property
+    def order(self) -> Sequence[str]:
+        """Names by the number of a column, from 1, those of `left_out` among them."""
+        ...
+
+    @property
+    def left_out(self) -> Mapping[str, str]:
+        """What the file holds beside the columns, by its name, and why it is not read."""
+        ...
+
+    @property
+    def remarks(self) -> Sequence[str]:
+        """What the user should know of the file, as far as it was read."""
         ...
 
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
@@ -75,7 +93,10 @@ class Source(Protocol):
 
 
 class PieceSource(Protocol):
-    """An open file of columns as a library reads it in a child process, piece by piece."""
+    """An open file of columns as a library reads it in a child process, piece by piece.
+
+    It may have ``left_out`` and ``remarks``, as a `Source` has them.
+    """
 
     @property
     def columns(self) -> Mapping[str, Column]:
@@ -100,10 +121,19 @@ class ReadOptions:
         Decimal mark of a text table, ``"."`` or ``","``; found out where it is empty.
     skip_lines
         Lines before the header of a text table.
+    titles
+        Whether the first row of a text table holds titles; found out where it is None.
+    encoding
+        How a text table writes characters; UTF-8, or as its byte-order mark says, where empty.
+    missing
+        Cells of a text table that say that nothing was measured, beside the usual ones.
     """
 
     decimal: str = ""
     skip_lines: int = 0
+    titles: bool | None = None
+    encoding: str = ""
+    missing: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -132,6 +162,10 @@ class FileFormat:
         A module that names some declares its format as ``FORMAT``.
     counts
         What a library calls a row, and the number of its first one.
+    also_reads
+        Endings of files that are read and never written.
+    opening
+        Seconds of a processor that a library may take to open a file.
     """
 
     name: str
@@ -143,6 +177,8 @@ class FileFormat:
     has_many_axes: bool = False
     libraries: tuple[str, ...] = ()
     counts: tuple[str, int] = ("row", 0)
+    also_reads: tuple[str, ...] = ()
+    opening: float = 10.0
 
 
 def library(name: str, what: str, extra: str = "measurements") -> ModuleType:

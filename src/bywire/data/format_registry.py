@@ -12,6 +12,23 @@ from bywire.data.file_format import FileFormat
 _HEAD = 1024
 
 
+# Files that are told by their first bytes and not read: what they are, and the way out.
+_NOT_READ = (
+    (b"TDSm", "a TDMS file of LabVIEW", "export it as CSV or LVM, or as MDF 4 with DIAdem"),
+    (b"LOGG", "a BLF file of Vector", "export its signals as MDF 4, which CANoe and CANalyzer do"),
+    (b"TDEX", "a TDX file of DIAdem", "export it as CSV or MDF 4 with DIAdem"),
+    (b"|CF,", "a FAMOS file of imc", "export it as CSV or MDF 4 with FAMOS"),
+    (b"\xd0\xcf\x11\xe0", "an Excel workbook (.xls)", "save its sheet as 'CSV UTF-8'"),
+    (b"PK\x03\x04", "a ZIP archive, as .xlsx and .ods are", "save its sheet as 'CSV UTF-8'"),
+    (b"\x1f\x8b", "packed by gzip", "unpack it first"),
+    (b"7z\xbc\xaf", "packed by 7-Zip", "unpack it first"),
+    (b"#ROSBAG", "a bag of ROS", "export its topics as CSV"),
+    (b"\x89MCAP", "an MCAP file of ROS 2", "export its topics as CSV"),
+    (b"SQLite format 3", "an SQLite database", "export its table as CSV"),
+    (b"%PDF", "a PDF file", "ask for the data it was made from"),
+)
+_ASC_OF_VECTOR = (b"date ", b"base ")  # how an ASC log of a bus begins
+
 FORMATS = Kind("file format", ("formats",), instances(FileFormat), "bywire.data.formats")
 """every format of measurement files"""
 
@@ -33,10 +50,11 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
     UnknownNameError
         When there is no such format.
     """
-    wanted = [FORMATS.find(name)] if name else _of_ending(path)
+    wanted = [FORMATS.find(name)] if name else _of_ending(path, to_read=True)
     head = head_of(path)
     if not head:
         raise FileError(f"{path} is empty (0 bytes): was the recording stopped or the copy cut?")
+    _require_readable(path, head)
     holds = [kind for kind in FORMATS.all().values() if kind.recognizes(head)]
     for kind in wanted or holds:
         if kind in holds:
@@ -49,7 +67,21 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
     else:
         content = f"something else (it begins with {quoted(head[:8])})"
         hint = "export it again from the program that measured"
+        if wanted[0].name == "mat":
+            hint = "if it is a MAT file of version 4, save it with '-v7' in MATLAB"
     raise FileError(f"{path} holds {content}, not {wanted[0].title} as {said} says: {hint}")
+
+
+def _require_readable(path: Path, head: bytes) -> None:
+    """Refuse what is no measurement that bywire reads, with the way out."""
+    for mark, what, way in _NOT_READ:
+        if head.startswith(mark):
+            raise FileError(f"{path} is {what}, which bywire does not read: {way}")
+    if head[:5].lower() in _ASC_OF_VECTOR and b"base hex" in head.lower():
+        raise FileError(
+            f"{path} is an ASC log of bus messages, whose signals are not decoded: export its "
+            "signals as MDF 4 with the program that recorded it"
+        )
 
 
 def format_to_write(path: Path, name: str = "") -> FileFormat:
@@ -70,8 +102,12 @@ def format_to_write(path: Path, name: str = "") -> FileFormat:
     raise FileError(f"{path}: the ending {path.suffix!r} belongs to no format: use {endings}")
 
 
-def _of_ending(path: Path) -> list[FileFormat]:
-    return [kind for kind in FORMATS.all().values() if path.suffix.lower() in kind.endings]
+def _of_ending(path: Path, *, to_read: bool = False) -> list[FileFormat]:
+    ending = path.suffix.lower()
+    return [
+        kind for kind in FORMATS.all().values()
+        if ending in kind.endings or (to_read and ending in kind.also_reads)
+    ]  # fmt: skip
 
 
 def _names() -> str:

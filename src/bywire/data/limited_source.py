@@ -10,7 +10,6 @@ import contextlib
 import os
 import shutil
 import signal
-import subprocess
 import sys
 import threading
 import warnings
@@ -19,16 +18,18 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
+from subprocess import DEVNULL
 from tempfile import mkdtemp
 from typing import IO, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.blas import one_thread_environment
+from bywire.core.blas import one_thread_variables
+from bywire.core.child_process import start_python
 from bywire.core.errors import FileError
 from bywire.core.extras import how_to_install
-from bywire.core.machine_memory import machine_memory
+from bywire.core.machine_memory import address_space, machine_memory
 from bywire.core.scratch import process_folder
 from bywire.data.file_format import Column, FileFormat, Progress
 from bywire.data.reading_child import NUMBERS, fill, receive, send
@@ -60,18 +61,15 @@ class Child:
     def __init__(self, module: str) -> None:
         # asammdf writes a temporary file; with its folder it goes, whatever becomes of the child.
         self._folder = mkdtemp(dir=process_folder())
-        paths = os.pathsep.join(path for path in sys.path if path)
-        self._process = subprocess.Popen(
-            # -P: a module beside the measurement must not run in place of a library's.
-            [sys.executable, "-P", "-m", "bywire.data.reading_child", module,
-             "forks" if _IS_LINUX else "alone"],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0,
-            env={**one_thread_environment(), "PYTHONPATH": paths,  # it forks: it has no threads
-                 "TMPDIR": self._folder, "TEMP": self._folder},
-            start_new_session=True,  # Ctrl-C reaches the parent, which ends the child
-        )  # fmt: skip
+        self._process = start_python(
+            "bywire.data.reading_child", module, "forks" if _IS_LINUX else "alone", bufsize=0,
+            stderr=DEVNULL, further={
+                **one_thread_variables(),  # it forks: it has no threads
+                "TMPDIR": self._folder, "TEMP": self._folder,
+            },
+        )
         self.state: _State = "idle"
-        self._is_late = False
+        self.is_late = False
         with contextlib.suppress(ImportError, AttributeError, OSError):
             import fcntl
 
@@ -102,10 +100,10 @@ class Child:
     def reason(self) -> str:
         """Return why it ended."""
         status = self._process.wait()
-        return "" if self._is_late else _ending(status)
+        return "" if self.is_late else _ending(status)
 
     def _end_late(self) -> None:
-        self._is_late = True
+        self.is_late = True
         self._kill()
 
     def _kill(self) -> None:
@@ -145,13 +143,17 @@ class LimitedSource:
     ) -> None:
         self._path, self._kind, self._child = path, kind, child
         self._memory, self._seconds = memory, seconds
-        self._request = next(_numbers)
+        self._request, self._is_open = next(_numbers), False
         answer = self._answer({
             "path": str(path), "folder": os.getcwd(), "memory": memory, "seconds": seconds,
-            "request": self._request,
+            "opening": min(seconds, kind.opening), "request": self._request,
         })  # fmt: skip
+        self._is_open = True
         columns = [Column(*fields) for fields in answer["columns"]]
         self.columns: Mapping[str, Column] = {column.name: column for column in columns}
+        self.left_out: Mapping[str, str] = answer["left_out"]
+        self.order: Sequence[str] = list(self.columns)
+        self.remarks: Sequence[str] = answer["remarks"]
         self.notes: Mapping[str, Any] = answer["notes"]
 
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
@@ -176,6 +178,7 @@ class LimitedSource:
             filled[k] += size
             progress(f"reading {self._path.name}", sum(filled) / total)
             answer = self._answer(None)
+        self.remarks = answer["remarks"]
         for name, column, size in zip(names, columns, filled, strict=True):
             if size != column.size:
                 raise self._torn(name, size, column.size)
@@ -201,8 +204,11 @@ class LimitedSource:
         if "column" not in answer and _IS_LINUX:
             self._child.state = "open" if {"columns", "end"} & set(answer) else "idle"
         if "error" in answer:
-            raise FileError(answer["error"])
+            limit = address_space() if answer.get("is_of_library") else 0
+            raise FileError(answer["error"] + (_limited_to(limit) if limit else ""))
         if "memory" in answer:
+            if limit := address_space():
+                raise self._too_small(limit)
             raise FileError(
                 f"{self._path} takes more than {self._memory / 2**30:.3g} GiB of memory to read: "
                 "it is damaged or was made to exhaust it; where it is sound, choose fewer signals, "
@@ -214,15 +220,25 @@ class LimitedSource:
 
     def _ended(self, reason: str) -> FileError:
         if not reason:
+            is_quick = not (self._is_open or self._child.is_late)
+            most = min(self._seconds, self._kind.opening) if is_quick else self._seconds
             return FileError(
-                f"{self._path}: reading it took longer than {self._seconds:g} s without getting "
-                "further: it is damaged or was made to take so long; where it is sound, copy it to "
-                "a local disk or choose fewer signals"
+                f"{self._path}: {'reading' if self._is_open else 'opening'} it took longer than "
+                f"{most:g} s without getting further: it is damaged or was made to take so long; "
+                "where it is sound, copy it to a local disk or choose fewer signals"
             )
+        if limit := address_space():
+            return self._too_small(limit)
         return FileError(
             f"{self._path}: the library that reads {self._kind.title} broke down on it ({reason}): "
             f"it is damaged, or takes more than {self._memory / 2**30:.3g} GiB of memory: copy or "
             "export it again"
+        )
+
+    def _too_small(self, limit: int) -> FileError:
+        return FileError(
+            f"{self._path}: reading {self._kind.title} ran out of memory"
+            + _limited_to(limit)
         )
 
     def _torn(self, name: str, size: int, declared: int) -> FileError:
@@ -230,6 +246,13 @@ class LimitedSource:
             f"{self._path} is damaged: {name!r} has {declared} numbers as it says, and {size} were "
             "read: copy it again, or export it again from where it was made"
         )
+
+
+def _limited_to(limit: int) -> str:
+    return (
+        f"; the address space of this process is limited to {limit / 2**30:.3g} GiB (ulimit -v): "
+        "where the file is sound, raise that limit, as by ulimit -v unlimited"
+    )
 
 
 def _ending(status: int) -> str:

@@ -20,12 +20,15 @@ class Clock:
         Sample rate [Hz]; 0 where there is a column.
     start
         Instant of the first sample [s], of a rate.
+    number
+        Number of the column, from 1; 0 where its name tells it.
     """
 
     column: str = ""
     unit: str = ""
     rate: float = 0.0
     start: float = 0.0
+    number: int = 0
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,10 @@ class SignalMapping:
         Description, for figures.
     clock
         Where its instants come from; None for those of the whole file.
+    number
+        Number of the column, from 1; 0 where its name tells it.
+    missing
+        Numbers and texts in the file that say that nothing was measured.
     """
 
     name: str
@@ -64,6 +71,8 @@ class SignalMapping:
     limits: tuple[float, float] | None = None
     label: str = ""
     clock: Clock | None = None
+    number: int = 0
+    missing: tuple[float | str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,8 +87,10 @@ class MeasurementMapping:
         Where the instants come from; None where the file says it.
     format
         Name of the file's format; empty where ending and content tell it.
-    decimal, skip_lines
+    decimal, skip_lines, titles, encoding
         See `ReadOptions`.
+    missing
+        Numbers and texts in the file that say that nothing was measured, beside the usual ones.
     """
 
     signals: Mapping[str, SignalMapping] = field(default_factory=dict)
@@ -87,3 +98,12 @@ class MeasurementMapping:
     format: str = ""
     decimal: str = ""
     skip_lines: int = 0
+    titles: bool | None = None
+    encoding: str = ""
+    missing: tuple[float | str, ...] = ()
+
+    @property
+    def marks(self) -> tuple[str, ...]:
+        """Every cell of a text table that says that nothing was measured."""
+        every = (*self.missing, *(mark for s in self.signals.values() for mark in s.missing))
+        return tuple(mark for mark in every if isinstance(mark, str))

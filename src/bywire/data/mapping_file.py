@@ -9,15 +9,27 @@ from typing import Any
 
 from bywire.core import units
 from bywire.core.arguments import whole_number
-from bywire.core.errors import InputError, ParameterError, UnitError, quoted, unknown_name
+from bywire.core.errors import (
+    InputError,
+    ParameterError,
+    UnitError,
+    quoted,
+    unknown_name,
+    unknown_of_few,
+)
 from bywire.data.column_units import si_symbol, unit_of
 from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
+from bywire.data.text_encoding import ENCODINGS
 from bywire.data.toml_file import read_toml
 
-_KEYS = ("format", "time", "rate", "start", "signals", "decimal", "skip_lines")
+_KEYS = (
+    "format", "time", "rate", "start", "signals", "decimal", "skip_lines", "titles", "encoding",
+    "missing",
+)  # fmt: skip
 _TIME_KEYS = ("column", "unit", "rate", "start")
 _SIGNAL_KEYS = (
     "column", "unit", "scale", "sign", "offset", "delay", "limits", "label", "time", "rate",
+    "missing",
 )  # fmt: skip
 
 
@@ -45,7 +57,43 @@ def mapping_from(content: Mapping[str, Any]) -> MeasurementMapping:
         _text(content, "format", ""),
         decimal,
         skip,
+        _titles(content),
+        _encoding(content),
+        _missing(content, ""),
     )
+
+
+def _titles(content: Mapping[str, Any]) -> bool | None:
+    titles = content.get("titles")
+    if titles is not None and not isinstance(titles, bool):
+        raise ParameterError(
+            f"titles = {quoted(titles)} is not valid: it must be true or false, whether the first "
+            "row holds titles"
+        )
+    return titles
+
+
+def _encoding(content: Mapping[str, Any]) -> str:
+    name = _text(content, "encoding", "").lower()
+    encoding = {"utf8": "utf-8", "utf16": "utf-16", "latin1": "latin-1", "ansi": "cp1252",
+                "iso-8859-1": "latin-1"}.get(name, name.replace("windows-", "cp"))  # fmt: skip
+    if encoding and encoding not in ENCODINGS:
+        raise unknown_of_few("encoding", encoding, ENCODINGS)
+    return encoding
+
+
+def _missing(table: Mapping[str, Any], where: str) -> tuple[float | str, ...]:
+    """Return the numbers and texts that mark missing values."""
+    marks = table.get("missing", [])
+    marks = marks if isinstance(marks, list) else [marks]
+    for mark in marks:
+        is_huge = isinstance(mark, int) and mark.bit_length() > 1000
+        if isinstance(mark, bool) or is_huge or not isinstance(mark, (int, float, str)):
+            raise ParameterError(
+                f"{where}missing = {quoted(table['missing'])} is not valid: write texts and "
+                'numbers, as ["NA", "OVLD", 9.9E37]'
+            )
+    return tuple(mark.strip() if isinstance(mark, str) else float(mark) for mark in marks)
 
 
 def _signal(name: str, table: Mapping[str, Any]) -> SignalMapping:
@@ -62,6 +110,7 @@ def _signal(name: str, table: Mapping[str, Any]) -> SignalMapping:
     return SignalMapping(
         name=name,
         column=_column(table, where) or name,
+        number=_column_number(table, where),
         unit=unit,
         scale=_scale(table, where),
         sign=int(sign),
@@ -70,6 +119,7 @@ def _signal(name: str, table: Mapping[str, Any]) -> SignalMapping:
         limits=_limits(table, symbol, f"{where}limits"),
         label=_text(table, "label", where),
         clock=_clock(table, where),
+        missing=_missing(table, where),
     )
 
 
@@ -135,7 +185,7 @@ def _clock(table: Mapping[str, Any], where: str) -> Clock | None:
             raise ParameterError(
                 f"{name}rate = {quoted(inner['rate'])} is not admissible: it must be > 0 Hz"
             )
-    return Clock(column, unit, rate, start)
+    return Clock(column, unit, rate, start, _column_number(inner, name))
 
 
 def _quantity(value: Any, symbol: str, name: str) -> float:
@@ -152,21 +202,26 @@ def _unit(table: Mapping[str, Any], name: str) -> str:
     try:
         if "unit" in table:
             unit_of(text)
-    except ValueError:
+    except UnitError as error:
         raise UnitError(
-            f"{name} = {quoted(text)} is no known unit: write for instance 'bar', or '1' for none"
+            f"{name} = {quoted(text)}: {error}: write for instance 'bar', or '1' for a pure number"
         ) from None
     return text
 
 
 def _column(table: Mapping[str, Any], where: str) -> str:
-    """Return the name of a column; a number counts columns without names from 1."""
+    """Return the name of a column, or its number as a text."""
+    return str(_column_number(table, where) or _text(table, "column", where))
+
+
+def _column_number(table: Mapping[str, Any], where: str) -> int:
+    """Return the number of a column, from 1; 0 where its name is given."""
     value = table.get("column", "")
-    if isinstance(value, int) and not isinstance(value, bool):
-        if not 1 <= value <= 100_000:
-            raise ParameterError(f"{where}column = {quoted(value)}: columns are counted from 1")
-        return str(value)
-    return _text(table, "column", where)
+    if not isinstance(value, int) or isinstance(value, bool):
+        return 0
+    if not 1 <= value <= 100_000:
+        raise ParameterError(f"{where}column = {quoted(value)}: columns are counted from 1")
+    return value
 
 
 def _text(table: Mapping[str, Any], key: str, where: str) -> str:

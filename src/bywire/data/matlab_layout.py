@@ -7,12 +7,14 @@ Beside the arrays, ``units`` holds the unit of each, ``clocks`` the name of its 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bywire.core.errors import FileError, quoted
+from bywire.data.column_units import split_title
 from bywire.data.file_format import Column
 
 if TYPE_CHECKING:
@@ -23,6 +25,16 @@ NOTES = {"units": "units", "labels": "long_name"}
 
 CLOCKS = "clocks"
 """struct with the name of the instants of each signal"""
+
+_SIGNAL = r"(?P<signal>(?P<scope>.+)\.{}(?:\([0-9]+\))?)\.{}(?P<column>\(:,[0-9]+\)|\([0-9]+,:\))?"
+_SIMULINK = re.compile(_SIGNAL.format("signals", "values"))
+_DSPACE = re.compile(_SIGNAL.format("Y", "Data"))
+_SERIES = re.compile(r"(?P<scope>.+)\.(?:Data|data)(?P<column>\(:,[0-9]+\)|\([0-9]+,:\))?")
+OBJECT = (
+    "it is an object of MATLAB, such as a timeseries or a Dataset, which only MATLAB reads: save "
+    "its times and values as arrays, as t = ts.Time; y = ts.Data"
+)
+"""why an object is not read"""
 
 _MOST_COLUMNS = 64  # of a table: a wider one is no table of signals
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
@@ -37,45 +49,147 @@ class Part:
     array
         Name of the array, with those of the structs around it.
     index
-        Which column of a table, from 0; None for a vector.
+        Which column of a table, from 0, or which row; None for a vector.
     length
         How many numbers it has.
+    is_row
+        Whether it is a row of a wide table, as Simulink's To File writes its signals.
     """
 
     array: str
     index: int | None
     length: int
+    is_row: bool = False
 
 
-def parts_of(name: str, shape: Sequence[int]) -> dict[str, Part]:
-    """Return the columns of an array of MATLAB's shape: a vector, or a table ``name(:,k)``."""
-    if len(shape) > 2 or not all(shape):
-        return {}
-    rows, columns = (*shape, 1, 1)[:2]
-    if 1 in (rows, columns):
-        size = rows * columns
-        return {name: Part(name, None, size)} if size > 1 else {}
-    if columns > _MOST_COLUMNS:
-        return {}
-    return {f"{name}(:,{k + 1})": Part(name, k, rows) for k in range(columns)}
-
-
-def columns_of(parts: Mapping[str, Part], texts: Mapping[str, str]) -> dict[str, Column]:
-    """Return the columns with what the structs say of them.
+@dataclass
+class Found:
+    """What a MAT file holds.
 
     Parameters
     ----------
     parts
-        Columns by name.
-    texts
-        Texts in structs by dotted name, for instance ``units.p_mc``.
+        Columns of its arrays by name.
+    texts, scalars
+        Texts and single numbers in structs by dotted name, for instance ``units.p_mc``.
+    left_out
+        What is not read, and why.
     """
-    columns = {}
-    for name, part in parts.items():
-        unit, label = (texts.get(f"{struct}.{name}", "") for struct in NOTES)
-        clock = texts.get(f"{CLOCKS}.{name}", "")
-        columns[name] = Column(name, unit, part.length, clock if clock in parts else None, label)
-    return columns
+
+    parts: dict[str, Part] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
+    scalars: dict[str, float] = field(default_factory=dict)
+    left_out: dict[str, str] = field(default_factory=dict)
+
+    def add(self, name: str, shape: Sequence[int]) -> None:
+        """Add the columns of an array of MATLAB's shape: a vector, ``a(:,k)`` or ``a(k,:)``."""
+        long = [size for size in shape if size > 1]
+        if not all(shape) or not long:
+            return  # empty, or a single number
+        if len(long) == 1:
+            self.parts[name] = Part(name, None, long[0])
+        elif len(shape) > 2:
+            self.left_out[name] = f"it has {len(shape)} dimensions"
+        elif shape[1] <= _MOST_COLUMNS:
+            for k in range(shape[1]):
+                self.parts[f"{name}(:,{k + 1})"] = Part(name, k, shape[0])
+        elif shape[0] <= _MOST_COLUMNS:
+            for k in range(shape[0]):
+                self.parts[f"{name}({k + 1},:)"] = Part(name, k, shape[1], is_row=True)
+        else:
+            self.left_out[name] = f"it is a table of {shape[0]} x {shape[1]} numbers"
+
+
+def columns_of(
+    found: Found, is_increasing: Callable[[Part], bool], remarks: list[str]
+) -> tuple[dict[str, Column], dict[str, Part]]:
+    """Return the columns with what structs say of them, and where each is.
+
+    Signals of Simulink and of dSPACE get the names that these programs gave them.
+
+    Parameters
+    ----------
+    found
+        What the file holds.
+    is_increasing
+        Tells whether the numbers of a part increase, as instants do.
+    remarks
+        What the user should know is added to it.
+    """
+    columns, parts = {}, {}
+    recorded = dict(_recorded(found))
+    short = Counter(_short(each) for each in recorded.values())
+    for name, part in found.parts.items():
+        unit, label = (found.texts.get(f"{struct}.{name}", "") for struct in NOTES)
+        clock = found.texts.get(f"{CLOCKS}.{name}", "")
+        shown = name
+        if name in recorded:
+            given, clock = recorded[name].name, recorded[name].clock
+            unit, label = recorded[name].unit, given or label
+            brief = _short(recorded[name])
+            shown = brief if brief and short[brief] == 1 and brief not in found.parts else name
+        elif name in {each.clock for each in recorded.values()} or name == "tout":
+            unit = unit or found.texts.get(f"{name.removesuffix('.Data')}.Unit", "").strip() or "s"
+        elif part.is_row and not unit:
+            clock, unit = _of_row(found, name, part, is_increasing, remarks)
+        columns[shown] = Column(shown, unit, part.length, clock, label, path=name)
+        parts[shown] = part
+    names = {id(part): shown for shown, part in parts.items()}
+    for shown, column in columns.items():
+        there = found.parts.get(column.clock or "")
+        columns[shown] = replace(column, clock=names[id(there)] if there is not None else None)
+    return columns, parts
+
+
+@dataclass(frozen=True)
+class _Recorded:
+    name: str
+    unit: str
+    clock: str
+    suffix: str = ""
+
+
+def _recorded(found: Found) -> Iterator[tuple[str, _Recorded]]:
+    """Yield the signals that Simulink and dSPACE describe in structs beside their numbers."""
+    for name in found.parts:
+        if match := _SIMULINK.fullmatch(name):
+            clock, text = f"{match['scope']}.time", found.texts.get(f"{match['signal']}.label", "")
+            title, unit = split_title(text.strip())
+        elif match := _DSPACE.fullmatch(name):
+            which = int(found.scalars.get(f"{match['signal']}.XIndex", 1))
+            clock = f"{match['scope']}.X({which}).Data"
+            clock = clock if clock in found.parts else f"{match['scope']}.X.Data"
+            title = found.texts.get(f"{match['signal']}.Name", "").strip()
+            unit = found.texts.get(f"{match['signal']}.Unit", "").strip()
+        elif match := _SERIES.fullmatch(name):
+            title, unit = match["scope"], ""
+            clock = next((f"{match['scope']}.{t}" for t in ("Time", "time")
+                          if f"{match['scope']}.{t}" in found.parts), "")  # fmt: skip
+        else:
+            continue
+        if clock in found.parts:
+            yield name, _Recorded(title, unit, clock, match["column"] or "")
+
+
+def _short(recorded: _Recorded) -> str:
+    """Return the last part of a signal's name, behind the blocks that hold it."""
+    brief = recorded.name.rpartition("/")[2].strip().strip("\"")
+    return brief + recorded.suffix if brief else ""
+
+
+def _of_row(
+    found: Found, name: str, part: Part, is_increasing: Callable[[Part], bool], remarks: list[str]
+) -> tuple[str, str]:
+    """Return clock and unit of a row of a wide table, whose first row has the instants."""
+    first = f"{part.array}(1,:)"
+    if first not in found.parts or not is_increasing(found.parts[first]):
+        return "", ""
+    if name == first:
+        remarks.append(
+            f"{part.array} has a signal in each row: its first one increases, and is read as the "
+            "time in s, as Simulink's To File writes it"
+        )
+    return ("", "s") if name == first else (first, "")
 
 
 def described(dataset: xr.Dataset, path: Path) -> dict[str, dict[str, str]]:

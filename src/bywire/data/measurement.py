@@ -7,6 +7,7 @@ here: `bywire.data.alignment.resample` brings signals to one time axis, and says
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,7 +20,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.core.errors import FileError, InputError, ParameterError, quoted
-from bywire.data.column_choice import Chosen, choose
+from bywire.data.column_choice import Chosen, choose, left_out_note
 from bywire.data.file_format import Progress, ReadOptions, Source, no_progress
 from bywire.data.format_registry import format_to_read
 from bywire.data.limited_source import limited
@@ -27,6 +28,10 @@ from bywire.data.mapping import MeasurementMapping
 from bywire.data.mapping_file import mapping_from, read_mapping
 from bywire.data.room import require_room, room
 from bywire.data.time_axis import AxisKey, instants
+
+
+class MeasurementWarning(UserWarning):
+    """What the user should know of how a measurement file was read."""
 
 
 def read_measurement(
@@ -60,6 +65,7 @@ def read_measurement(
         Variables of shape ``(time,)``, or ``(time_NAME,)`` for signals on other instants, with
         ``units`` (SI), ``long_name``, ``column`` and, where known, ``delay`` [s], ``valid_min``
         and ``valid_max``; attributes ``source`` and ``format``. What was not measured is NaN.
+        A `MeasurementWarning` tells what is left out, counts as missing, or was guessed.
 
     Raises
     ------
@@ -72,6 +78,26 @@ def read_measurement(
     ParameterError
         When an entry of the mapping is not admissible.
     """
+    dataset, notes = read_with_notes(
+        path, mapping, signals=signals, progress=progress, largest=largest
+    )
+    for note in notes:
+        warnings.warn(f"{Path(path).name}: {note}", MeasurementWarning, stacklevel=2)
+    return dataset
+
+
+def read_with_notes(
+    path: str | Path,
+    mapping: MeasurementMapping | Mapping[str, Any] | str | Path | None = None,
+    *,
+    signals: Sequence[str] | None = None,
+    progress: Progress = no_progress,
+    largest: int | None = None,
+) -> tuple[xr.Dataset, tuple[str, ...]]:
+    """Read a measurement file, and return what the user should know of it too.
+
+    Everything else as of `read_measurement`, which warns of it.
+    """
     file = Path(path)
     meaning = mapping_of(mapping)
     with opened(file, meaning) as source:
@@ -83,14 +109,16 @@ def read_measurement(
 def dataset_of(
     file: Path, source: Source, meaning: MeasurementMapping, signals: Sequence[str] | None,
     progress: Progress, largest: int,
-) -> xr.Dataset:  # fmt: skip
-    """Read signals of an open measurement file, as `read_measurement` does."""
+) -> tuple[xr.Dataset, tuple[str, ...]]:  # fmt: skip
+    """Read signals of an open measurement file, as `read_with_notes` does."""
     chosen = choose(file, source, meaning, signals)
     names = {c.column for c in chosen} | {c.clock.column for c in chosen if c.clock.column}
     require_room(file, source, names, largest)
-    dataset = _dataset(file, source, chosen, progress)
+    dataset, notes = _dataset(file, source, chosen, progress)
     dataset.attrs = {"source": file.name, "format": format_to_read(file, meaning.format).name}
-    return dataset
+    every = signals is None and not meaning.signals
+    left_out = left_out_note(source.left_out) if every else []
+    return dataset, (*source.remarks, *left_out, *notes)
 
 
 @contextmanager
@@ -109,7 +137,10 @@ def opened(file: Path, meaning: MeasurementMapping) -> Iterator[Source]:
             with limited(file, kind) as source:
                 yield source
         else:
-            with kind.open(file, ReadOptions(meaning.decimal, meaning.skip_lines)) as plain:
+            options = ReadOptions(
+                meaning.decimal, meaning.skip_lines, meaning.titles, meaning.encoding, meaning.marks
+            )
+            with kind.open(file, options) as plain:
                 yield cast(Source, plain)
     except InputError:
         raise
@@ -133,7 +164,7 @@ def mapping_of(
 
 def _dataset(
     file: Path, source: Source, chosen: Sequence[Chosen], progress: Progress
-) -> xr.Dataset:
+) -> tuple[xr.Dataset, list[str]]:
     clocks = [c.clock.column for c in chosen if c.clock.column]
     names = list(dict.fromkeys([*clocks, *(c.column for c in chosen)]))
     values = source.read(names, progress)
@@ -146,9 +177,10 @@ def _dataset(
         column = _taken(values, uses, key.clock.column) if key.clock.column else None
         axes[key] = instants(file, source, key, column)
     variables = {}
+    notes: list[str] = []
     for signal, key in zip(chosen, keys, strict=True):
         numbers = _timed(file, signal, _taken(values, uses, signal.column), axes[key].size)
-        signal.to_si(numbers)
+        notes += signal.to_si(numbers)
         variables[signal.mapping.name] = (dims[key], numbers, signal.attributes())
     # Indexes of pandas that share the array: from the array, xarray would copy it.
     coords: dict[str, Any] = {
@@ -156,7 +188,7 @@ def _dataset(
                     {"units": "s", "long_name": "time"})
         for key, axis in axes.items()
     }  # fmt: skip
-    return xr.Dataset(variables, coords=coords)
+    return xr.Dataset(variables, coords=coords), notes
 
 
 def _taken(

@@ -4,10 +4,10 @@ Libraries believe what a file says of itself: a damaged one, or one that was mad
 crash, run without an end, or ask for all memory. Here that ends a child, and nothing else.
 
 Both ways messages go as a length, a JSON object, and for a piece of a column its numbers as they
-lie in memory: nothing is unpickled. The reader asks ``{path, folder, memory, seconds}``; the answer
-is ``{columns, notes}``. It asks for ``{names}`` as often as it likes, and ends with none; the
-answers are pieces ``{column, begin, count, kind}`` and ``{end}``. ``{error}`` and ``{memory}`` end
-it early.
+lie in memory: nothing is unpickled. The reader asks ``{path, folder, memory, seconds, opening}``;
+the answer is ``{columns, left_out, remarks, notes}``. It asks for ``{names}`` as often as it likes,
+and ends with none; the answers are pieces ``{column, begin, count, kind}`` and ``{end, remarks}``.
+``{error}`` and ``{memory}`` end it early.
 
 On Linux the process imports the library once and forks for each file, so that a file costs
 milliseconds, starts from a sound state and has its own limits. Elsewhere it reads one file.
@@ -78,23 +78,26 @@ def main(module: str, is_forking: bool) -> None:
         for name in kind.libraries:
             importlib.import_module(name)
         missing = ""
-    except ImportError as error:
-        missing = str(error)
+    except (ImportError, MemoryError, OSError) as error:
+        missing = str(error) or "out of memory"
     while (request := receive(requests)) is not None:
         if missing:
             what = f"{request['path']}: the library that reads {kind.title} does not load"
-            send(answers, {"error": f"{what} ({missing}): install it again"})
+            text = f"{what} ({missing}): install it again"
+            send(answers, {"error": text, "is_of_library": True})
         elif not is_forking:
             _serve(kind, request, requests, answers)
             return
         else:
             child = os.fork()
             if not child:
+                status = 1
                 try:
                     _limit(request["memory"])
                     _serve(kind, request, requests, answers)
+                    status = 0
                 finally:
-                    os._exit(0)
+                    os._exit(status)
             status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
             if status:
                 send(answers, {"ended": status, "request": request["request"]})
@@ -107,11 +110,13 @@ def _serve(
     path = Path(request["path"])
     try:
         os.chdir(request["folder"])
-        _allow(request["seconds"])
+        _allow(request["opening"])
         with kind.open(path, ReadOptions()) as opened:
             source = cast(PieceSource, opened)
             columns = source.columns
-            described = {"columns": [astuple(column) for column in columns.values()]}
+            described: dict[str, Any] = {"columns": [astuple(c) for c in columns.values()]}
+            described["left_out"] = dict(getattr(source, "left_out", {}))
+            described["remarks"] = list(getattr(source, "remarks", []))
             send(answers, described | {"notes": getattr(source, "notes", {})})
             while names := (receive(requests) or {"names": []})["names"]:
                 for name, begin, part in source.pieces(names):
@@ -122,7 +127,7 @@ def _serve(
                     place = {"column": names.index(name), "begin": begin, "count": numbers.size,
                              "kind": NUMBERS.index(numbers.dtype.name)}  # fmt: skip
                     send(answers, place, numbers)
-                send(answers, {"end": True})
+                send(answers, {"end": True, "remarks": list(getattr(source, "remarks", []))})
     except FileError as error:
         send(answers, {"error": str(error)})
     except MemoryError:
@@ -136,7 +141,7 @@ def _serve(
         if getattr(error, "errno", None) == errno.ENOSPC:
             what = f"{path} cannot be read: the library's temporary files have no room"
             hint = "make room where they go, or set TMPDIR to another folder"
-        send(answers, {"error": f"{what}: {hint}"})
+        send(answers, {"error": f"{what}: {hint}", "is_of_library": True})
 
 
 def _limit(memory: int) -> None:
@@ -145,9 +150,12 @@ def _limit(memory: int) -> None:
 
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     most = pages * resource.getpagesize() + memory
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (memory, memory))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    for kind, wanted in (
+        (resource.RLIMIT_AS, most), (resource.RLIMIT_FSIZE, memory), (resource.RLIMIT_CORE, 0)
+    ):  # fmt: skip
+        inherited = [limit for limit in resource.getrlimit(kind) if limit != resource.RLIM_INFINITY]
+        allowed = min([wanted, *inherited])  # an inherited limit cannot be raised
+        resource.setrlimit(kind, (allowed, allowed))
 
 
 def _allow(seconds: float) -> None:

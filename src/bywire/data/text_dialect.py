@@ -1,28 +1,46 @@
-"""How a text table is written: separator, decimal mark, header, row of units; from its head."""
+"""How a text table is written: separator, decimal mark, header, units; from its head."""
 
 from __future__ import annotations
 
-import codecs
 import csv
 import io
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from bywire.core.errors import FileError, quoted
+from bywire.core.errors import FileError, UnitError, quoted
 from bywire.data.column_units import split_title, unit_of
+from bywire.data.file_format import ReadOptions
+from bywire.data.text_encoding import head_text
+from bywire.data.time_stamps import is_stamp, is_unclear, kind_of_stamps
 
-SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
+SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
 """what may stand between two cells, in the order in which it is looked for"""
 
 HEAD = 1 << 18
 """bytes that are looked at; a header must end before"""
 
-_ROWS = 200  # rows that are looked at for the decimal mark
+_MARKS = (
+    "- -- --- nan -nan nan(ind) -nan(ind) 1.#qnan 1.#ind -1.#ind 1.#inf -1.#inf na n/a n.a. #n/a "
+    "#na #num! #value! #div/0! null inf +inf -inf infinity +infinity -infinity ∞ +∞ -∞ ovld ol o.l "
+    "overload overrange missing invalid sna"
+)
+MARKS = frozenset(("", *_MARKS.split()))
+"""cells of what was not measured, in small letters"""
+
+COMMENTS = ("#", "%", "//", "!")
+"""what a line of comment begins with"""
+
+NUMBER, TEXT, UNCLEAR = "number", "text", "date of no clear order"
+"""kinds of columns, beside those of time stamps"""
+
+_ROWS = 200  # rows that are looked at for the decimal mark and the kinds of columns
+_LINES = 2000  # in which the first row of numbers is looked for
 _NUMBER = re.compile(r"[+-]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)([eE][+-]?[0-9]+)?")
-MISSING = ("", "nan", "NaN")
-"""cells of what was not measured"""
+_BEGINS_LIKE_ONE = re.compile(r"[+-]?[.,]?[0-9]")  # then it is an error, and no text
+_SEP_LINE = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
+_SPACED_UNIT = re.compile(r" +(?=[\[(][^\])]*[\])])")  # "t [s]  p [bar]" has two cells
 
 
 @dataclass(frozen=True)
@@ -44,9 +62,23 @@ class Dialect:
     first_line
         Line of the first row of numbers, counted from 1.
     start
-        Its first byte in the file.
+        Its first byte in the file, as UTF-8.
     rows
         First rows of numbers.
+    kinds
+        What the cells of each column are: `NUMBER`, `TEXT`, or a kind of time stamps.
+    encoding
+        How the file writes characters.
+    marks
+        Further cells of what was not measured.
+    raster
+        First instant and step [s], where no column has the instants.
+    clocks
+        Columns with the instants of others, by the column from 0, where the file says so.
+    is_ragged
+        Whether cells may be left away at the end of a row.
+    notes
+        What the user should know of how the table is read.
     """
 
     separator: str
@@ -57,123 +89,159 @@ class Dialect:
     first_line: int
     start: int
     rows: tuple[str, ...]
+    kinds: tuple[str, ...] = ()
+    encoding: str = "utf-8"
+    marks: frozenset[str] = frozenset()
+    raster: tuple[float, float] | None = None
+    clocks: dict[int, int] = field(default_factory=dict)
+    is_ragged: bool = False
+    notes: tuple[str, ...] = ()
 
     def label(self, column: int) -> str:
         """Return what errors call a column, counted from 0."""
-        return self.titles[column] if self.titles else str(column + 1)
+        return self.titles[column] if column < len(self.titles) else str(column + 1)
+
+    def is_mark(self, cell: str) -> bool:
+        """Return whether a cell says that nothing was measured."""
+        return cell.casefold() in MARKS or cell in self.marks
 
 
-def dialect_of(path: Path, head: bytes, decimal: str, skip_lines: int) -> Dialect:
-    """Return how a text table is written.
+@dataclass(frozen=True)
+class Head:
+    """The first lines of a text table.
 
     Parameters
     ----------
     path
-        What errors call it.
-    head
-        Its first bytes, up to ``HEAD``.
-    decimal
-        Decimal mark where it is known; else the head tells.
-    skip_lines
-        Lines before the table.
+        What errors call the file.
+    lines
+        Its complete lines, with their ends.
+    encoding
+        How it writes characters.
+    options
+        How it is to be read.
+    """
+
+    path: Path
+    lines: list[str]
+    encoding: str
+    options: ReadOptions
+
+    def start(self, line: int) -> int:
+        """Return the first byte of a line, counted from 0, as UTF-8."""
+        return sum(len(text.encode()) for text in self.lines[:line])
+
+    def plain(self, line: int) -> str:
+        """Return a line without its end."""
+        return self.lines[line].rstrip("\r\n")
+
+    def is_blank(self, line: int) -> bool:
+        """Return whether a line holds nothing."""
+        return not self.lines[line].strip()
+
+    def cells(self, line: int, separator: str) -> list[str]:
+        """Return the cells of a line.
+
+        Raises
+        ------
+        FileError
+            When its quotation marks do not fit.
+        """
+        try:
+            return cells_of(self.plain(line), separator)
+        except csv.Error as error:
+            raise FileError(
+                f"{self.path}, line {line + 1}: {error}: check its quotation marks"
+            ) from None
+
+    def table(
+        self, separator: str, titles: Sequence[str], units: Sequence[str], at: int, width: int
+    ) -> Dialect:
+        """Return the dialect of a table whose first row of numbers is known."""
+        rows = tuple(self.plain(k) for k in range(at, min(at + _ROWS, len(self.lines))))
+        decimal = "." if separator == "," else self.options.decimal
+        marks = frozenset(mark for mark in self.options.missing if mark)
+        dialect = Dialect(
+            separator, decimal, tuple(titles), tuple(units), width, at + 1, self.start(at), rows,
+            encoding=self.encoding, marks=marks,
+        )  # fmt: skip
+        return replace(dialect, kinds=_kinds(dialect))
+
+
+def head_of_table(path: Path, options: ReadOptions) -> Head:
+    """Return the first lines of a text table.
 
     Raises
     ------
     FileError
-        When it is not UTF-8, has no row of numbers, or is not clear.
+        When they are not text in the encoding that is named, or in UTF-8.
     """
-    lines = _lines(path, head)
-    at = skip_lines
-    while at < len(lines) and not lines[at].strip():
+    lines, encoding, _ = head_text(path, options.encoding, HEAD)
+    return Head(path, lines, encoding, options)
+
+
+def dialect_of(head: Head) -> Dialect:
+    """Return how a text table is written.
+
+    The table begins with the first row of numbers, and the row of titles and that of units before
+    it. What stands before those is left out with a note, unless it holds numbers too.
+
+    Raises
+    ------
+    FileError
+        When it has no row, or is not clear.
+    """
+    options, path = head.options, head.path
+    at, chosen = options.skip_lines, ""
+    while at < len(head.lines) and head.is_blank(at):
         at += 1
-    if at >= len(lines):
-        raise FileError(f"{path} holds no row after {skip_lines} lines that are skipped")
-    separator = separator_of(lines[at])
-    first = _cells(path, lines[at], separator, at + 1)
-    titles: tuple[str, ...] = ()
-    units = [""] * len(first)
-    if not _are_numbers(first):
-        names = [split_title(cell) for cell in first]
-        titles, units = tuple(n for n, _ in names), [u for _, u in names]
-        at += 1
-        row = _cells(path, lines[at], separator, at + 1) if at < len(lines) else []
-        if row and any(row) and not _are_numbers(row) and _are_units(row):
-            units = [_bare(cell) or unit for cell, unit in zip(row, units, strict=False)]
-            at += 1
-    width = len(first)
-    while titles and not titles[-1] and not units[-1]:  # a separator ends every row
-        titles, units = titles[:-1], units[:-1]
-    if separator == "," and decimal == ",":
+    if at < len(head.lines) and (match := _SEP_LINE.fullmatch(head.plain(at).strip())):
+        at, chosen = at + 1, match[1]
+    first = _first_row_of_numbers(head, at, [chosen] if chosen else list(SEPARATORS))
+    begin = at
+    while begin < len(head.lines) and (head.is_blank(begin) or _is_comment(head.plain(begin))):
+        begin += 1
+    if begin >= len(head.lines):
+        raise FileError(f"{path} holds no row after {options.skip_lines} lines that are skipped")
+    if chosen and chosen not in SEPARATORS:
+        raise FileError(f"{path}: its first line names the separator {quoted(chosen)}: use ';'")
+    dialect = None
+    if first is not None and options.titles is None:
+        dialect, begin = _from_numbers(head, at, begin, *first)
+    if dialect is None:
+        separator = chosen or (first[0] if first else separator_of(head, begin))
+        dialect = _headed(head, begin, separator, options.titles)
+    if dialect.separator == "," and options.decimal == ",":
         raise FileError(f"{path}: a comma cannot separate columns and mark decimals: decimal = '.'")
-    start = sum(len(line) for line in _raw_lines(head)[:at])
-    if not start and head.startswith(codecs.BOM_UTF8):
-        start = len(codecs.BOM_UTF8)
-    mark = "." if separator == "," else decimal
-    rows = tuple(lines[at : at + _ROWS])
-    return Dialect(separator, mark, titles, tuple(units), width, at + 1, start, rows)
+    before = [k for k in range(at, begin) if not head.is_blank(k)]
+    if before:
+        note = (
+            f"{len(before)} lines before the table are not read, from line {before[0] + 1} "
+            f"({quoted(head.plain(before[0]).strip())}) to {before[-1] + 1}"
+        )
+        dialect = replace(dialect, notes=(note, *dialect.notes))
+    return dialect
 
 
-def _raw_lines(head: bytes) -> list[bytes]:
-    return head.splitlines(keepends=True)
+def separator_of(head: Head, at: int) -> str:
+    """Return the separator of a line that is no row of numbers; quotes do not count."""
+    bare = re.sub(r'"[^"]*"', "", head.plain(at))
+    found = next((mark for mark in "\t;," if mark in bare), "")
+    if found:
+        return found
+    following = [head.cells(k, " ") for k in range(at, len(head.lines)) if not head.is_blank(k)][:5]
+    widths = {len(cells) for cells in following}
+    return " " if len(widths) == 1 and widths != {1} and len(following) > 1 else ","
 
 
-def _lines(path: Path, head: bytes) -> list[str]:
-    """Return the complete lines of the head."""
-    if b"\r" in head and b"\n" not in head:
-        raise FileError(f"{path}: its lines end with a bare carriage return: save it with LF ends")
-    if len(head) == HEAD:
-        head = head[: head.rfind(b"\n") + 1]
-        if not head:
-            raise FileError(f"{path}, line 1: it is longer than {HEAD} bytes: is this a table?")
-    try:
-        return [line.decode("utf-8-sig").rstrip("\r\n") for line in _raw_lines(head)]
-    except UnicodeDecodeError:
-        number = next(k for k, line in enumerate(_raw_lines(head), 1) if not _is_text(line))
-        raise FileError(
-            f"{path}, line {number}: it is not UTF-8: save the file as text in UTF-8 (in "
-            "spreadsheets: 'CSV UTF-8')"
-        ) from None
-
-
-def _is_text(line: bytes) -> bool:
-    try:
-        line.decode("utf-8")
-    except UnicodeDecodeError:
-        return False
-    return True
-
-
-def _cells(path: Path, line: str, separator: str, number: int) -> list[str]:
-    try:
-        rows = list(csv.reader(
-            io.StringIO(line), delimiter=separator, strict=True, skipinitialspace=True
-        ))
-    except csv.Error as error:
-        raise FileError(f"{path}, line {number}: {error}: check its quotation marks") from None
+def cells_of(line: str, separator: str) -> list[str]:
+    """Return the cells of a line; csv.Error where its quotation marks do not fit."""
+    if separator == " ":
+        line = _SPACED_UNIT.sub("", " ".join(line.split()))
+    rows = list(
+        csv.reader(io.StringIO(line), delimiter=separator, strict=True, skipinitialspace=True)
+    )
     return [cell.strip() for cell in rows[0]] if rows else []
-
-
-def _are_numbers(cells: list[str]) -> bool:
-    """Return whether a row is one of measured values: numbers and blanks, one number at least."""
-    plain = [cell for cell in cells if cell not in MISSING]
-    return bool(plain) and all(_NUMBER.fullmatch(cell) for cell in plain)
-
-
-def _are_units(cells: list[str]) -> bool:
-    return all(not cell or cell == "-" or _is_unit(_bare(cell)) for cell in cells)
-
-
-def _bare(cell: str) -> str:
-    """Return a unit without the brackets around it."""
-    return cell[1:-1].strip() if cell[:1] in "[(" and cell[-1:] in "])" and cell else cell
-
-
-def _is_unit(text: str) -> bool:
-    try:
-        unit_of(text)
-    except ValueError:
-        return False
-    return True
 
 
 def with_mark(path: Path, dialect: Dialect, indices: Sequence[int]) -> Dialect:
@@ -188,7 +256,8 @@ def with_mark(path: Path, dialect: Dialect, indices: Sequence[int]) -> Dialect:
         return dialect
     first: dict[str, tuple[int, int, str]] = {}
     for number, line in enumerate(dialect.rows, dialect.first_line):
-        cells = [cell.strip().strip('"') for cell in line.split(dialect.separator)]
+        split = line.split() if dialect.separator == " " else line.split(dialect.separator)
+        cells = [cell.strip().strip('"') for cell in split]
         for k, cell in ((k, cells[k]) for k in indices if k < len(cells)):
             for mark in ",.":
                 if mark in cell and _NUMBER.fullmatch(cell):
@@ -204,7 +273,169 @@ def with_mark(path: Path, dialect: Dialect, indices: Sequence[int]) -> Dialect:
     return replace(dialect, decimal=next(iter(first), "."))
 
 
-def separator_of(first: str) -> str:
-    """Return the separator of a table's first line; what stands in quotes does not count."""
-    bare = re.sub(r'"[^"]*"', "", first)
-    return next((mark for mark in SEPARATORS if mark in bare), ",")
+def _first_row_of_numbers(head: Head, at: int, separators: list[str]) -> tuple[str, int] | None:
+    """Return the separator and the line of the first row of two numbers or more."""
+    for separator in separators:
+        for line in range(at, min(at + _LINES, len(head.lines))):
+            if separator != " " and separator not in head.lines[line]:
+                continue
+            try:
+                cells = cells_of(head.plain(line), separator)
+            except csv.Error:
+                if _is_comment(head.plain(line)):
+                    continue
+                break  # the reader of rows finds the place
+            if _are_numbers(cells, head.options.missing) and len(_bare_row(cells)) > 1:
+                return separator, line
+    return None
+
+
+def _bare_row(cells: list[str]) -> list[str]:
+    """Return the cells of a row without the empty ones at its end."""
+    while cells and not cells[-1]:
+        cells = cells[:-1]
+    return cells
+
+
+def _are_numbers(cells: list[str], marks: Sequence[str] = ()) -> bool:
+    """Return whether a row is one of measured values: numbers, times and marks of missing ones."""
+    plain = [cell for cell in cells if cell.casefold() not in MARKS and cell not in marks]
+    return bool(plain) and all(_NUMBER.fullmatch(cell) or is_stamp(cell) for cell in plain)
+
+
+def _has_number(cells: list[str]) -> bool:
+    return any(_NUMBER.fullmatch(cell) or is_stamp(cell) for cell in cells)
+
+
+def _from_numbers(
+    head: Head, at: int, begin: int, separator: str, first: int
+) -> tuple[Dialect | None, int]:
+    """Return the dialect of a table by its first row of numbers, and the line of its titles.
+
+    None where a row of as many cells, with a number among them, stands before: it may belong to
+    the table.
+    """
+    row = head.cells(first, separator)
+    width = len(_bare_row(row))
+    above = [k for k in range(at, first) if not head.is_blank(k)]
+    rows = {k: _loose_cells(head, k, separator) for k in above}
+    alike = [k for k in above[-2:] if len(_bare_row(rows[k])) in (width, len(row))]
+    titles: list[str] = []
+    units = [""] * len(row)
+    notes: list[str] = []
+    start = first
+    if alike and alike[-1] == above[-1]:
+        has_units = len(alike) == 2 and _are_units(rows[alike[-1]])
+        start = alike[-2] if has_units else alike[-1]
+        titles, units = _titles_of(rows[start], rows[alike[-1]] if has_units else [])
+        notes += _doubtful_titles(titles, start)
+        if _is_comment(head.plain(start)):
+            notes.append(f"line {start + 1} is a comment, and is read as titles")
+    elif above and above[-1] == begin:
+        return None, begin  # a header of other cells than the rows
+    elif above and start > begin:
+        notes.append(
+            f"the columns have no titles, since line {above[-1] + 1} has other cells than the rows "
+            "below it: they are called 1, 2, ..."
+        )
+    mixed = (k for k in above if len(rows[k]) == len(row) and _has_number(rows[k]))
+    if any(k < start or k == start != begin for k in mixed):
+        return None, begin
+    dialect = head.table(separator, titles, units, first, len(row))
+    return replace(dialect, notes=tuple(notes)), start
+
+
+def _loose_cells(head: Head, line: int, separator: str) -> list[str]:
+    try:
+        return cells_of(head.plain(line), separator)
+    except csv.Error:
+        return [head.plain(line)]
+
+
+def _doubtful_titles(titles: list[str], line: int) -> list[str]:
+    """Return a note on titles that are numbers."""
+    number = next((title for title in titles if _has_number([title])), None)
+    if number is None:
+        return []
+    return [
+        f"line {line + 1} is read as titles although it holds numbers ({quoted(number)}): "
+        "titles = false in the mapping reads it as a row"
+    ]
+
+
+def _headed(head: Head, at: int, separator: str, titles: bool | None) -> Dialect:
+    """Return the dialect of a table that begins in a line: with titles, or a row of numbers."""
+    first = head.cells(at, separator)
+    names: list[str] = []
+    units = [""] * len(first)
+    notes: list[str] = []
+    if titles or (titles is None and not _are_numbers(first, head.options.missing)):
+        below = at + 1
+        while below < len(head.lines) and head.is_blank(below):
+            below += 1
+        row = head.cells(below, separator) if below < len(head.lines) else []
+        is_units = any(row) and not _are_numbers(row) and _are_units(row)
+        names, units = _titles_of(first, row if is_units else [])
+        notes = [] if titles else _doubtful_titles(names, at)
+        at = below + 1 if is_units else at + 1
+    return replace(head.table(separator, names, units, at, len(first)), notes=tuple(notes))
+
+
+def _titles_of(first: list[str], below: list[str]) -> tuple[list[str], list[str]]:
+    """Return titles and units of a row of titles and one of units, which may be none."""
+    names = [split_title(cell.lstrip("#% ") if k == 0 else cell) for k, cell in enumerate(first)]
+    titles, units = [name for name, _ in names], [unit for _, unit in names]
+    for k, cell in enumerate(below[: len(units)]):
+        units[k] = _bare(cell) or units[k]
+    while titles and not titles[-1] and not units[-1]:  # a separator ends every row
+        titles, units = titles[:-1], units[:-1]
+    return titles, units
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip().startswith(COMMENTS)
+
+
+def _are_units(cells: list[str]) -> bool:
+    """Return whether a row is one of units: all of them, or most and the others in brackets."""
+    plain = [cell for cell in cells if cell and cell != "-"]
+    known = [cell for cell in plain if _is_unit(_bare(cell))]
+    return len(known) == len(plain) or (
+        2 * len(known) > len(plain) and all(c in known or _bare(c) != c for c in plain)
+    )
+
+
+def _bare(cell: str) -> str:
+    """Return a unit without the brackets around it."""
+    return cell[1:-1].strip() if cell[:1] in "[(" and cell[-1:] in "])" and cell else cell
+
+
+def _is_unit(text: str) -> bool:
+    try:
+        unit_of(text)
+    except UnitError:
+        return text in ("g", "C", "F")
+    return True
+
+
+def _kinds(dialect: Dialect) -> tuple[str, ...]:
+    """Return what the cells of each column are, by the first rows."""
+    columns: list[list[str]] = [[] for _ in range(dialect.width)]
+    for line in dialect.rows:
+        try:
+            cells = cells_of(line, dialect.separator)
+        except csv.Error:
+            continue
+        for k, cell in enumerate(cells[: dialect.width]):
+            if not dialect.is_mark(cell):
+                columns[k].append(cell)
+    return tuple(_kind(cells) for cells in columns)
+
+
+def _kind(cells: list[str]) -> str:
+    if not cells or any(_NUMBER.fullmatch(cell) for cell in cells):
+        return NUMBER
+    if all(is_unclear(cell) for cell in cells):
+        return UNCLEAR
+    kind = kind_of_stamps(cells)
+    return kind or (NUMBER if any(_BEGINS_LIKE_ONE.match(cell) for cell in cells) else TEXT)

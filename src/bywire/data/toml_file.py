@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bywire.core.errors import FileError
+from bywire.core.errors import FileError, quoted
 from bywire.core.scratch import NULL_CHARACTER
 
 LARGEST = 1_000_000
@@ -44,17 +45,31 @@ def read_toml(
     Raises
     ------
     FileError
-        When the file cannot be read or is no TOML.
+        When the file cannot be read or is no TOML, and for whole numbers beyond all others.
     """
     text = _text(file, kind, missing, too_large)
     if _LONG_KEY.search(text):
         raise FileError(f"{file} holds a dotted key of more than {_KEY_PARTS} parts: shorten it")
     try:
-        return tomllib.loads(text)
+        content = tomllib.loads(text)
+        _require_numbers(content, file, "")
     except RecursionError:
         raise FileError(f"{file} is no {kind}: it is nested far too deeply") from None
     except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
         raise FileError(f"{file} is not valid TOML: {error}") from None
+    return content
+
+
+def _require_numbers(value: Any, file: Path, key: str) -> None:
+    """Refuse whole numbers that no floating-point number is as large as, wherever they stand."""
+    if isinstance(value, dict):
+        for name, each in value.items():
+            _require_numbers(each, file, f"{key}.{name}" if key else name)
+    elif isinstance(value, list):
+        for each in value:
+            _require_numbers(each, file, key)
+    elif isinstance(value, int) and value.bit_length() >= sys.float_info.max_exp:
+        raise FileError(f"{file}: {key} = {quoted(value)}: write any finite number, below 1.8e308")
 
 
 def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str) -> str:

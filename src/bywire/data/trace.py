@@ -7,6 +7,7 @@ pause that is allowed, it is refused, never bridged in silence. In a text table 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +24,7 @@ from bywire.data.column_units import measures, unit_of_symbol
 from bywire.data.file_format import Source, no_progress
 from bywire.data.format_registry import FORMATS, format_to_read, head_of
 from bywire.data.mapping import MeasurementMapping, SignalMapping
-from bywire.data.measurement import dataset_of, mapping_of, opened
+from bywire.data.measurement import MeasurementWarning, dataset_of, mapping_of, opened
 from bywire.data.room import room
 
 _GAP = 10.0  # median steps: a pause must be longer to count as a gap
@@ -77,7 +78,7 @@ def read_trace(
     with opened(file, meaning) as source:
         names = tuple(signals) if signals is not None else _names(file, source, meaning)
         chosen = {n: _chosen(file, source, meaning, n) for n in names}
-        whole = dataset_of(
+        whole, notes = dataset_of(
             file, source, replace(meaning, signals=chosen), None, no_progress, room()
         )
         for name, symbol in (signals or {}).items():
@@ -85,6 +86,8 @@ def read_trace(
         for signal in whole.data_vars.values():
             _require_whole(file, source, signal, longest)
     whole.attrs["source"] = file.name
+    for note in notes:
+        warnings.warn(f"{file.name}: {note}", MeasurementWarning, stacklevel=2)
     return whole
 
 

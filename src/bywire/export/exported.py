@@ -12,7 +12,7 @@ from bywire.bench.experiment import Case
 from bywire.bench.running import run_of
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.simulation.emission import layout_of
-from bywire.simulation.emit_single import emit_single
+from bywire.simulation.emit_single import EXPORTED, emit_single
 from bywire.simulation.engine import prepare
 from bywire.simulation.layout import Layout
 from bywire.simulation.program import Program
@@ -52,8 +52,8 @@ class Exported:
 
     @cached_property
     def kernel(self) -> str:
-        """C source of its kernel, the same as that of the bench's own run."""
-        return emit_single(self.stages)
+        """C source of its kernel: that of the bench's own run, without its pauses."""
+        return emit_single(self.stages, EXPORTED)
 
     @property
     def layout(self) -> Layout:

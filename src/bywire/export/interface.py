@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal, get_args
 
-from bywire.core.signals import signals_of
+from bywire.core.signals import ranges_of, signals_of
 from bywire.export.exported import Exported
 from bywire.export.variables import (
     Causality,
@@ -148,12 +149,14 @@ def leaves_read(graph: Graph, roots: Iterable[Node]) -> dict[str, frozenset[int]
 
 def _stimuli(made: Exported, reads: _Reads) -> Iterator[Variable]:
     known, starts = signals_of(made.run.model.Stimulus), made.demanded
+    ranges = ranges_of(made.run.model.Stimulus)
     for k, (name, signal) in enumerate(known.items()):
         if k in reads.ecu["u"]:
             label = signal.label + ", a standard normal number" * name.startswith("noise_")
             yield Variable(
-                name, "input", "stimulus", k, signal.unit, label, starts[k], is_held=True
-            )
+                name, "input", "stimulus", k, signal.unit, label, starts[k], is_held=True,
+                ends=ranges.get(name, (-math.inf, math.inf)),
+            )  # fmt: skip
 
 
 def readings(made: Exported) -> dict[int, str]:

@@ -7,7 +7,8 @@ from typing import Any
 
 import casadi as ca
 
-from bywire.analysis.linear.linearize import closed_contacts
+from bywire.analysis.linear.corners import beside_point
+from bywire.analysis.linear.linearize import closed_contacts, free_signals, smooth_point
 from bywire.analysis.linear.sampled_system import frames_of
 from bywire.analysis.linear.smooth_functions import smooth_functions
 from bywire.analysis.loop import Loop, Point
@@ -30,10 +31,12 @@ class LoopSource:
     loop
         The loop.
     entry, text
-        Name and C text of ``void entry(const double *p, double *out)``, which writes what is not
-        zero of: how clearly each contact is closed or open [m], then row by row A (n, n) and
-        B (n, nm) of the plant, and of each task the memory's Jacobians by states (nm, n) and by
-        memory (nm, nm). Of an analog loop, whose sampled controllers hold, A is all.
+        Name and C text of ``void entry(const double *p, double t, double *out)``, which writes
+        what is not zero of the model at the operating point (t = 0), or beside it on either side
+        (t = 1, -1; see `bywire.analysis.linear.corners`): how clearly each contact is closed or
+        open [m], then row by row A (n, n) and B (n, nm) of the plant, and of each task the
+        memory's Jacobians by states (nm, n) and by memory (nm, nm). Of an analog loop, whose
+        sampled controllers hold, A is all.
     states, memory
         Names, in the order of rows and columns; an analog loop has no memory.
     contacts
@@ -71,8 +74,9 @@ def loop_source(loop: Loop, par: ParameterSet) -> LoopSource | None:
         moving = loop.point(loop.smooth(symbolic), loop.at.default)
         if at.par.leaves().keys() != names.keys():
             return None
-        results = _jacobians(loop, at, moving)
-        function = ca.Function("loop", [p], results)
+        t = SX.sym("t")
+        results = _jacobians(loop, at, moving, t)
+        function = ca.Function("loop", [p, t], results)
     except _NOT_SYMBOLIC:
         return None
     frame, every = frames_of([task.period for task in at.model.tasks(at.par)])
@@ -83,11 +87,15 @@ def loop_source(loop: Loop, par: ParameterSet) -> LoopSource | None:
     return LoopSource(loop, entry, text, kept, memory, contacts, tuple(every), frame)
 
 
-def _jacobians(loop: Loop, at: Point, moving: Point) -> list[Any]:
-    """Return the rows of what the C writes, over symbolic parameters."""
+def _jacobians(loop: Loop, at: Point, moving: Point, t: Any) -> list[Any]:
+    """Return the rows of what the C writes, over symbolic parameters and the side t."""
     model, functions = at.model, smooth_functions(at.model, at.par)
     p = column([moving.par.value(name) for name in at.par.leaves()])
     x, m, u = (column(list(each)) for each in (moving.state, moving.memory, moving.stimulus))
+    point = smooth_point(model, at.par, (at.state, at.memory, at.stimulus))
+    states = [name for name in model.State._fields if name not in loop.locked]
+    beside = beside_point(point, free_signals(point, states, model.Memory._fields, ()))
+    x, m = x + t * beside[: len(at.state)], m + t * beside[len(at.state) :][: len(at.memory)]
     *matrices, gaps = _tuple(functions.contacts(x, p))
     closed = closed_contacts(model, at.par, at.state)
     K, slack, first = SX(gaps.shape[0], gaps.shape[0]), [], 0
@@ -111,7 +119,7 @@ def _jacobians(loop: Loop, at: Point, moving: Point) -> list[Any]:
         return rows
     rows.append(_by_rows(B[kept, :]))
     for tick in functions.ticks:
-        M_x, M_m, _ = tick(x, m, u, p)
+        M_x, M_m, *_ = tick(x, m, u, p)
         rows += [_by_rows(M_x[:, kept]), _by_rows(M_m)]
     return rows
 
@@ -120,16 +128,20 @@ def _in_c(entry: str, function: ca.Function) -> str:
     """Return the C of a function of parameters; what is zero is not written."""
     graph = Graph()
     results = graph.add_function(
-        function, [[graph.leaf("p", k) for k in range(function.nnz_in(0))]]
+        function,
+        [[graph.leaf("p", k) for k in range(function.nnz_in(0))], [graph.leaf("t", 0)]],
     )
     nodes = [node for result in results for node in result]
     zero = graph.constant(0.0)
     targets = {at: node for at, node in enumerate(nodes) if node != zero}
-    name = leaf_namer(graph, lambda kind, k: f"{kind}[{k}]", lambda node: f"v{node}")
+    name = leaf_namer(
+        graph, lambda kind, k: kind if kind == "t" else f"{kind}[{k}]", lambda node: f"v{node}"
+    )
     order = needed(graph, list(targets.values()), lambda _: False)
     lines = statements(graph, order, name, "const double ")
     lines += [f"out[{at}] = {as_number(graph, node, name)};" for at, node in targets.items()]
-    return f"void {entry}(const double *p, double *out) {{\n  {indented(lines, 2)}\n}}\n"
+    head = f"void {entry}(const double *p, double t, double *out)"
+    return f"{head} {{\n  {indented(lines, 2)}\n}}\n"
 
 
 def _by_rows(matrix: Any) -> Any:

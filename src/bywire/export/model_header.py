@@ -12,6 +12,7 @@ from bywire.export.initial_values import HEADING
 from bywire.export.interface import Interface, tables
 from bywire.export.variables import Variable, finite_range
 from bywire.simulation.c_runtime import SCALAR
+from bywire.simulation.layout import COUNTERS
 
 _PLACES = {
     "parameter": "PARAMETER", "stimulus": "STIMULUS", "state": "IN_STATE", "row": "IN_ROW",
@@ -47,6 +48,7 @@ def model_header(
         "ROWS": n.output,
         "STATES": n.x,
         "STATE": made.layout.total,
+        "COUNTERS": COUNTERS,
         "VARIABLES": len(faces.variables),
         "IS_PLANT": int(faces.part == "plant"),
         "IS_ECU": int(faces.part == "ecu"),
@@ -100,14 +102,24 @@ def _row(each: Variable) -> str:
     kind = {"parameter": "TUNABLE" if each.is_tunable else "FIXED", "input": "GIVEN"}.get(
         each.causality, "RESULT"
     )
-    low, high = (None, None) if each.leaf is None else finite_range(each.leaf)
-    wanted = "any finite number" if each.leaf is None else each.leaf.range_text
+    if each.leaf is None:
+        low, high = (end if math.isfinite(end) else None for end in each.ends)
+        wanted = _ends(each) or "any finite number"
+    else:
+        (low, high), wanted = finite_range(each.leaf), each.leaf.range_text
     unit = "" if each.unit == "1" else f" {each.unit}"
     return (
         f"{{{text(each.name)}, {text(unit)}, {text(wanted)}, {_PLACES[each.place]}, {kind}, "
         f"{each.index}, {'-HUGE_VAL' if low is None else number(low)}, "
         f"{'HUGE_VAL' if high is None else number(high)}}}"
     )
+
+
+def _ends(each: Variable) -> str:
+    unit = "" if each.unit == "1" else f" {each.unit}"
+    low, high = each.ends
+    parts = [f">= {low:g}{unit}"] * math.isfinite(low)
+    return " and ".join([*parts, *([f"<= {high:g}{unit}"] * math.isfinite(high))])
 
 
 def text(value: str) -> str:

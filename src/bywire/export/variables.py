@@ -33,7 +33,7 @@ class Variable:
     place, index
         Where the C code keeps it.
     unit, label
-        SI unit in the syntax of pint, and what it means.
+        SI unit, and what it means.
     start
         Value before anything is set; None of what is computed.
     leaf
@@ -42,6 +42,8 @@ class Variable:
         Whether a parameter may change during the run: those that the ECU alone reads.
     is_held
         Whether it changes at ticks alone.
+    ends
+        Admissible range of an input whose signal declares one.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Variable:
     leaf: Leaf | None = None
     is_tunable: bool = False
     is_held: bool = False
+    ends: tuple[float, float] = (-math.inf, math.inf)
 
 
 def row_variable(made: Exported, k: int, place: Literal["row", "sampled"]) -> Variable:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import threading
 from collections.abc import Callable, Collection, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from bywire.core.errors import ParameterError, SolverError
+from bywire.core.interrupts import raise_if_stopped, thread_pool
 from bywire.core.typing import Array, Progress
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import NO_TRIAL, Loss, Problem, Solution, estimate, solve
@@ -22,10 +21,6 @@ from bywire.simulation.job_store import JobStore
 _SAME = 0.01  # of the lowest cost: minima that count as one
 _ROUGH = 1e-4  # of the cost: enough to come nearer
 _ENDED = 1e-5  # of the cost: enough to tell minima apart; the best one is polished later
-
-
-class _StoppedError(Exception):
-    """Ends the search in a thread after an interrupt."""
 
 
 @dataclass(frozen=True)
@@ -144,11 +139,9 @@ def search(
     known = _finished(kept)
     keys = _keys(problem, starts, loss) if store is not None else [""] * len(starts)
     solutions = {k: known[key] for k, key in enumerate(keys) if key in known}
-    stop = threading.Event()
 
     def evaluate(values: Array) -> tuple[Array, Array]:
-        if stop.is_set():
-            raise _StoppedError
+        raise_if_stopped()
         return problem.evaluate(values)
 
     guarded = replace(problem, evaluate=evaluate)
@@ -157,26 +150,21 @@ def search(
         return solve(guarded, start if before is None else before(start), loss, share=_ENDED)
 
     failed, refused = 0, None  # type: int, ParameterError | None
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with thread_pool(threads) as pool:
         jobs = {
             pool.submit(solved, start): k for k, start in enumerate(starts) if k not in solutions
         }
-        try:
-            for job in as_completed(jobs):
-                k = jobs[job]
-                try:
-                    solutions[k] = job.result()
-                    kept.append({"key": keys[k], "values": solutions[k].values.tolist(),
-                                 "cost": solutions[k].cost})  # fmt: skip
-                except NO_TRIAL as error:
-                    failed += 1
-                    refused = error if isinstance(error, ParameterError) else refused
-                if progress is not None:
-                    progress("starts", (len(solutions) + failed) / len(starts))
-        except KeyboardInterrupt:
-            stop.set()
-            pool.shutdown(cancel_futures=True)
-            raise
+        for job in as_completed(jobs):
+            k = jobs[job]
+            try:
+                solutions[k] = job.result()
+                kept.append({"key": keys[k], "values": solutions[k].values.tolist(),
+                             "cost": solutions[k].cost})  # fmt: skip
+            except NO_TRIAL as error:
+                failed += 1
+                refused = error if isinstance(error, ParameterError) else refused
+            if progress is not None:
+                progress("starts", (len(solutions) + failed) / len(starts))
     if not solutions and refused is not None:
         raise refused
     if not solutions:

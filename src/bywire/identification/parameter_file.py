@@ -34,8 +34,8 @@ def parameter_file(
     par
         Parameters of that set, for units.
     changes
-        Dotted name -> value, SI, or choice. What the experiment itself sets is left out, and
-        said.
+        Dotted name -> value, SI, or choice. What has no effect in the experiment is left
+        out, and a comment says so.
     comment
         First line.
     """
@@ -52,7 +52,7 @@ def parameter_file(
     lines += [f'experiment = "{experiment}"', f'parameters = "{parameters}"', "", "[set]"]
     lines += [f'"{name}" = {_written(name, value, par)}' for name, value in wanted.items()]
     lines += [
-        f"# the experiment sets this itself: {name} = {_written(name, changes[name], par)}"
+        f"# without effect in this experiment: {name} = {_written(name, changes[name], par)}"
         for name in left_out
     ]
     return "\n".join(lines) + "\n"

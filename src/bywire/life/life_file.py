@@ -21,8 +21,9 @@ from bywire.studies.distribution_section import read_distribution
 from bywire.studies.plan import Varied
 from bywire.studies.vary_section import entries_of, quantities_of, read_varied
 
+WEAR = "wear."
+"""what the names of parameters of wear begin with"""
 _KEYS = ("name", "life", "set", "vary", "projection")
-_WEAR = "wear."
 _MOST = 4096  # stops that stand for a population
 CONDITIONS = StopConditions(pause=600.0, T_air=293.15)
 """a stop every ten minutes at 20 degC"""
@@ -79,7 +80,7 @@ def _plan(content: Mapping[str, Any], name: str, overrides: Mapping[str, str]) -
         {**life.settings, **{k: v for k, v in changes.items() if not _is_of_life(k)}},
     )
     conditions = CONDITIONS.replace(_given(StopConditions, changes, CONDITION))
-    wear = life.defaults().replace(_given(life.wear, changes, _WEAR))
+    wear = life.defaults().replace(_given(life.wear, changes, WEAR))
     population = {k: v for k, v in life.population.items() if k not in changes}
     varied = tuple(_varied(bench, conditions, content.get("vary", population)))
     _require_free(life, bench, wear, varied)
@@ -90,7 +91,7 @@ def _plan(content: Mapping[str, Any], name: str, overrides: Mapping[str, str]) -
 
 
 def _is_of_life(name: str) -> bool:
-    return name.startswith((_WEAR, CONDITION))
+    return name.startswith((WEAR, CONDITION))
 
 
 def _texts(changes: Mapping[str, Any]) -> dict[str, str]:

@@ -16,7 +16,9 @@ from bywire.core.units import shown
 from bywire.core.validity import first, row_by_row
 
 Convection = Annotated[float, Unit("W/(m**2*K)", 10.0), Field(ge=0, allow_inf_nan=False)]
-Cooling = Annotated[float, Signal("W", "cooling by air", role=Role("sink", "air", book="heat"))]
+Cooling = Annotated[
+    float, Signal("W", "cooling by air", role=Role("sink", "air", book="heat", returns="any"))
+]
 Kelvin = Annotated[float, Signal("K", "temperature", 400.0), Ge(0)]
 _STANDS = 1e-9  # of v_ref: below, the power of the speed is 0 and has no slope
 

@@ -25,9 +25,12 @@ from bywire.core.validity import first, row_by_row
 
 BOOK = "motor heat"
 COPPER = Role("source", "copper", book=BOOK)
-WINDING, HOUSING = (Role("sink", label, book=BOOK) for label in ("winding", "housing"))
+WINDING, HOUSING = (
+    Role("sink", label, book=BOOK, returns="any") for label in ("winding", "housing")
+)
 Conducted = Annotated[
-    float, Signal("W", "heat of motors to the air", role=Role("sink", "air", book=BOOK))
+    float,
+    Signal("W", "heat of motors to the air", role=Role("sink", "air", book=BOOK, returns="any")),
 ]
 Kelvin = Annotated[float, Signal("K", "temperature", 400.0), Ge(0)]
 

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Length, Unit
 from bywire.core.signals import Energy, Power, Role, Signal
+from bywire.core.typing import Array
+from bywire.core.validity import first, highest, row_by_row
 
 BodyMass = Annotated[float, Unit("kg", 250.0), Field(gt=0, allow_inf_nan=False)]
 BodyInertia = Annotated[float, Unit("kg*m**2", 35.0), Field(ge=0, allow_inf_nan=False)]
 Sine = Annotated[float, Signal("1", "sine of the slope", 0.05)]
 Cosine = Annotated[float, Signal("1", "cosine of the slope", 1.0)]
 Drag = Annotated[float, Signal("W", "air drag", role=Role("sink", "air drag", book="vehicle"))]
+_LEAST_FACTOR = 1e-9  # below, the load lies at one of its ends
 
 
 class Parameters(ParameterSet):
@@ -135,12 +139,12 @@ def rear_load(
     cosine: Cosine,
     par: Parameters,
 ) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
-    r"""Return the load that holds the body level, >= 0.
+    r"""Return the load that holds the body level, between nothing and the whole weight.
 
     .. math:: N_r = (m g l_f \cos\gamma - F h - F_d (h - h_a))/L
     """
     carried = F * par.h + F_d * (par.h - par.h_a)
-    return ops.fmax(static_load(cosine, par) - carried / par.L, 0.0)
+    return carried_load(static_load(cosine, par) - carried / par.L, cosine, par)
 
 
 def rigid_rear_load(
@@ -150,10 +154,30 @@ def rigid_rear_load(
     cosine: Cosine,
     par: Parameters,
 ) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
-    """Return `rear_load` where the braking forces follow the loads at once."""
+    r"""Return `rear_load` where the braking forces follow the loads at once.
+
+    .. math::
+        N_r \left(1 + (\mu_r - \mu_f) h/L\right)
+            = (m g \cos\gamma\, (l_f - \mu_f h) - F_d (h - h_a))/L
+
+    Load on the rear wheel is missing on the front one, whose force then pitches less. Where the
+    factor on the left is not positive, no load between the ends is stable: a rear wheel that sinks
+    a little sinks further. It then carries nothing where the right-hand side is negative, and the
+    whole weight where that is positive.
+    """
     carried = mu_f * par.m * par.g * cosine * par.h + F_d * (par.h - par.h_a)
     left = static_load(cosine, par) - carried / par.L
-    return ops.fmax(left / (1.0 + (mu_r - mu_f) * par.h / par.L), 0.0)
+    factor = ops.fmax(1.0 + (mu_r - mu_f) * par.h / par.L, _LEAST_FACTOR)
+    return carried_load(left / factor, cosine, par)
+
+
+def carried_load(
+    N_r: Annotated[float, Signal("N", "load that holds the body level", 1e3)],
+    cosine: Cosine,
+    par: Parameters,
+) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
+    """Return a load of the rear wheel with which neither wheel pulls on the road."""
+    return ops.clip(N_r, 0.0, par.m * par.g * cosine)
 
 
 def loads(
@@ -218,3 +242,17 @@ def pitch_power(x: State, u: Input, par: Parameters) -> Power:
 def power_loss(x: State, par: Parameters) -> Drag:
     """Return the power of the air drag, >= 0."""
     return drag(x, par) * x.v
+
+
+@row_by_row
+def watch(t: Array, x: State, par: Parameters) -> list[str]:
+    r"""Return whether the body falls over its front wheel.
+
+    At the pitch :math:`\arctan(l_f/h)` the center of gravity is above the front contact. Beyond,
+    gravity pitches the body further, whatever the brakes do.
+    """
+    limit = np.degrees(np.arctan2(par.l_f, par.h))
+    pitch = np.degrees(x.phi)
+    most = f" (pitch up to {highest(pitch):.3g} deg, limit {highest(limit):.3g} deg)"
+    text = "the rider goes over the handlebar: the center of gravity passes the front wheel"
+    return first(t, np.greater(pitch, limit), text, f"{most}, and what follows is no longer a stop")

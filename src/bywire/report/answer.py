@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
+import os
+import sys
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -188,12 +191,15 @@ def with_files(document: Document, files: list[Path]) -> dict[str, Any]:
 
 
 def leave_out_descriptions() -> None:
-    """Have matplotlib do without descriptions of all that can be set.
+    """Load matplotlib without descriptions of all that can be set.
 
     It makes signatures and docstrings of every artist's properties when it is loaded, which takes
-    a third of that time, and no command shows them.
+    a third of that time, and no command shows them. Settings of a file ``matplotlibrc`` in the
+    working folder, which may have figures set by another program (TeX), do not count.
     """
-    from matplotlib import artist
+    is_set_here = os.path.exists("matplotlibrc")
+    with contextlib.chdir(sys.prefix) if is_set_here else contextlib.nullcontext():
+        from matplotlib import artist
 
     of_all: Any = artist.Artist
     setattr(artist, "kwdoc", lambda _: "")  # noqa: B010 - a function is no variable to mypy

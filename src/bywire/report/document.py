@@ -157,6 +157,29 @@ def recording_file(name: str, data: xr.Dataset) -> Attachment:
 
 
 @dataclass(frozen=True)
+class Change:
+    """A value that the user set, and that is not what it would be otherwise.
+
+    Parameters
+    ----------
+    name
+        What ``--set`` calls it.
+    now, before
+        Both values as text with unit.
+    of
+        What it changes: the name of a parameter set, or whose defaults.
+    where
+        Where the value before comes from.
+    """
+
+    name: str
+    now: str
+    before: str
+    of: str
+    where: str = ""
+
+
+@dataclass(frozen=True)
 class Document:
     """What a result has to say.
 
@@ -191,6 +214,11 @@ class Document:
         File of the page.
     has_files
         Whether it may be written into a folder; its JSON object then lists the files.
+    headline
+        What a reader must know first: the first words on a terminal and of the JSON object.
+    changes
+        What the user changed, which a terminal shows first and the JSON object has by name; None
+        where nothing can be. A page has it where its sections put it (`bywire.report.changes`).
     """
 
     title: str
@@ -208,6 +236,8 @@ class Document:
     is_paged: bool = True
     page_name: str = "report.html"
     has_files: bool = True
+    headline: str = ""
+    changes: Sequence[Change] | None = None
 
     @cached_property
     def page(self) -> Sequence[Section]:
@@ -217,7 +247,14 @@ class Document:
     @cached_property
     def facts(self) -> Mapping[str, Any]:
         """The JSON object, made on first use."""
-        return self.data() if callable(self.data) else self.data
+        data = self.data() if callable(self.data) else self.data
+        data = {"headline": self.headline, **data} if self.headline else data
+        if self.changes is None:
+            return data
+        return {**data, "changes": {
+            each.name: {"value": each.now, "instead_of": each.before, "of": each.of}
+            for each in self.changes
+        }}  # fmt: skip
 
     def flat(self) -> Iterator[Flat]:
         """Yield the blocks of all sections, folded ones among them."""

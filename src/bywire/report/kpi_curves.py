@@ -95,7 +95,7 @@ def kpi_curves(varied: Varied) -> Figure:
 def _curves(varied: Varied) -> dict[str, tuple[Array, Array, str]]:
     """Return value and error by case, and unit, of every key figure by name."""
     units = {kpi.name: kpi.unit for result in varied.results for kpi in result.kpis}
-    each = [{kpi.name: (kpi.value, kpi.error) for kpi in r.kpis} for r in varied.results]
+    each = [{kpi.name: (kpi.value, kpi.bound) for kpi in r.kpis} for r in varied.results]
     lacking = (math.nan, math.nan)
     return {
         name: (*np.array([known.get(name, lacking) for known in each]).T, unit)

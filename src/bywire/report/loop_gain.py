@@ -46,12 +46,20 @@ def _spans(upper: Axes, lower: Axes, worst: LoopCurve) -> None:
         lower.plot([margins.phase_at] * 2, [-180.0, margins.phase - 180.0], color=style.GREEN,
                    linewidth=2.2, zorder=4)  # fmt: skip
         _line(upper, lower, margins.phase_at, style.GREEN, text)
-    if math.isfinite(margins.gain):
-        at = worst.phase_crossover
-        text = f"gain margin {margins.gain:.3g} at {at:.3g} Hz"
-        upper.plot([at] * 2, [-20.0 * math.log10(margins.gain), 0.0], color=style.PURPLE,
-                   linewidth=2.2, zorder=4)  # fmt: skip
-        _line(upper, lower, at, style.PURPLE, text)
+    factors = (
+        ("gain margin", margins.gain, margins.gain_at, style.PURPLE),
+        ("lower gain margin", margins.lower_gain, margins.lower_gain_at, style.SKY),
+    )
+    for name, factor, at, color in factors:
+        if not 0.0 < factor < math.inf:
+            continue
+        text = f"{name} {factor:.3g} at {at:.3g} Hz"
+        if at > 0.0:  # rest lies beyond the axis
+            upper.plot([at] * 2, [-20.0 * math.log10(factor), 0.0], color=color,
+                       linewidth=2.2, zorder=4)  # fmt: skip
+            _line(upper, lower, at, color, text)
+        else:
+            upper.plot([], [], color=color, linestyle="--", label=text)
 
 
 def _line(upper: Axes, lower: Axes, frequency: float, color: str, text: str) -> None:

@@ -88,8 +88,14 @@ def _crossings(axes: Axes, worst: LoopCurve) -> None:
     if math.isfinite(margins.crossover):
         axes.plot(margins.phase - 180.0, 0.0, "o", color=style.BLACK, markersize=5, zorder=5,
                   linestyle="none", label=f"phase margin {margins.phase:.3g}°")  # fmt: skip
-    if math.isfinite(margins.gain):
-        phase = float(np.interp(worst.phase_crossover, worst.frequency, worst.phase))
+    factors = (
+        ("gain margin", "s", margins.gain, margins.gain_at),
+        ("lower gain margin", "D", margins.lower_gain, margins.lower_gain_at),
+    )
+    for name, mark, factor, frequency in factors:
+        if not 0.0 < factor < math.inf:
+            continue
+        phase = float(np.interp(frequency, worst.frequency, worst.phase))
         at = 360.0 * round((phase - 180.0) / 360.0) + 180.0  # the odd half turn next to it
-        axes.plot(at, -20.0 * math.log10(margins.gain), "s", color=style.BLACK, markersize=5,
-                  zorder=5, linestyle="none", label=f"gain margin {margins.gain:.3g}")  # fmt: skip
+        axes.plot(at, -20.0 * math.log10(factor), mark, color=style.BLACK, markersize=5,
+                  zorder=5, linestyle="none", label=f"{name} {factor:.3g}")  # fmt: skip

@@ -74,8 +74,12 @@ def _crossings(axes: Axes, worst: LoopCurve) -> None:
                   linestyle="none",
                   label=f"phase margin {margins.phase:.3g}° at {margins.phase_at:.3g} Hz",
                   )  # fmt: skip
-    if math.isfinite(margins.gain):
-        axes.plot(-1.0 / margins.gain, 0.0, "s", color=style.BLACK, markersize=5, zorder=5,
-                  linestyle="none",
-                  label=f"gain margin {margins.gain:.3g} at {worst.phase_crossover:.3g} Hz",
-                  )  # fmt: skip
+    factors = (
+        ("gain margin", "s", margins.gain, margins.gain_at),
+        ("lower gain margin", "D", margins.lower_gain, margins.lower_gain_at),
+    )
+    for name, mark, factor, at in factors:
+        if 0.0 < factor < math.inf:
+            axes.plot(-1.0 / factor, 0.0, mark, color=style.BLACK, markersize=5, zorder=5,
+                      linestyle="none", label=f"{name} {factor:.3g} at {at:.3g} Hz",
+                      )  # fmt: skip

@@ -57,7 +57,7 @@ class KpiRow:
     Parameters
     ----------
     name, value, unit
-        What it is called, its value in ``unit`` (``None`` for none) and the unit in pint's syntax.
+        What it is called, its value in ``unit`` (``None`` for none) and the unit.
     definition
         How it is computed.
     limit
@@ -68,6 +68,8 @@ class KpiRow:
         How far the value may be off, in ``unit``; NaN where that was not estimated.
     stated, where
         What a source states of it, as text, and its place there; empty for nothing.
+    converges
+        Whether runs in several steps show an order; else ``error`` bounds what is not known.
     """
 
     name: str
@@ -79,6 +81,7 @@ class KpiRow:
     error: float = math.nan
     stated: str = ""
     where: str = ""
+    converges: bool = True
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,7 @@ class ReproductionRow:
     stated, computed
         Values in ``unit``; ``None`` where nothing is stated or computed.
     unit
-        Unit in pint's syntax.
+        Unit.
     tolerance
         Text, or a number in ``unit``; ``None`` for none; ``"<="`` or ``">="`` where the statement
         is a bound, which is then shown before it.
@@ -126,7 +129,7 @@ class ParameterRow:
     Parameters
     ----------
     name, value, unit
-        Dotted name, value in the SI ``unit`` of pint's syntax; a choice or a table may be a value.
+        Dotted name, value in the SI ``unit``; a choice or a table may be a value.
     range
         Admissible range as text.
     kind
@@ -162,7 +165,7 @@ def kpi_table(rows: Iterable[KpiRow]) -> Table:
             (
                 Cell(clean(row.name)),
                 Cell(measured_amount(row.value, row.unit, row.error)),
-                *((Cell(error_text(row.value, row.unit, row.error)),) * estimated),
+                *((Cell(error_text(row.value, row.unit, row.error, row.converges)),) * estimated),
                 *((Cell(clean(row.limit) or "-"), OUTCOMES[row.outcome]) * limited),
                 *((Cell(clean(row.stated) or "-"),) * stated),
                 *((Cell(clean(row.where) or "-"),) * placed),

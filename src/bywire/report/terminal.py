@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import shutil
 import textwrap
+from collections.abc import Sequence
 
-from bywire.report.document import Document, Drawing, FigureBlock, Flat, Listing, Paragraph
+from bywire.report.document import (
+    Change,
+    Document,
+    Drawing,
+    FigureBlock,
+    Flat,
+    Listing,
+    Paragraph,
+)
 from bywire.report.tables import Table
 
 WIDTH = 100
@@ -15,13 +24,29 @@ NARROWEST = 12
 """least width of a column that is wrapped"""
 LONGEST_WORD = 40
 """longest word that is never broken"""
+LONGEST_VALUE = 60
+"""characters of a value, such as a table, that a sentence on changes shows"""
 
 
 def terminal_text(document: Document) -> str:
     """Return what a terminal shows of a document; figures are left out."""
     shown = (each for each in document.brief if not isinstance(each, FigureBlock | Drawing))
-    texts = [_text(block) for block in shown]
-    return "\n".join(text for text in texts if text is not None)
+    first = [_text(Paragraph(document.headline)), ""] if document.headline else []
+    changed = [_bullet(text) for text in change_texts(document.changes or ())]
+    return "\n".join([*first, *changed, *map(_text, shown)])
+
+
+def change_texts(changes: Sequence[Change]) -> list[str]:
+    """Return a sentence on what was changed of each parameter set and of all defaults."""
+    texts: dict[str, list[str]] = {}
+    for each in changes:
+        now, before = (_shortened(text) for text in (each.now, each.before))
+        texts.setdefault(each.of, []).append(f"{each.name} = {now} (was {before})")
+    return [f"changed from {of}: {', '.join(each)}" for of, each in texts.items()]
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}..."
 
 
 def _text(block: str | Flat) -> str:

@@ -65,7 +65,7 @@ def amount(
     value
         Number in ``symbol``; ``None`` where there is none, NaN where it is not defined.
     symbol
-        Unit in the syntax of pint; SI units are shown in their display unit.
+        Unit; SI units are shown in their display unit.
     digits
         Significant digits.
     like
@@ -107,7 +107,7 @@ def measured_amount(value: float | None, symbol: str, error: float, digits: int 
     value
         Number in ``symbol``; ``None`` where there is none, NaN where it is not defined.
     symbol
-        Unit in the syntax of pint; SI units are shown in their display unit.
+        Unit; SI units are shown in their display unit.
     error
         How far the value may be off, in ``symbol``; NaN where that is not known.
     digits
@@ -139,8 +139,12 @@ def measured_amount(value: float | None, symbol: str, error: float, digits: int 
     return figures + (f" {written}" if written else "")
 
 
-def error_text(value: float | None, symbol: str, error: float) -> str:
+def error_text(
+    value: float | None, symbol: str, error: float, converges: bool = True
+) -> str:
     """Return an error in one digit, in the unit in which `measured_amount` writes the value.
+
+    ``converges``: whether it is an error, rather than a bound of one that is not known.
 
     Examples
     --------
@@ -153,7 +157,8 @@ def error_text(value: float | None, symbol: str, error: float) -> str:
         return "unknown"
     number, unit = _readable_difference(error, value, symbol)
     written = unit_text(unit)
-    return f"{float(f'{number:.1g}'):g}" + (f" {written}" if written and number else "")
+    text = f"{float(f'{number:.1g}'):g}" + (f" {written}" if written and number else "")
+    return text if converges or not number else f"up to {text}"
 
 
 def _readable_difference(number: float, value: float, symbol: str) -> tuple[float, str]:

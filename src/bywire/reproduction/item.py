@@ -28,7 +28,7 @@ class Allowance:
     size
         Largest difference that counts as agreement.
     unit
-        Unit of ``size`` in pint's syntax, or `SHARE`.
+        Unit of ``size``, or `SHARE`.
     reason
         Why so much and not more.
     """
@@ -52,7 +52,7 @@ class Fact:
     value
         The number in ``unit``, as printed.
     unit
-        Unit as the source prints it, in pint's syntax; ``"1"`` for a pure number.
+        Unit as the source prints it; ``"1"`` for a pure number.
     where
         Place in the source.
     kind

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
 from bywire.bench.running import Progress
+from bywire.core.interrupts import thread_pool
 from bywire.core.registry import Kind, instances
 from bywire.report.answer import Answer
 from bywire.report.document import (
@@ -250,7 +250,7 @@ def reproduced(
     RunError
         When a run fails.
     KeyboardInterrupt
-        When interrupted, once the runs that have begun are through.
+        When interrupted.
     """
 
     def made(label: str) -> Part:
@@ -259,14 +259,9 @@ def reproduced(
         runs.report(label, 1.0)
         return part
 
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, _THREADS)) as pool:
+    with thread_pool(min(os.cpu_count() or 1, _THREADS)) as pool:
         jobs = [pool.submit(made, label) for label in parts]
-        try:
-            finished = tuple(job.result() for job in jobs)
-        except BaseException:
-            runs.stop()
-            pool.shutdown(cancel_futures=True)
-            raise
+        finished = tuple(job.result() for job in jobs)
     whole = replace(source, parts=finished)
     return replace(whole, causes=causes(whole.items))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from concurrent.futures import CancelledError, Future
+from concurrent.futures import Future
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import xarray as xr
 from bywire.bench.bench import Bench
 from bywire.bench.result import Result
 from bywire.bench.running import Progress, run
+from bywire.core.interrupts import raise_if_stopped
 
 
 class Runs:
@@ -27,11 +28,7 @@ class Runs:
     def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
         self._known: dict[str, Future[Result]] = {}
-        self._lock, self._stop = threading.Lock(), threading.Event()
-
-    def stop(self) -> None:
-        """Begin no further run: who asks for one, from any thread, gets a CancelledError."""
-        self._stop.set()
+        self._lock = threading.Lock()
 
     def report(self, label: str, share: float) -> None:
         """Tell how far a piece of work is."""
@@ -60,9 +57,7 @@ class Runs:
         RunError
             When a run fails.
         KeyboardInterrupt
-            When the user stopped a run: half a reproduction is none.
-        CancelledError
-            When no further run is to begin.
+            When the user stopped a run, or another part failed: half a reproduction is none.
         """
         bench = Bench(experiment, name, overrides or {}, options or {}, stimulus or {})
         key = repr(bench)
@@ -77,8 +72,7 @@ class Runs:
         return result.result()
 
     def _run(self, bench: Bench) -> Result:
-        if self._stop.is_set():
-            raise CancelledError
+        raise_if_stopped()
         result = run(bench)
         if result.status == "interrupted":
             raise KeyboardInterrupt

@@ -9,12 +9,11 @@ from typing import Any, Literal
 
 from bywire.bench.bench_text import PATHS
 from bywire.core.errors import ParameterError, quoted, unknown_name
-from bywire.core.pairs import changes, named
+from bywire.core.pairs import changes, named, read_count
 from bywire.server.contents import Contents
 from bywire.server.place import Place, require_inside
 
 _LONGEST = 20_000  # characters of a field
-_DIGITS = 9
 
 Kind = Literal[
     "text", "whole", "lines", "pairs", "changes", "names", "flag", "choice", "file", "files",
@@ -118,12 +117,12 @@ class Field:
     def _whole(self, text: str) -> int | None:
         if not text:
             return self.default
-        is_whole = text.isascii() and text.isdecimal() and len(text) <= _DIGITS
-        if not is_whole or int(text) < self.least:
+        number = read_count(text)
+        if number is None or number < self.least:
             raise ParameterError(
                 f"{self.label} = {quoted(text)}: a whole number from {self.least} on is wanted"
             )
-        return int(text)
+        return number
 
     def _thing(self, text: str, place: Place) -> str:
         """Return a thing that is known by its name, or lies in the folder."""

@@ -16,6 +16,8 @@ from typing import Final
 from bywire.server.address import HERE, NAMES
 from bywire.server.refusal import RefusedError
 
+_PLAIN: Final = 80
+"""the port of HTTP, which addresses leave out"""
 _HERE: Final = ("same-origin", "none")
 
 
@@ -37,9 +39,10 @@ def require_place(method: str, headers: Message, port: int) -> None:
     RefusedError
         With status 421 for a foreign Host, and 403 for a foreign page.
     """
-    known = {f"{name}:{port}" for name in NAMES}
-    host = headers.get("Host", "")
-    if host not in known:
+    host = headers.get("Host", "").lower()
+    if port == _PLAIN:
+        host = host.removesuffix(f":{port}")  # browsers leave it out, others may not
+    if host not in {name if port == _PLAIN else f"{name}:{port}" for name in NAMES}:
         raise RefusedError(
             421, f"this server answers as {HERE}:{port} only: open the link that it printed"
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import shutil
 import socket
@@ -15,7 +16,8 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import parse_qsl, unquote, urlsplit
 
-from bywire.core.errors import BywireError
+from bywire.core.clean_text import shortened
+from bywire.core.errors import BywireError, quoted
 from bywire.core.version import __version__
 from bywire.server import guard
 from bywire.server.exchange import REFUSAL, Reply, Request
@@ -64,6 +66,8 @@ class Handler(BaseHTTPRequestHandler):
         except (ConnectionError, TimeoutError):
             return self._refused(408, "the request did not come to its end: send it again")
         except OSError as error:
+            if error.errno in (errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL):
+                return self._refused(404, "there is no such file: its name is not a valid one")
             place = f"{error.filename}: " if error.filename else ""
             return self._refused(507, f"{place}{error.strerror or error}: make room there")
         except Exception as error:  # a defect ends a request, not the server
@@ -76,7 +80,10 @@ class Handler(BaseHTTPRequestHandler):
     def _answered(self) -> Reply:
         port = int(self.connection.getsockname()[1])
         guard.require_place(self.command, self.headers, port)
-        address = urlsplit(self.path)
+        try:
+            address = urlsplit(self.path)
+        except ValueError:  # brackets that hold no address, for instance
+            raise RefusedError(400, f"{quoted(self.path)} is not a valid address") from None
         query = dict(parse_qsl(address.query, keep_blank_values=True))
         guard.require_token(self.headers, query, port, self.service.token)
         if self.command not in METHODS:
@@ -114,6 +121,7 @@ class Handler(BaseHTTPRequestHandler):
         return _Body(self)
 
     def _refused(self, status: int, text: str, field: str = "") -> Reply:
+        text = shortened(text)
         if self.path.startswith("/api/"):
             body = json.dumps({"error": text, **({"field": field} if field else {})}).encode()
             return Reply(body, "application/json", status, REFUSAL)

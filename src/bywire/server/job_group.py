@@ -6,19 +6,14 @@ import contextlib
 import os
 import signal
 import subprocess
-import sys
+from pathlib import Path
+
+from bywire.core.child_process import start_python
 
 
-def started() -> subprocess.Popen[bytes]:
-    """Return a new process that waits for its order."""
-    paths = os.pathsep.join(path for path in sys.path if path)
-    return subprocess.Popen(
-        # -P: a module in the folder that is served must not run in place of a library's.
-        [sys.executable, "-P", "-m", "bywire.server.job_process"],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": paths},
-        start_new_session=True,  # Ctrl-C reaches the server, which ends its jobs
-    )  # fmt: skip
+def started(folder: Path) -> subprocess.Popen[bytes]:
+    """Return a new process that waits for its order; no code of the served folder runs in it."""
+    return start_python("bywire.server.job_process", untrusted=(folder,))
 
 
 def interrupt(process: subprocess.Popen[bytes]) -> None:

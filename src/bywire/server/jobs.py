@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from bywire.core.brake import loaded_files
+from bywire.core.pairs import read_count
 from bywire.server.job_group import interrupt, kill, started
 from bywire.server.place import Place
 from bywire.server.refusal import RefusedError
@@ -138,7 +139,7 @@ class Jobs:
             With status 404 where there is none.
         """
         with self._lock:
-            job = self._jobs.get(int(number)) if number.isdecimal() and len(number) < 9 else None
+            job = self._jobs.get(read_count(number) or 0)
         if job is None:
             raise RefusedError(404, f"there is no job {number[:20]!r}: see the list of jobs")
         return job
@@ -166,7 +167,7 @@ class Jobs:
 
     def _folder(self, task: Task, asked: Mapping[str, Any]) -> Path:
         if task.is_kept:
-            return self._place.same_folder(task.stem(asked))
+            return self._place.same_folder(task.said_of(asked))
         return self._place.fresh_folder(_name(task, asked))
 
     def _run(self, job: Job) -> None:
@@ -186,7 +187,7 @@ class Jobs:
             if job.is_unwanted:
                 job.state = "canceled"
                 return
-            job.state, job.process = "running", started()
+            job.state, job.process = "running", started(self._place.root)
         order = {
             "task": job.task.name, "asked": dict(job.asked), "folder": str(self._place.root),
             "out": str(job.out), "systems": list(loaded_files()),

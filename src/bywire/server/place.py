@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
+import threading
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from glob import escape
 from pathlib import Path, PurePosixPath
 
 from bywire.core.errors import FileError
+from bywire.core.scratch import claim
 from bywire.server.refusal import RefusedError
 
 RESULTS, MEASUREMENTS = "results", "measurements"
 _LONGEST = 100  # characters of the name of a file that was dropped
+_LONGEST_FOLDER = 60  # characters of the name of a result's folder, of four bytes at most
 _PLAIN = re.compile(r"[^A-Za-z0-9._-]+")
+
+
+_claiming = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -45,9 +53,13 @@ class Place:
             raise self.unknown(text)
         try:
             path = (self.root / text).resolve()
-        except (OSError, RuntimeError, ValueError):  # a circle of links
+            with suppress(FileNotFoundError, NotADirectoryError):
+                path.lstat()
+        except (OSError, RuntimeError, ValueError):  # a circle of links, too long a name
             raise self.unknown(text) from None
         if not path.is_relative_to(self.root):
+            raise self.unknown(text)
+        if any(each.startswith(".") for each in path.relative_to(self.root).parts):  # by a link
             raise self.unknown(text)
         return path
 
@@ -95,10 +107,10 @@ class Place:
             return folder
         raise FileError(f"{parent} holds 9,999 results of {stem}: move them elsewhere")
 
-    def same_folder(self, stem: str) -> Path:
-        """Return the one folder of a result that is gone on with."""
+    def same_folder(self, name: str) -> Path:
+        """Return the one folder of a file's result that is gone on with."""
         self._made(RESULTS)
-        return self.inside(f"{RESULTS}/{stem}")
+        return self.inside(f"{RESULTS}/{folder_name(name)}")
 
     def folders(self, stem: str) -> list[Path]:
         """Return the folders of results of a name, the latest first."""
@@ -109,14 +121,38 @@ class Place:
         }
         return [found[number] for number in sorted(found, reverse=True)]
 
-    def fresh_file(self, name: str) -> Path:
-        """Return where a measurement of a name is kept; nothing that is there is replaced."""
-        parent, plain = self._made(MEASUREMENTS), Path(safe_name(name))
-        for number in range(1, 10_000):
-            path = parent / (plain.name if number == 1 else f"{plain.stem}-{number}{plain.suffix}")
-            if not os.path.lexists(path):
-                return path
-        raise FileError(f"{parent} holds 9,999 files named {plain.name}: move them elsewhere")
+    def measurements(self) -> Path:
+        """Return the folder of measurements that were dropped.
+
+        Raises
+        ------
+        FileError
+            When it cannot be made.
+        """
+        return self._made(MEASUREMENTS)
+
+    def kept(self, fresh: Path, name: str) -> Path:
+        """Give a measurement, written beside the others, the first free name; return its place.
+
+        Nothing is ever replaced, also where several files of one name arrive at once. Names that
+        differ in upper and lower case alone count as one, for the systems on which they are.
+
+        Raises
+        ------
+        FileError
+            When all names are taken.
+        OSError
+            When the folder cannot be written to.
+        """
+        parent, plain = self.measurements(), Path(safe_name(name))
+        numbered = (f"{plain.stem}-{number}{plain.suffix}" for number in range(2, 10_000))
+        with _claiming:
+            taken = {each.casefold() for each in os.listdir(parent)}
+            names = (each for each in (plain.name, *numbered) if each.casefold() not in taken)
+            path = claim(fresh, (parent / each for each in names))
+        if path is None:
+            raise FileError(f"{parent} holds 9,999 files named {plain.name}: move them elsewhere")
+        return path
 
     def _made(self, name: str) -> Path:
         folder = self.inside(name)
@@ -125,6 +161,27 @@ class Place:
         except OSError as error:
             raise _unwritable(folder, error) from None
         return folder
+
+
+def folder_name(name: str) -> str:
+    """Return what the folder of a file's result is called: no two files of a folder share one.
+
+    Where the file lies deeper, ``~1`` stands for the slash, as in JSON pointers.
+
+    Examples
+    --------
+    >>> folder_name("tol.toml"), folder_name("a/tol.toml"), folder_name("a~1tol.toml")
+    ('tol', 'a~1tol', 'a~01tol')
+    """
+    return shortened(name.removesuffix(".toml").replace("~", "~0").replace("/", "~1"))
+
+
+def shortened(name: str) -> str:
+    """Return a name that is short enough for a folder; long ones end in a digest of the whole."""
+    if len(name) <= _LONGEST_FOLDER:
+        return name
+    digest = hashlib.sha256(name.encode(errors="replace")).hexdigest()[:8]
+    return f"{name[: _LONGEST_FOLDER - 9]}-{digest}"
 
 
 def safe_name(name: str) -> str:

@@ -8,15 +8,16 @@ from pathlib import Path
 from typing import Final
 
 from bywire.core.errors import ParameterError, quoted, unknown_name
-from bywire.server.contents import contents
+from bywire.server.contents import REPORT, contents
 from bywire.server.exchange import LIVE, SANDBOX, Reply, Request, page, plain
 from bywire.server.field import is_file_name
 from bywire.server.live_pages import experiments
 from bywire.server.pages.bench_page import bench_page
 from bywire.server.pages.index_page import index_page
+from bywire.server.pages.report_page import report_page
 from bywire.server.pages.study_page import study_page
 from bywire.server.pages.task_page import task_page
-from bywire.server.place import RESULTS, Place
+from bywire.server.place import RESULTS, Place, folder_name
 from bywire.server.refusal import RefusedError
 from bywire.server.service import Service
 from bywire.server.shown_bench import shown_bench
@@ -103,7 +104,7 @@ def _study(service: Service, request: Request, rest: str) -> Reply:
     service.place.file(name)
     if name not in there.studies:
         raise ParameterError(f"{name} is no study file: it has no bench and section [vary]")
-    folder = f"{RESULTS}/{Path(name).stem}"
+    folder = f"{RESULTS}/{folder_name(name)}"
     said = how_far(service.place.root / folder)
     text = study_page(name, there.studies[name], f"{folder}/report.html", said, there,
                       service.largest)  # fmt: skip
@@ -111,9 +112,11 @@ def _study(service: Service, request: Request, rest: str) -> Reply:
 
 
 def _file(service: Service, request: Request, rest: str) -> Reply:
-    del request
     path = service.place.file(rest)
     kind = _KINDS.get(path.suffix.lower())
+    if path.suffix.lower() == REPORT and request.headers.get("Sec-Fetch-Dest") == "document":
+        # Alone in a tab, a page may lead that to another site, with what it knows in the address.
+        return page(report_page(service.place.named(path)))
     if kind is None:
         saved = {"Content-Disposition": "attachment"}
         return Reply(path, "application/octet-stream", policy=SANDBOX, headers=saved)

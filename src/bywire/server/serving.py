@@ -22,6 +22,7 @@ from bywire.server.service import LARGEST_FILE, Service, service_of
 
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
+    request_queue_size = 128  # connections that wait: by the standard library's 5, many are cut off
     allow_reuse_address = os.name == "posix"  # elsewhere it lets two servers share a port
     handle_error = quiet_error  # type: ignore[assignment]
 

@@ -13,10 +13,8 @@ from bywire.core.errors import InputError, unknown_name
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
 from bywire.server.field import Field
-from bywire.server.place import Place
+from bywire.server.place import Place, shortened
 from bywire.server.refusal import RefusedError
-
-_LONGEST = 60  # characters of the name of a result's folder
 
 
 @dataclass(frozen=True)
@@ -95,8 +93,8 @@ class Task:
         """Return what the folder of its result is called by."""
         subject = asked[self.subject]
         if isinstance(subject, list):
-            return "-".join(Path(each).stem for each in subject)[:_LONGEST]
-        return Path(str(subject)).stem
+            return shortened("-".join(Path(each).stem for each in subject))
+        return shortened(Path(str(subject)).stem)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bywire.core.scratch import replacing
+from bywire.core.scratch import scratch_folder
 from bywire.server.contents import endings
 from bywire.server.exchange import Request
 from bywire.server.place import Place, safe_name
@@ -36,13 +36,15 @@ def uploaded(place: Place, request: Request, name: str, largest: int) -> Path:
     request.require_length(largest, "a measurement")
     if request.length == 0:
         raise RefusedError(400, f"{name[:100]!r} is empty: was the recording stopped?")
-    path = place.fresh_file(name)
-    with replacing(path) as fresh, fresh.open("wb") as stream:
-        left = request.length
-        while left:
-            piece = request.body.read(min(left, _PIECE))
-            if not piece:
-                raise RefusedError(400, f"{name[:100]!r} did not come to its end: send it again")
-            stream.write(piece)
-            left -= len(piece)
-    return path
+    with scratch_folder(place.measurements()) as scratch:
+        fresh = scratch / "measurement"
+        with fresh.open("wb") as stream:
+            left = request.length
+            while left:
+                piece = request.body.read(min(left, _PIECE))
+                if not piece:
+                    what = f"{name[:100]!r} did not come to its end: send it again"
+                    raise RefusedError(400, what)
+                stream.write(piece)
+                left -= len(piece)
+        return place.kept(fresh, name)

@@ -18,7 +18,7 @@ from bywire.simulation.compiler import IN_TURN, VECTOR, Compiler, find_compiler,
 from bywire.simulation.engine import CUDA, Prepared, built_once, engine_names
 from bywire.simulation.kernel_cache import load
 from bywire.simulation.layout import Layout
-from bywire.simulation.native import Ends, plan_array, pointer
+from bywire.simulation.native import Ends, plan_array, pointer, run_in_calls
 from bywire.simulation.schedule import Schedule
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class LaneKernel:
         self.lanes, self.at_once = int(loaded.bw_lanes()), os.cpu_count() or 1
         self.label = f"compiled C in {self.lanes} lanes, {compiler.label}"
         self._run = loaded[self.ENTRY]
-        self._run.restype = None
+        self._run.restype = ctypes.c_int64
 
     @classmethod
     def of(
@@ -143,18 +143,23 @@ class LaneKernel:
         own = stimulus.ndim == 3
         apart = [stride // rows.itemsize for stride in rows.strides]
         at = (-1, -1, 0) if ends is None else (*ends.frames, ends.values.strides[0] // 8)
-        plan = np.concatenate(
-            (plan_array(schedule, begin, end, self._signals), [int(own), len(rows), *apart, *at])
-        ).astype(np.int64)
-        self._run(
-            pointer(parameters),
-            ctypes.c_double(schedule.step),
-            pointer(stimulus),
-            pointer(vector),
-            pointer(plan),
-            ctypes.c_void_p(rows.ctypes.data),
-            ctypes.c_void_p(None if ends is None else ends.values.ctypes.data),
-        )
+
+        def call(first: int, last: int, row: int) -> int:
+            plan = plan_array(schedule, first, last, self._signals)
+            plan = np.array([*plan, int(own), len(rows), *apart, *at], dtype=np.int64)
+            return int(
+                self._run(
+                    pointer(parameters),
+                    ctypes.c_double(schedule.step),
+                    pointer(stimulus),
+                    pointer(vector),
+                    pointer(plan),
+                    ctypes.c_void_p(rows.ctypes.data + row * rows.strides[1]),
+                    ctypes.c_void_p(None if ends is None else ends.values.ctypes.data),
+                )
+            )
+
+        run_in_calls(schedule, begin, end, call)
 
 
 def is_side_by_side(engine: str) -> bool:

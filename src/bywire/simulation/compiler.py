@@ -5,16 +5,14 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import hashlib
-import importlib.util
 import os
 import platform
-import shutil
 import subprocess
-import sys
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from bywire.core.child_process import find_program, module_command, run_program
 from bywire.core.errors import CompilerError
 from bywire.core.scratch import scratch_folder
 from bywire.simulation.kernel_cache import digest_of, is_intact, load, sha256, usable_folder
@@ -94,22 +92,27 @@ def find_compiler() -> Compiler | None:
     if wanted == "none":
         return None
     is_quick = _is_quick()
-    if wanted and shutil.which(wanted):
-        return _labeled((str(shutil.which(wanted)),), is_quick)
     if wanted:
+        if program := find_program(wanted):
+            return _labeled((program,), is_quick)
         raise CompilerError(
             f"BYWIRE_CC = {wanted!r} names no program: "
             "unset it, or set it to a C compiler or 'none'"
         )
     commands: list[tuple[str, ...]] = [
-        (path,) for name in ("cc", "gcc", "clang") if (path := shutil.which(name))
+        (path,) for name in ("cc", "gcc", "clang") if (path := find_program(name))
     ]
-    if importlib.util.find_spec("ziglang") is not None:
-        commands.append((sys.executable, "-m", "ziglang", "cc"))
+    if command := bundled_compiler():
+        commands.append(command)
     for command in commands:
         with contextlib.suppress(CompilerError):  # a broken one must not hide the next
             return _labeled(command, is_quick)
     return None
+
+
+def bundled_compiler() -> tuple[str, ...] | None:
+    """Return the command of the extra's C compiler, for all systems; None where it is missing."""
+    return module_command("ziglang", "cc")
 
 
 def _is_quick() -> bool:
@@ -128,9 +131,7 @@ def _is_quick() -> bool:
 
 def _labeled(command: tuple[str, ...], is_quick: bool) -> Compiler:
     try:
-        done = subprocess.run(
-            [*command, "--version"], capture_output=True, text=True, timeout=60, check=False
-        )
+        done = run_program([*command, "--version"], 60.0)
     except (OSError, subprocess.TimeoutExpired) as error:
         reason = getattr(error, "strerror", None) or "it took longer than 60 s"
         what = f"the C compiler {command[0]} does not start ({reason})"
@@ -192,7 +193,7 @@ def compile_library(
     built_for = processor() if "-march=native" in flags else platform.machine()
     parts = "\0".join((source, *_COMMON, *flags, compiler.label, built_for))
     key = hashlib.sha256(parts.encode()).hexdigest()[:32]
-    folder = usable_folder()
+    folder = usable_folder().absolute()
     library = folder / f"{key}.so"
     if is_intact(library, entry):
         return library
@@ -225,7 +226,7 @@ def processor() -> str:
 def _compile(compiler: Compiler, flags: tuple[str, ...], source: Path, target: Path) -> None:
     command = [*compiler.command, *_COMMON, *flags, str(source), "-o", str(target), "-lm"]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+        done = run_program(command, TIMEOUT)
     except subprocess.TimeoutExpired:
         raise CompilerError(
             f"{compiler.label} took longer than {TIMEOUT:g} s for a kernel: {_OTHERWISE}"

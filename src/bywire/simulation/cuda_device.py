@@ -13,6 +13,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from bywire.core.errors import DeviceError, ParameterError, quoted
+from bywire.core.pairs import read_count
 from bywire.simulation.cuda_compiler import OTHERWISE, bindings, cuda_binary
 from bywire.simulation.native import pointer
 
@@ -189,9 +190,10 @@ def find_device() -> CudaDevice:
             f"lists one, {OTHERWISE}"
         )
     wanted = os.environ.get(VARIABLE, "0")
-    if not wanted.isdecimal() or int(wanted) >= count:
+    number = read_count(wanted)
+    if number is None or number >= count:
         raise ParameterError(
             f"{VARIABLE} = {quoted(wanted)} names no graphics processor: there "
             f"{'is one, 0' if count == 1 else f'are {count}, 0 to {count - 1}'}"
         )
-    return CudaDevice(driver, int(wanted))
+    return CudaDevice(driver, number)

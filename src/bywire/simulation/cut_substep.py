@@ -29,6 +29,11 @@ class CutSubstep:
         Memory and parameters.
     h
         Length of the substep [s].
+
+    Attributes
+    ----------
+    tries
+        How many parts were tried.
     """
 
     def __init__(
@@ -36,6 +41,7 @@ class CutSubstep:
     ) -> None:
         self._settle, self._velocities = settle, velocities
         self._m, self._p, self._h = m, p, h
+        self.tries = 0
 
     def results(self, x: Array, d: Array) -> tuple[list[Array], bool]:
         """Return x, d, r, q at the end of the substep, and whether it did not settle."""
@@ -64,6 +70,7 @@ class CutSubstep:
         return o, failed or unsettled
 
     def _part(self, x: Array, d: Array, t: float) -> tuple[list[Array], bool]:
+        self.tries += 1
         return self._settle(x, d * (t / self._h), self._m, self._p, t)
 
     def _jumps(self, o: list[Array]) -> Iterator[tuple[int, float]]:

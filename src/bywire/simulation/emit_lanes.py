@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 from bywire.simulation.c_runtime import LANES
 from bywire.simulation.emission import indented, leaf_count
-from bywire.simulation.emit_rare import rare_substep
+from bywire.simulation.emit_rare import most_tries, rare_substep
 from bywire.simulation.lane_repeats import repeated_lanes, repeated_results, settling_function
 from bywire.simulation.lane_statements import Lanes
 from bywire.simulation.layout import Layout
@@ -19,7 +19,7 @@ from bywire.simulation.stages import Stages
 
 SIGNATURE = """int bw_lanes(void) { return TURNS * W; }
 
-void bw_run_lanes(const double *restrict p, double h_, const double *restrict u,
+int64_t bw_run_lanes(const double *restrict p, double h_, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, double *restrict rec,
     double *restrict ends)"""
 
@@ -60,6 +60,7 @@ def takes_turns(stages: Stages) -> bool:
 def emit_lanes(stages: Stages, in_turn: bool = False, ends: int = 0) -> str:
     """Return the C source of the kernel for one vector of cases, or for two that take turns.
 
+    It ends earlier where it takes long, and returns the frame at which it goes on.
     ``ends``: how many of the signals, the last ones, are recorded at both ends alone.
     """
     t = Lanes(stages)
@@ -86,7 +87,9 @@ def emit_lanes(stages: Stages, in_turn: bool = False, ends: int = 0) -> str:
   {each(Lanes.once, 2)}
   {each(Lanes.mode_state, 2)}
   {each(lambda t: [f"V {line}" for line in _ahead(t)], 2)}
-  for (int64_t f = begin; f < end + last; ++f) {{
+  int64_t f = begin, tried = 0;
+  for (; f < end + last; ++f) {{
+    if (__builtin_expect(tried > {most_tries(stages)}, 0) && f > begin && f < end) break;
     const double *row = u + (f / stim) * {stimuli} * (own ? TURNS * W : 1);
     {each(_stimulus, 4)}
     {each(_ticks, 4)}
@@ -112,6 +115,7 @@ def emit_lanes(stages: Stages, in_turn: bool = False, ends: int = 0) -> str:
   {each(lambda t: _put(t, ends), 2)}
   {each(_stores, 2)}
   (void)P; (void)h; (void)own; (void){counters}; (void)end0; (void)end1; (void)by_end; (void)ends;
+  return f;
 }}
 """
 
@@ -184,7 +188,7 @@ def _stores(t: Lanes) -> list[str]:
 def _names(layout: Layout) -> list[str]:
     """Return the names of all entries of the state vector, in order."""
     entries = [f"{kind}{k}" for kind, count in layout.length.items() for k in range(count)]
-    return [*entries, "failures", "repeats"]
+    return [*entries, "failures", "repeats", "tries"]
 
 
 def _ticks(t: Lanes) -> list[str]:

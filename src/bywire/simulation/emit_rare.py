@@ -20,6 +20,7 @@ from bywire.simulation.rare_text import CUT, PROJECTION
 from bywire.simulation.set_valued import FITTING, NEVER, NOTHING, RESIDUAL
 from bywire.simulation.stages import STATE, Stages
 
+_TRIES = 200_000
 APART = "__attribute__((noinline))"  # but fast: what is cold is compiled to be short
 
 def rare_substep(stages: Stages) -> str:
@@ -40,6 +41,14 @@ enum {{ CONSTANTS = {len(slots)}, POSED = {len(stages.posed)} }};
 {_pass_function("fast_pass", APART, _lines(stages, rare_results(stages.fast), slots))}
 {PROJECTION if stages.rows else ""}{_pass_function("exact_pass", "RARE", _exact(stages, slots))}
 {CUT}"""
+
+
+def most_tries(stages: Stages) -> int:
+    """Return after how many tried parts of substeps a call of a kernel ends: tens of milliseconds.
+
+    A part takes an exact pass or a few, in which all combinations of signs may be tried.
+    """
+    return max(_TRIES // (10 + 3**stages.rows), 1)
 
 
 def rare_header(stages: Stages) -> str:

@@ -7,7 +7,7 @@ a graphics processor for each of many cases.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bywire.simulation.branches import branch, branched
 from bywire.simulation.c_runtime import SCALAR
@@ -22,7 +22,7 @@ from bywire.simulation.emission import (
     statements,
     unread,
 )
-from bywire.simulation.emit_rare import rare_substep
+from bywire.simulation.emit_rare import most_tries, rare_substep
 from bywire.simulation.expressions import Namer, as_number, condition, needed
 from bywire.simulation.graph import Graph
 from bywire.simulation.layout import Layout
@@ -31,7 +31,7 @@ from bywire.simulation.operation import Node
 from bywire.simulation.remembered import Remembered, declarations, remembered, renewal
 from bywire.simulation.stages import STATE, Stages
 
-SIGNATURE = """void bw_run(const double *restrict p, double h, const double *restrict u,
+SIGNATURE = """{} bw_run(const double *restrict p, double h, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
     double *restrict rec)"""
 
@@ -52,6 +52,9 @@ class Caller:
         Where the stimulus' row begins; ``nu``: its length.
     record
         Statements that keep the outputs ``o``; ``count``: how many.
+    pause, end
+        Statements at the beginning of a frame ``f``, before which ``most`` parts of substeps may
+        have been tried, and after the last one.
     """
 
     runtime: str
@@ -61,11 +64,13 @@ class Caller:
     entry: str
     row: str
     record: str
+    pause: str = ""
+    end: str = ""
 
 
-ONE_RUN = Caller(
+EXPORTED = Caller(
     runtime=SCALAR,
-    head=SIGNATURE,
+    head=SIGNATURE.format("void"),
     begin="",
     stimulus="uk[{k}]",
     entry="state[{k}]",
@@ -73,6 +78,15 @@ ONE_RUN = Caller(
     record="""double *row = rec + (f / every - row0) * chosen;
       for (int64_t j = 0; j < chosen; ++j) row[j] = o[selection[j]];""",
 )
+"""one run, all frames that it is told of"""
+ONE_RUN = replace(
+    EXPORTED,
+    head=SIGNATURE.format("int64_t"),
+    begin="const double most = " + EXPORTED.entry.format(k="{tries}") + " + {most};",
+    pause="if (__builtin_expect(tries > most, 0) && f > begin && f < end) break;",
+    end="return f;",
+)
+"""one run, ended earlier where it takes long: it returns the frame at which it goes on"""
 
 
 def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
@@ -150,7 +164,8 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
     outputs = block(needed(graph, stages.output, lambda n: level[n] == 0))
     outputs += [f"o[{j}] = {as_number(graph, n, name)};" for j, n in enumerate(stages.output)]
     parts = {"nu": leaf_count(stages, "u"), "np": leaf_count(stages, "p"),
-             "tasks": len(stages.ticks), "count": len(stages.output)}  # fmt: skip
+             "tasks": len(stages.ticks), "count": len(stages.output),
+             "most": most_tries(stages), "tries": layout.start["counters"] + 2}  # fmt: skip
     return f"""{caller.runtime}{rare_substep(stages)}
 {caller.head} {{
   {PLAN}
@@ -162,7 +177,9 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
   {indented(_mode_state(mode, name), 2)}
   {indented(declarations(groups, name), 2)}
   {indented([f"double {each}" for each in ahead], 2)}
-  for (int64_t f = begin; f < end + last; ++f) {{
+  int64_t f = begin;
+  for (; f < end + last; ++f) {{
+    {caller.pause}
     const double *restrict uk = {caller.row.format(**parts)};
     (void)uk;
     {indented(ticks, 4)}
@@ -189,6 +206,7 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
     {indented(_integrals(stages, name), 4)}
   }}
   {indented(_stores(layout, caller), 2)}
+  {caller.end}
 }}
 """
 
@@ -223,7 +241,7 @@ def _entries(layout: Layout, caller: Caller) -> list[tuple[str, str]]:
         for k in range(count)
     ]
     counters = layout.start["counters"]
-    places += [("failures", counters), ("repeats", counters + 1)]
+    places += [(name, counters + k) for k, name in enumerate(("failures", "repeats", "tries"))]
     return [(name, caller.entry.format(k=at)) for name, at in places]
 
 
@@ -265,6 +283,7 @@ def _repeat(stages: Stages, results: dict[str, Node], name: Namer) -> list[str]:
         "cuts made;",
         "failures += located(c, h, ms, xs, ds, known, o, &made);",
         "repeats += 1.0;",
+        "tries += made.tries;",
     ]
     at = 0
     for kind in STATE:

@@ -14,14 +14,14 @@ from bywire.simulation.emission import (
     leaf_namer,
     statements,
 )
-from bywire.simulation.emit_rare import rare_substep
+from bywire.simulation.emit_rare import most_tries, rare_substep
 from bywire.simulation.exact_tangents import exact_tangents, located_statements
 from bywire.simulation.expressions import PLAIN_C, Dialect, as_number, needed
 from bywire.simulation.layout import Layout
 from bywire.simulation.operation import Node
 from bywire.simulation.stages import SEEDS, STATE, Stages
 
-SIGNATURE = """void bw_run_tangents(const double *restrict p, double h, const double *restrict u,
+SIGNATURE = """int64_t bw_run_tangents(const double *restrict p, double h, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
     double *restrict rec, const double *restrict seeds, double *restrict tangents,
     double *restrict rec_t)"""
@@ -132,6 +132,8 @@ def emit_tangents(stages: Stages, lanes: int) -> str:
 {SIGNATURE} {{
   {PLAN}
   double failures = state[{start["counters"]}], repeats = state[{start["counters"] + 1}];
+  double tries = state[{start["counters"] + 2}];
+  const double most = tries + {most_tries(stages)};
   double *restrict T = tangents;
   double C[{max(len(t.slot), 1)} * L] __attribute__((aligned(64)));
   double c[CONSTANTS + 1];
@@ -142,7 +144,9 @@ def emit_tangents(stages: Stages, lanes: int) -> str:
   for (int l = 0; l < L; ++l) {{
     {indented(t.lines(t.once, True), 4)}
   }}
-  for (int64_t f = begin; f < end + last; ++f) {{
+  int64_t f = begin;
+  for (; f < end + last; ++f) {{
+    if (__builtin_expect(tries > most, 0) && f > begin && f < end) break;
     const double *restrict uk = u + (f / stim) * {leaf_count(stages, "u")};
     (void)uk;
     {indented(_ticks(t), 4)}
@@ -175,6 +179,8 @@ def emit_tangents(stages: Stages, lanes: int) -> str:
   {indented(stores, 2)}
   state[{start["counters"]}] = failures;
   state[{start["counters"] + 1}] = repeats;
+  state[{start["counters"] + 2}] = tries;
+  return f;
 }}
 """
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
+from bywire.core.interrupts import thread_pool
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
 from bywire.simulation.case_kernels import case_kernel, is_side_by_side
 from bywire.simulation.engine import prepare
+from bywire.simulation.layout import COUNTERS
 from bywire.simulation.run import (
     Run,
     initial_vector,
@@ -105,7 +106,7 @@ def simulate_ensemble(
     stimulus = sampled_stimulus(run, schedule)
     padded = -(-count // kernel.lanes) * kernel.lanes
     values = kernel.rows(padded, schedule.rows)
-    counters = np.zeros((2, padded))
+    counters = np.zeros((COUNTERS, padded))
     start = initial_vector(kernel.layout, run.state, run.memory)
 
     def group(first: int) -> None:
@@ -119,7 +120,7 @@ def simulate_ensemble(
         require_finite(kernel.layout, vector, f"one of cases {first} to {last} left the numbers")
         counters[:, cases] = vector[kernel.layout.start["counters"] :]
 
-    with ThreadPoolExecutor(threads or kernel.at_once) as pool:
+    with thread_pool(threads or kernel.at_once) as pool:
         list(pool.map(group, range(0, padded, kernel.lanes)))
     return Ensemble(
         time=schedule.record_times,

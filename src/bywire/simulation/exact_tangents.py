@@ -45,7 +45,8 @@ static inline void part_ends(double t, double h, const double *moved, const doub
 
 // T: tangents of x, d, r, q, m before the substep.
 static APART int located_tangents(const double *p, const double *c, double h, const double *m,
-    const double *x, const double *d, double *o, const double *sp, const double *T, double *o_t) {
+    const double *x, const double *d, double *o, const double *sp, const double *T, double *o_t,
+    double *tries) {
   static const double none[(NX + MEMORY + SEEDED) * L];
   double at[NX], last[NX], guess[NX], at_t[NX * L], last_t[NX * L], guess_t[NX * L];
   double end[RESULTS], by[DOUBT * L], sum[FLOWS * L + 1], moved[L] = {0.0}, gone[L] = {0.0};
@@ -53,6 +54,7 @@ static APART int located_tangents(const double *p, const double *c, double h, co
   const double *sm = T + JUMP * L, one[L] = {1.0};
   cuts made;
   const int failed = located(c, h, m, x, d, 0, o, &made);
+  *tries += made.tries;
   memcpy(at, x, sizeof(at));
   memcpy(last, d, sizeof(last));
   memcpy(at_t, T, sizeof(at_t));
@@ -137,7 +139,7 @@ def located_statements(layout: Layout) -> list[str]:
         f"const double xs[] = {{{', '.join(f'x{k}' for k in range(nx))}}};",
         f"const double ms[] = {{{', '.join(f'm{k}' for k in range(nm)) or '0.0'}}};",
         f"const double ds[] = {{{', '.join(f'd{k}' for k in range(nx))}}};",
-        "failures += located_tangents(p, c, h, ms, xs, ds, o, seeds, T, o_t);",
+        "failures += located_tangents(p, c, h, ms, xs, ds, o, seeds, T, o_t, &tries);",
         "repeats += 1.0;",
         *(f"{name} {'+=' if k >= q else '='} o[{k}];" for k, name in enumerate(names)),
         f"for (int k = 0; k < {q} * L; ++k) T[k] = o_t[k];",

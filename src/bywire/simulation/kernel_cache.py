@@ -43,9 +43,16 @@ def usable_folder() -> Path:
     Raises
     ------
     CompilerError
-        When ``BYWIRE_CACHE`` names a folder that others may write to.
+        When ``BYWIRE_CACHE`` names a folder that others may write to, or a relative one.
     """
     folder = cache_folder()
+    if not folder.is_absolute():  # in whatever folder one works, somebody else's perhaps
+        if "BYWIRE_CACHE" in os.environ:
+            raise CompilerError(
+                f"BYWIRE_CACHE = {folder} is relative, and kernels of the working folder would be "
+                f"run: name a folder from the root, such as {folder.absolute()}, or unset it"
+            )
+        return process_folder()
     try:
         for each in reversed((folder, *folder.parents)):  # each, or those above get other rights
             each.mkdir(mode=0o700, exist_ok=True)

@@ -57,7 +57,7 @@ def settling_function(t: Lanes) -> str:
     ]
     added = [f"q[{j}][l] += o[{places.index(name)}];" for j, name in enumerate(_flows(t))]
     return f"""static RARE void settle_lanes(B flagged, B doubtful, const double *c, double h,
-    const V *m, const V *old, V *n, V *q, V *counters) {{
+    const V *m, const V *old, V *n, V *q, V *counters, int64_t *tried) {{
   double ms[{max(t.layout.length["m"], 1)}], xs[{nx}], ds[{nx}], o[RESULTS];
   EACH_LANE(l, flagged) {{
     for (int k = 0; k < {nx}; ++k) {{ xs[k] = old[k][l]; ds[k] = old[{nx} + k][l]; }}
@@ -65,6 +65,8 @@ def settling_function(t: Lanes) -> str:
     cuts made;
     counters[0][l] += located(c + l * (CONSTANTS + 1), h, ms, xs, ds, !LANE(doubtful, l), o, &made);
     counters[1][l] += 1.0;
+    counters[2][l] += made.tries;
+    *tried += made.tries;
     {indented(taken + added, 4)}
   }}
   (void)m; (void)q;
@@ -77,7 +79,8 @@ def _handed_over(t: Lanes) -> list[str]:
     old = t.marked(*(f"{kind}{k}" for kind in ("x", "d") for k in range(t.layout.length[kind])))
     flow = t.marked(*_flows(t))
     memory = t.marked(*(f"m{k}" for k in _memory(t)))
-    failures, repeats, flagged, c = t.marked("failures", "repeats", "flagged", "c")
+    failures, repeats, tries = t.marked("failures", "repeats", "tries")
+    flagged, c = t.marked("flagged", "c")
     doubtful = condition(t.graph, t.stages.fast["doubtful"][0], t.name, VECTOR_C)
     nothing = ["SET(0.0)"]
     arrays = {"old": old, "memory": memory or nothing, "flow": flow or nothing}
@@ -88,11 +91,12 @@ def _handed_over(t: Lanes) -> list[str]:
         f"{settled} = {flagged};",
         *(f"{before}[{k}] = {name};" for k, name in enumerate(_sums(t))),
         *(f"V {name}[] = {{{', '.join(values)}}};" for name, values in arrays.items()),
-        f"V count[] = {{{failures}, {repeats}}};",
-        f"settle_lanes({flagged}, {doubtful}, {c}, h_, memory, old, {new}, flow, count);",
+        f"V count[] = {{{failures}, {repeats}, {tries}}};",
+        f"settle_lanes({flagged}, {doubtful}, {c}, h_, memory, old, {new}, flow, count, &tried);",
         *(f"{name} = flow[{k}];" for k, name in enumerate(flow)),
         f"{failures} = count[0];",
         f"{repeats} = count[1];",
+        f"{tries} = count[2];",
     ]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+COUNTERS = 3  # at the end of the state vector, see `Layout`
 CAP = 8  # passes through one substep before it is counted as unsettled
 JUMP, FLAG, DOUBT = 4, 5, 6  # places among the results of a pass, behind x, d, r, q
 # Where a substep is cut: how often the instant is tried, within which share of the substep's change
@@ -25,8 +26,8 @@ def most_cuts(velocities: int) -> int:
 class Layout:
     """Where the parts of the state vector start.
 
-    The vector holds x, d, r, q, the memory m, and two counters: substeps that did not
-    settle, substeps that were repeated.
+    The vector holds x, d, r, q, the memory m, and the counters: substeps that did not settle,
+    substeps that were repeated, and parts of substeps that were tried for that.
     """
 
     start: dict[str, int]
@@ -35,4 +36,4 @@ class Layout:
     @property
     def total(self) -> int:
         """Length of the state vector."""
-        return self.start["counters"] + 2
+        return self.start["counters"] + COUNTERS

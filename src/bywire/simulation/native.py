@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.interrupts import raise_if_stopped
 from bywire.core.typing import Array
 from bywire.simulation.compiler import SINGLE, Compiler, load_library
 from bywire.simulation.kernel_cache import load
@@ -21,6 +23,8 @@ from bywire.simulation.schedule import Schedule
 if TYPE_CHECKING:
     from bywire.simulation.program import Program
 
+CHUNK = 50_000
+"""substeps after which a call of a kernel ends: tens of milliseconds"""
 
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.S)
 
@@ -79,6 +83,37 @@ def plan_array(schedule: Schedule, begin: int, end: int, selected: int) -> NDArr
     )
 
 
+def run_in_calls(
+    schedule: Schedule,
+    begin: int,
+    end: int,
+    call: Callable[[int, int, int], int],
+    most: int = CHUNK,
+) -> None:
+    """Run frames begin..end in calls of a kernel between which an interrupt is heeded.
+
+    Parameters
+    ----------
+    call
+        ``call(first, last, row)``: runs frames, writes rows from this one on, and returns the
+        frame it came to, which may be an earlier one than the last.
+    most
+        Substeps of a call; a frame of more is one call.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        When interrupted, or stopped in a thread.
+    """
+    every, size = schedule.record_frames, max(most // schedule.substeps, 1)
+    at = begin
+    while True:
+        raise_if_stopped()
+        at = call(at, min(at + size, end), -(-at // every) - -(-begin // every))
+        if at >= end:
+            return
+
+
 def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
     """Return the address of a C-contiguous array."""
     if not array.flags.c_contiguous:
@@ -104,7 +139,7 @@ class SingleKernel:
         self.digest = digest
         self.label = f"compiled C, {compiler.label}"
         self._run = load(library, self.ENTRY)[self.ENTRY]
-        self._run.restype = None
+        self._run.restype = ctypes.c_int64
 
     @classmethod
     def of(cls, program: Program, compiler: Compiler) -> SingleKernel:
@@ -128,13 +163,19 @@ class SingleKernel:
         rows
             Shape (recorded rows of these frames, selected outputs).
         """
-        plan = plan_array(request.schedule, begin, end, request.selection.size)
-        self._run(
-            pointer(request.parameters),
-            ctypes.c_double(request.schedule.step),
-            pointer(request.stimulus),
-            pointer(state),
-            pointer(plan),
-            pointer(request.selection),
-            pointer(rows),
-        )
+
+        def call(first: int, last: int, row: int) -> int:
+            plan = plan_array(request.schedule, first, last, request.selection.size)
+            return int(
+                self._run(
+                    pointer(request.parameters),
+                    ctypes.c_double(request.schedule.step),
+                    pointer(request.stimulus),
+                    pointer(state),
+                    pointer(plan),
+                    pointer(request.selection),
+                    pointer(rows[row:]),
+                )
+            )
+
+        run_in_calls(request.schedule, begin, end, call)

@@ -117,8 +117,9 @@ static APART int settle(const double *c, double h, const double *m, const double
   return 1;
 }
 
-// Where a substep was cut: length of each part but the last, and which velocity is zero at its end.
-typedef struct { int count, which[CUTS]; double length[CUTS]; } cuts;
+// Where a substep was cut: length of each part but the last, and which velocity is zero at its end;
+// and how many parts were tried.
+typedef struct { int count, which[CUTS], tries; double length[CUTS]; } cuts;
 
 // Which velocity is the first to change its sign within a part, -1 if none does, and when.
 static inline int first_turn(const double *x, const double *o, double *share) {
@@ -153,10 +154,10 @@ static inline double zero_of(double v, double w, double t, double before, double
 
 // Shorten a part of length *t to the first instant at which a velocity is zero: by the parabola
 // through three lengths, within what is known to lie before and behind. Before, o is that of *t in
-// the velocities, behind in everything. Return which velocity it is, -1 if its friction turns out
-// not to jump; failed: that part did not settle.
+// the velocities, behind in everything. Return which velocity it is, -1 if velocities alone were
+// known and its friction turns out not to jump; failed: that part did not settle.
 static APART int locate(const double *c, double h, double *t, const double *m, const double *x,
-    const double *last, double *o, int *failed) {
+    const double *last, int known, double *o, int *failed, int *tries) {
   double d[NX], share, low = 0.0, high = *t;
   const double first = EDGE * *t, final = (1.0 - EDGE) * *t;
   int which = first_turn(x, o, &share), turns = velocity[which];
@@ -166,7 +167,8 @@ static APART int locate(const double *c, double h, double *t, const double *m, c
   for (int n = 1;; ++n) { // what is left of the last attempt is of the length that is returned
     N = fmin(fmax(N, first), final);
     *failed = part(c, h, N, m, x, last, d, o);
-    if (o[JUMP + which] == 0.0) return -1;
+    ++*tries;
+    if (known && o[JUMP + which] == 0.0) return -1;
     const int other = VELOCITIES > 1 ? first_turn(x, o, &share) : -1;
     if (other >= 0 && other != which && n < ATTEMPTS) { // another one is earlier
       which = other, turns = velocity[which];
@@ -229,8 +231,9 @@ static APART int located(const double *c, double h, const double *m, const doubl
   memcpy(last, d, sizeof(last));
   memset(sum, 0, sizeof(sum));
   for (int k = 0; k < VELOCITIES; ++k) o[JUMP + k] = known;
+  made->tries = 0;
   for (made->count = 0;; known = 0, ++made->count) {
-    if (!known) failed = part(c, h, left, m, at, last, guess, o);
+    if (!known) failed = part(c, h, left, m, at, last, guess, o), ++made->tries;
     const int turns = first_turn(at, o, &share) >= 0;
     if (!turns && !known) break;
     if (made->count == CUTS) { // there is no end to it
@@ -240,7 +243,7 @@ static APART int located(const double *c, double h, const double *m, const doubl
       break;
     }
     double t = left;
-    const int which = turns ? locate(c, h, &t, m, at, last, o, &failed) : -1;
+    const int which = turns ? locate(c, h, &t, m, at, last, known, o, &failed, &made->tries) : -1;
     if (which < 0) { // then once more, knowing nothing
       --made->count;
       continue;

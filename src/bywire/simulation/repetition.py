@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 import os
-import threading
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import StepError
+from bywire.core.interrupts import thread_pool
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
 from bywire.simulation.case_kernels import lane_kernel
@@ -70,7 +69,6 @@ def repeat(
     *,
     starts: Sequence[tuple[Sequence[float], Sequence[float]]] | None = None,
     lanes: bool = True,
-    stop: threading.Event | None = None,
 ) -> Repeated:
     """Run every case window after window until it repeats.
 
@@ -101,8 +99,6 @@ def repeat(
         State and memory that each case starts from; by default those of the run.
     lanes
         False: one case after another on one core, as in a simulator without ensembles.
-    stop
-        Once it is set, from another thread, what runs ends within a moment.
 
     Raises
     ------
@@ -113,7 +109,7 @@ def repeat(
     SolverError
         When a trajectory leaves the numbers.
     KeyboardInterrupt
-        When ``stop`` was set.
+        When interrupted, or stopped in a thread.
     """
     schedule = window_schedule(run)
     count = matrix.shape[1]
@@ -134,7 +130,7 @@ def repeat(
 
     layout = prepared.engine("auto").layout
     begins = _start_vectors(layout, starts or [(run.state, run.memory)] * count)
-    stopped, queue = threading.Event() if stop is None else stop, deque(range(count))
+    queue = deque(range(count))
     rows, counters = schedule.frames // schedule.record_frames, layout.start["counters"]
     values = np.empty((count, rows, len(signals)))
     done: dict[int, tuple[list[Complex], bool, float]] = {}
@@ -146,7 +142,7 @@ def repeat(
             return np.ascontiguousarray(np.moveaxis(given(taken.case, first, last), 0, 2))
 
         while taken.seen:
-            advance_window(advance, schedule, stopped, taken.columns, u, taken.vector, now)
+            advance_window(advance, schedule, taken.columns, u, taken.vector, now)
             counted = sorted(taken.seen)
             which = ", ".join(str(taken.case[lane]) for lane in counted)
             ends = taken.vector[:, counted]
@@ -157,15 +153,11 @@ def repeat(
                 taken.release(lane)
 
     workers = min((os.cpu_count() or 1) if lanes else 1, -(-count // width))
-    pool = ThreadPoolExecutor(workers)
-    try:
-        list(pool.map(turns, range(workers)))
-    except KeyboardInterrupt:
-        stopped.set()
-        raise
-    finally:
-        queue.clear()  # where one failed, what waits is not begun
-        pool.shutdown()
+    with thread_pool(workers) as pool:
+        try:
+            list(pool.map(turns, range(workers)))
+        finally:
+            queue.clear()  # where one failed, what waits is not begun
     seen, repeats, unsettled = zip(*(done[k] for k in range(count)), strict=True)
     return Repeated(
         time=np.asarray(np.arange(rows) * schedule.record_frames * schedule.frame, np.float64),

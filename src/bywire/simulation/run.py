@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,8 +14,10 @@ from numpy.typing import NDArray
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_table
+from bywire.core.signals import ranges_of, signals_of
 from bywire.core.typing import Array
-from bywire.simulation.advance import Progress, advance_all
+from bywire.core.units import shown
+from bywire.simulation.advance import Progress, advance_all, work_of
 from bywire.simulation.buffered_call import BufferedCall
 from bywire.simulation.changes import Change, energies, energy_of, pieces, put_in_signals
 from bywire.simulation.engine import Engine, prepare
@@ -43,6 +46,8 @@ class Run:
         Length of the run, substep and recording interval [s].
     changes
         Parameters that replace those before at some times, in order of time: see `Change`.
+    most_work
+        Work after which it fails, in substeps; see `Trajectory.work`.
     """
 
     model: Model
@@ -54,6 +59,7 @@ class Run:
     step: float = 20e-6
     record: float = 1e-3
     changes: tuple[Change, ...] = ()
+    most_work: float = math.inf
 
     def schedule(self) -> Schedule:
         """Return the integer plan of the run."""
@@ -82,6 +88,8 @@ class Trajectory:
         ``interrupted`` when the user stopped it (rows end there).
     unsettled, repeated
         Substeps that hit the cap, and that took more than one pass.
+    work
+        What it took, counted in ordinary substeps: the same on every machine.
     vector
         State vector at the end.
     """
@@ -93,6 +101,7 @@ class Trajectory:
     status: Status
     unsettled: int
     repeated: int
+    work: float
     engine: str
     vector: Array
 
@@ -161,6 +170,8 @@ def simulate(
         When steps and sample times do not divide each other.
     SolverError
         When the trajectory leaves the numbers.
+    WorkLimitError
+        When it takes more work than it may.
     ParameterError
         When the stimulus is not finite.
     UnknownNameError
@@ -178,7 +189,7 @@ def simulate(
         wanted = (*wanted, *put_in_signals(run.model.Output))
         values = np.column_stack((values, put_in))
     else:
-        finished = advance_all(chosen, request, vector, values, progress)
+        finished = advance_all(chosen, request, vector, values, progress, most=run.most_work)
     rows = schedule.rows if finished == schedule.frames else -(-finished // schedule.record_frames)
     counters = vector[chosen.layout.start["counters"] :]
     status: Status = "done" if finished == schedule.frames else "interrupted"
@@ -192,6 +203,7 @@ def simulate(
         status=status,
         unsettled=int(counters[0]),
         repeated=int(counters[1]),
+        work=float(work_of(schedule, chosen.layout, finished, vector)),
         engine=chosen.label,
         vector=vector,
     )
@@ -226,7 +238,8 @@ def _advanced_in_pieces(
             jump = energy_of(engine, here, vector, places) - energy_of(*before, vector, places)
             put_in[-(-begin // schedule.record_frames) :] += jump
         row = -(-begin // schedule.record_frames)
-        finished = advance_all(engine, here, vector, values[row:], progress, begin, last)
+        rows = values[row:]
+        finished = advance_all(engine, here, vector, rows, progress, begin, last, run.most_work)
         if finished < last:
             break
         before = engine, here
@@ -268,7 +281,7 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
     Raises
     ------
     ParameterError
-        When one of them is not finite.
+        When one of them is not finite, or outside the range of its signal.
     """
     rows = np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64)
     is_finite = np.isfinite(rows)
@@ -278,7 +291,25 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
             f"the stimulus {run.model.Stimulus._fields[signal]} is {rows[row, signal]} at "
             f"t = {schedule.stimulus_times[row]:g} s: it must be finite all through the run"
         )
+    for signal, low, high in stimulus_ranges(run.model):
+        outside = (rows[:, signal] < low) | (rows[:, signal] > high)
+        if outside.any():
+            row = int(np.argmax(outside))
+            name = run.model.Stimulus._fields[signal]
+            unit = signals_of(run.model.Stimulus)[name].unit
+            ends = [f">= {shown(low, unit)}"] * (low > -np.inf)
+            ends += [f"<= {shown(high, unit)}"] * (high < np.inf)
+            raise ParameterError(
+                f"the stimulus {name} is {shown(rows[row, signal], unit)} at "
+                f"t = {schedule.stimulus_times[row]:g} s: it must be {' and '.join(ends)}"
+            )
     return rows
+
+
+def stimulus_ranges(model: Model) -> list[tuple[int, float, float]]:
+    """Return index and range of the stimuli that declare one: controllers take no others."""
+    fields = model.Stimulus._fields
+    return [(fields.index(n), *ends) for n, ends in ranges_of(model.Stimulus).items()]
 
 
 def put_into(rows: Array, run: Run, t: Array) -> None:

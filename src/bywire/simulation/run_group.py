@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import overload
@@ -17,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
+from bywire.core.interrupts import thread_pool
 from bywire.core.parameters import ParameterSet, leaf_table
 from bywire.core.typing import Array
-from bywire.simulation.advance import require_finite
+from bywire.simulation.advance import require_finite, require_work, work_of
 from bywire.simulation.case_kernels import CaseKernel, case_kernel, is_side_by_side
 from bywire.simulation.changes import energies, pieces, put_in_signals
 from bywire.simulation.engine import CUDA, are_alike, prepare
@@ -31,6 +31,7 @@ from bywire.simulation.run import (
     put_into,
     sampled_stimulus,
     selected,
+    stimulus_ranges,
 )
 from bywire.simulation.schedule import Schedule
 
@@ -103,9 +104,8 @@ class RunGroup(Sequence[Trajectory]):
     def __getitem__(self, k: int | slice) -> Trajectory | tuple[Trajectory, ...]:
         if isinstance(k, slice):
             return tuple(self)[k]
-        unsettled, repeated = (
-            int(n) for n in self.vectors[self.kernel.layout.start["counters"] :, k][:2]
-        )
+        layout, schedule, vector = self.kernel.layout, self.runs[k].schedule(), self.vectors[:, k]
+        unsettled, repeated = (int(n) for n in vector[layout.start["counters"] :][:2])
         return Trajectory(
             run=self.runs[k],
             time=self.time,
@@ -114,8 +114,9 @@ class RunGroup(Sequence[Trajectory]):
             status="unsettled" if unsettled else "done",
             unsettled=unsettled,
             repeated=repeated,
+            work=float(work_of(schedule, layout, schedule.frames, vector)),
             engine=self.kernel.label,
-            vector=self.vectors[:, k].copy(),
+            vector=vector.copy(),
         )
 
 
@@ -156,6 +157,8 @@ def simulate_group(
         When a signal is unknown.
     SolverError
         When a trajectory leaves the numbers.
+    WorkLimitError
+        When a run takes more work than it may.
     DeviceError
         For ``cuda`` where there is no graphics processor, or no room on it.
     """
@@ -191,12 +194,8 @@ def simulate_group(
         apart = Ends(at_ends[:, cases], frames) if ends else None
         return carried.to_the_end(values[:, cases], edges, first, watch, apart)
 
-    with ThreadPoolExecutor(threads or kernel.at_once) as pool:
-        try:
-            vectors = list(pool.map(computed, range(0, len(runs), kernel.lanes)))
-        except BaseException:
-            watch.stop.set()
-            raise
+    with thread_pool(threads or kernel.at_once) as pool:
+        vectors = list(pool.map(computed, range(0, len(runs), kernel.lanes)))
     vector = np.concatenate(vectors, axis=1)[:, : len(runs)]
     return RunGroup(
         tuple(runs), schedule.record_times[first:], values, recorded, vector, kernel, at_ends,
@@ -218,10 +217,9 @@ def _edges(schedule: Schedule, first: int, runs: Sequence[Run]) -> list[int]:
 
 
 class _Watch:
-    """Progress of several threads, and whether they shall stop."""
+    """Progress of several threads."""
 
     def __init__(self, pieces: int, progress: Callable[[float], None] | None) -> None:
-        self.stop = threading.Event()
         self._pieces, self._done = pieces, 0
         self._progress, self._lock = progress, threading.Lock()
 
@@ -239,7 +237,11 @@ def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
     for lane, run in enumerate(group):
         put_into(signals[lane].T, run, t)
     signals[len(group) :] = signals[len(group) - 1]
-    if not np.isfinite(signals).all():
+    is_usual = np.isfinite(signals).all() and all(
+        (signals[:, k] >= low).all() and (signals[:, k] <= high).all()
+        for k, low, high in stimulus_ranges(group[0].model)
+    )
+    if not is_usual:
         for run in group:
             sampled_stimulus(run, schedule)  # says which and when
     is_shared = all(np.array_equal(signals[0], other) for other in signals[1:])
@@ -267,6 +269,7 @@ class _Carried:
             for begin, _, par in pieces(run.par, run.changes, schedule) if run.changes else ():
                 self._changes.setdefault(begin, []).append((lane, par))
         self._stimulus = _stimuli(group, schedule, width)
+        self._most = np.array([run.most_work for run in filled])
 
     def to_the_end(
         self, values: Array, edges: Sequence[int], skipped: int, watch: _Watch, ends: Ends | None
@@ -275,8 +278,6 @@ class _Carried:
         schedule, every = self._schedule, self._schedule.record_frames
         silent = replace(schedule, record_frames=schedule.frames + 1)  # but for the first row
         for begin, end in pairwise(edges):
-            if watch.stop.is_set():
-                break
             first = -(-begin // every) - skipped
             self._change(begin, values[:, :, max(first, 0) :])
             last = (schedule.rows if end == schedule.frames else -(-end // every)) - skipped
@@ -291,6 +292,7 @@ class _Carried:
                 self._kernel.layout, self._vector,
                 f"one of {self._count} runs left the numbers before t = {end * schedule.frame:g} s",
             )  # fmt: skip
+            require_work(work_of(schedule, self._kernel.layout, end, self._vector), self._most)
             watch.piece()
         return self._vector
 

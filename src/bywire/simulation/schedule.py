@@ -16,6 +16,7 @@ from bywire.core.errors import StepError
 _TOLERANCE = 1e-9
 _REST = 1e-6  # of a step, that an interval may differ from whole steps
 _MOST = 2**53  # substeps in an interval or a run: beyond, not even a float tells them apart
+_FRAME = 100_000  # substeps of a frame at most: between two frames a run heeds an interrupt
 _TRIALS = 10_000  # divisors that are tried for one that is short to write
 
 
@@ -23,8 +24,8 @@ _TRIALS = 10_000  # divisors that are tried for one that is short to write
 class Schedule:
     """Integer plan of a run.
 
-    A frame is the longest interval that divides all sample times and the recording interval; it
-    is cut into ``substeps`` equal steps.
+    A frame is the longest interval that divides all sample times and the recording interval, or a
+    part of it where it is very long; it is cut into ``substeps`` equal steps.
 
     Parameters
     ----------
@@ -111,7 +112,7 @@ def _planned(
         raise StepError(f"duration = {duration:g} s is not admissible: it must be > 0 s")
     counts = {name: _whole(period, step, name) for name, period in periods}
     recorded = _whole(record, step, "recording")
-    frame = math.gcd(recorded, *counts.values())
+    frame = _divided(math.gcd(recorded, *counts.values()))
     rows = math.ceil(duration / record - _TOLERANCE)
     return Schedule(
         step=step,
@@ -120,6 +121,13 @@ def _planned(
         task_frames=tuple(count // frame for count in counts.values()),
         record_frames=recorded // frame,
     )
+
+
+def _divided(frame: int) -> int:
+    """Return the largest divisor of a frame's substeps that is not too long."""
+    shares = range(-(-frame // _FRAME), math.isqrt(frame) + 1)
+    share = next((each for each in shares if frame % each == 0), frame)
+    return frame // share
 
 
 def _require_few(name: str, length: float, step: float) -> None:

@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.core.errors import CompilerError, ParameterError, unknown_name
 from bywire.core.typing import Array
-from bywire.simulation.advance import require_finite
+from bywire.simulation.advance import require_finite, work_of
 from bywire.simulation.changes import require_unchanged
 from bywire.simulation.compiler import VECTOR, Compiler, find_compiler, load_library
 from bywire.simulation.emission import layout_of
@@ -20,7 +19,7 @@ from bywire.simulation.emit_tangents import emit_tangents
 from bywire.simulation.engine import built_once, prepare
 from bywire.simulation.expressions import needed
 from bywire.simulation.layout import Layout
-from bywire.simulation.native import plan_array, pointer
+from bywire.simulation.native import Request, plan_array, pointer, run_in_calls
 from bywire.simulation.program import Program
 from bywire.simulation.run import (
     Run,
@@ -32,6 +31,7 @@ from bywire.simulation.run import (
 from bywire.simulation.stages import Stages, build_stages
 
 DIRECTIONS = 8
+_CHUNK = 5_000  # substeps after which a call of the kernel ends
 
 
 def rounds(stages: Stages) -> bool:
@@ -78,13 +78,33 @@ class TangentKernel:
         entry = "bw_run_tangents"
         library, _ = load_library(source, VECTOR, compiler, entry)
         self._run = library[entry]
-        self._run.restype = None
+        self._run.restype = ctypes.c_int64
         self.rounds = rounds(stages)
 
-    def run(self, arrays: Sequence[NDArray[np.generic]], step: float) -> None:
-        """Call the kernel; the arrays are p, u, state, plan, selection, rec, seeds, T, rec_t."""
-        p, *rest = arrays
-        self._run(pointer(p), ctypes.c_double(step), *(pointer(a) for a in rest))
+    def advance(
+        self, request: Request, state: Array, begin: int, end: int, rows: Array,
+        seeds: Array, tangents: Array, rows_t: Array,
+    ) -> None:  # fmt: skip
+        """Run frames begin..end; renews ``state`` and ``tangents``, fills ``rows`` and ``rows_t``.
+
+        Parameters
+        ----------
+        seeds
+            What moves along each direction, shape (seeded parameters and stimuli, directions).
+        tangents
+            Derivatives of the state vector, shape (entries, directions).
+        rows_t
+            Those of the rows, shape (rows, signals, directions).
+        """
+
+        def call(first: int, last: int, row: int) -> int:
+            plan = plan_array(request.schedule, first, last, request.selection.size)
+            arrays = (request.stimulus, state, plan, request.selection, rows[row:], seeds, tangents,
+                      rows_t[row:])  # fmt: skip
+            step = ctypes.c_double(request.schedule.step)
+            return int(self._run(pointer(request.parameters), step, *map(pointer, arrays)))
+
+        run_in_calls(request.schedule, begin, end, call, _CHUNK)
 
 
 def simulate_with_sensitivities(
@@ -157,11 +177,10 @@ def simulate_with_sensitivities(
     stimulus = sampled_stimulus(run, schedule)
     outputs = tuple(prepared.program.outputs)
     selection = selected(outputs, signals)
-    plan = plan_array(schedule, 0, schedule.frames, selection.size)
     values = np.empty((schedule.rows, selection.size))
     count = len(parameters)
     derivatives = np.empty((schedule.rows, selection.size, count))
-    p = np.array(list(run.par.leaves().values()))
+    request = Request(schedule, np.array(list(run.par.leaves().values())), stimulus, selection)
     for first in range(0, count, DIRECTIONS):
         here = min(DIRECTIONS, count - first)
         vector = initial_vector(kernel.layout, run.state, run.memory)
@@ -174,9 +193,7 @@ def simulate_with_sensitivities(
             at = kernel.layout.start["m"]
             tangents[at : at + len(memory), :here] = memory[:, lanes]
         rec_t = np.empty((schedule.rows, selection.size, DIRECTIONS))
-        kernel.run(
-            (p, stimulus, vector, plan, selection, values, seeds, tangents, rec_t), schedule.step
-        )
+        kernel.advance(request, vector, 0, schedule.frames, values, seeds, tangents, rec_t)
         require_finite(kernel.layout, vector, "the run left the numbers")
         derivatives[:, :, first : first + here] = rec_t[:, :, :here]
     counters = vector[kernel.layout.start["counters"] :]
@@ -188,6 +205,7 @@ def simulate_with_sensitivities(
         status="unsettled" if counters[0] else "done",
         unsettled=int(counters[0]),
         repeated=int(counters[1]),
+        work=float(work_of(schedule, kernel.layout, schedule.frames, vector)),
         engine=kernel.label,
         vector=vector,
     )

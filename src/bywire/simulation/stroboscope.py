@@ -20,7 +20,7 @@ from bywire.simulation.advance import require_finite
 from bywire.simulation.changes import require_unchanged
 from bywire.simulation.compiler import Compiler, find_compiler
 from bywire.simulation.engine import built_once, prepare
-from bywire.simulation.native import plan_array
+from bywire.simulation.native import Request
 from bywire.simulation.program import Program
 from bywire.simulation.repetition import window_schedule
 from bywire.simulation.run import Run, initial_vector, selected
@@ -166,13 +166,10 @@ class Stroboscope:
         found = np.empty((self._schedule.frames, self._frictions.size))
         if not self._frictions.size:
             return found
-        plan = plan_array(self._open, 0, 1, 0)
-        nothing = np.empty(0)
-        arrays = (self._p, self._u, vector, plan, self._selection[:0], nothing, self._seeds(()),
-                  tangents, nothing)  # fmt: skip
+        nothing, seeds = np.empty(0), self._seeds(())
+        request = Request(self._open, self._p, self._u, self._selection[:0])
         for k in range(self._schedule.frames):
-            plan[:2] = k, k + 1
-            self._kernel.run(arrays, self._schedule.step)
+            self._kernel.advance(request, vector, k, k + 1, nothing, seeds, tangents, nothing)
             found[k] = vector[self._frictions]
         return found
 
@@ -197,11 +194,8 @@ class Stroboscope:
         rows = -(-end // every) - -(-begin // every)
         values, rec_t = np.empty((rows, signals)), np.empty((rows, signals, DIRECTIONS))
         # The end of a period is the beginning of the next, and ticks only there.
-        plan = plan_array(self._open, begin, end, signals)
-        self._kernel.run(
-            (self._p, self._u, vector, plan, self._selection, values, seeds, tangents, rec_t),
-            schedule.step,
-        )
+        request = Request(self._open, self._p, self._u, self._selection)
+        self._kernel.advance(request, vector, begin, end, values, seeds, tangents, rec_t)
         return values, rec_t
 
 

@@ -8,6 +8,7 @@ the one inside, and runs with and without a fault are of one structure.
 
 from __future__ import annotations
 
+import math
 import typing
 from collections.abc import Callable, Iterable
 from functools import cache, partial
@@ -15,7 +16,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from bywire.core import ops
 from bywire.core.model import Model, Task
-from bywire.core.signals import Signal, signals_of
+from bywire.core.signals import Signal, ranges_of, signals_of
 from bywire.core.wrapping import Wrapping
 
 DEAD = 2.0
@@ -133,7 +134,9 @@ class Tapped(Wrapping):
             if tap.side == "reading":
                 x = x._replace(**{tap.field: _tapped(tap, x, memory, stimulus, last)})
             elif tap.side == "demand":
-                u = u._replace(**{tap.field: _tapped(tap, u, memory, stimulus, last)})
+                u = u._replace(**{tap.field: self._inside_range(
+                    tap.field, _tapped(tap, u, memory, stimulus, last)
+                )})  # fmt: skip
         after = tick(x, before, u, par)
         if name in self.resting:
             fails = getattr(stimulus, rests(name))
@@ -148,6 +151,12 @@ class Tapped(Wrapping):
                 _tapped(tap, after, memory, stimulus, last)
         kept = {each: getattr(memory, each) for each in self.Memory._fields[len(after) :]}
         return self.Memory(*after, **{**kept, **last})
+
+    def _inside_range(self, field: str, demand: Any) -> Any:
+        """Return a falsified demand within its range: a switch has no third position."""
+        low, high = ranges_of(self.inner.Stimulus).get(field, (-math.inf, math.inf))
+        above = demand if low == -math.inf else ops.fmax(demand, low)
+        return above if high == math.inf else ops.fmin(above, high)
 
     def _inside(self, memory: Any) -> Any:
         return self.inner.Memory._make(memory[: len(self.inner.Memory._fields)])

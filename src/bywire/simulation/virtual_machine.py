@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bywire.core.interrupts import raise_if_stopped
 from bywire.core.typing import Array
 from bywire.simulation.buffered_call import BufferedCall
 from bywire.simulation.cut_substep import CutSubstep
-from bywire.simulation.layout import CAP, DOUBT, FLAG, Layout
+from bywire.simulation.layout import CAP, COUNTERS, DOUBT, FLAG, Layout
 from bywire.simulation.native import Request
 
 if TYPE_CHECKING:
@@ -46,11 +47,12 @@ class VirtualMachine:
         schedule = request.schedule
         p, h = request.parameters, np.array([schedule.step])
         part = {
-            kind: state[at : at + self.layout.length.get(kind, 2)]
+            kind: state[at : at + self.layout.length.get(kind, COUNTERS)]
             for kind, at in self.layout.start.items()
         }
         row = 0
         for frame in range(begin, end + int(end == schedule.frames)):
+            raise_if_stopped()
             u = request.stimulus[frame // schedule.stimulus_frames]
             for task, every in zip(self._ticks, schedule.task_frames, strict=True):
                 if frame % every == 0:
@@ -67,8 +69,10 @@ class VirtualMachine:
         result = self._fast(part["x"], part["d"], part["m"], p, h)
         if result[FLAG][0] != 0.0:
             cut = CutSubstep(self._settled, self._velocities, part["m"], p, float(h[0]))
+            is_known = int(result[DOUBT][0] == 0.0)
             result, failed = cut.results(part["x"].copy(), part["d"].copy())
-            part["counters"] += failed, 1.0
+            # Of a step that has settled a kernel knows the velocities, and does not try it again.
+            part["counters"] += failed, 1.0, cut.tries - is_known
         for kind, value in zip(("x", "d", "r"), result, strict=False):
             part[kind][:] = value
         part["q"] += result[3]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Callable
 
 import numpy as np
@@ -29,20 +28,17 @@ a compiler"""
 def advance_window(
     advance: Advance,
     schedule: Schedule,
-    stop: threading.Event,
     p: Array,
     u: Callable[[int, int], Array],
     vector: Array,
     values: Array,
 ) -> None:
-    """Run one window in parts, so that it can be stopped; renews vector and values in place."""
+    """Run one window in parts, which take little memory; renews vector and values in place."""
     every, held = schedule.record_frames, schedule.stimulus_frames
     # All tasks run at the beginning of a part, as at the beginning of a run.
     common = math.lcm(every, *schedule.task_frames)
     size = max(CHUNK // (schedule.substeps * common), 1) * common
     for first in range(0, schedule.frames, size):
-        if stop.is_set():
-            raise KeyboardInterrupt
         last = min(first + size, schedule.frames)
         part = np.empty((values.shape[0], (last - first) // every, values.shape[2]))
         advance(p, u(first // held, last // held), vector, part, last - first)

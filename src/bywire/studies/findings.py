@@ -248,7 +248,7 @@ class Findings:
 
     def _error(self, name: str) -> float:
         """Return what a key figure may be off by, in its unit; nothing where that is not known."""
-        error = {kpi.name: kpi.error for kpi in self.nominal}.get(name, math.nan)
+        error = {kpi.name: kpi.bound for kpi in self.nominal}.get(name, math.nan)
         return 0.0 if math.isnan(error) else error
 
     def is_close(self, demand: Demand) -> NDArray[np.bool_]:

@@ -158,4 +158,5 @@ def weights_of(where: str, section: Mapping[str, Any], count: int) -> Array:
         raise ParameterError(
             f"{where}.weights = {quoted(given)}: {count} numbers > 0 are wanted, one a value"
         )
-    return np.asarray(weights / weights.sum())
+    shares = weights / weights.max()  # whose sum is finite
+    return np.asarray(shares / shares.sum())

@@ -91,6 +91,8 @@ def read_varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
             raise ParameterError(f"[vary] {name} is a table: single numbers vary, and choices")
         leaf = varied_leaf(bench, name)
         nominal = float(values[name])
+        if not choices.keys() & section.keys():  # one of them may switch it on
+            bench.require_effect(name)
         law = read_distribution(name, entry, leaf, nominal)
         for each in filter(values.get, together):
             require_following(

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bywire.analysis.crossings import Margin, fall, measured_margin
+from bywire.analysis.linear.corners import taking
 from bywire.analysis.loop import Loop
 from bywire.analysis.response.dataset import Sweep, complex_values
 from bywire.analysis.response.frequency_response import frequency_response
@@ -208,7 +209,10 @@ def laws_of(
     loop: Loop, par: ParameterSet, value: float, frequencies: Array
 ) -> tuple[Complex, Complex] | None:
     """Return what a loop's laws make of set point and measured value; None where not known."""
-    return None if loop.laws is None else loop.laws(par, value, frequencies)
+    if loop.laws is None:
+        return None
+    with taking(loop.side):
+        return loop.laws(par, value, frequencies)
 
 
 def _behind(closed: Complex, demand: Complex, feedback: Complex) -> Complex:

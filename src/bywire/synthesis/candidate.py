@@ -33,6 +33,9 @@ class Candidate:
     rooms
         The same as ``slacks``, but of a bandwidth by its frequency: what is shown. Those that are
         not named are as ``slacks`` has them.
+    shown
+        By requirement's text: in how many sines and steps the bench shows its figure, and in how
+        many of them it might; without any, the linear model alone decides.
     """
 
     gains: Mapping[str, float]
@@ -40,6 +43,7 @@ class Candidate:
     slacks: Mapping[str, float]
     corners: Mapping[str, BenchFigures] = field(default_factory=dict)
     rooms: Mapping[str, float] = field(default_factory=dict)
+    shown: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
     @property
     def slack(self) -> float:
@@ -136,7 +140,20 @@ def judged(
     corners = {label: figures for label, figures in trials.items() if label != NOMINAL}
     rooms = {wanted.text: _room(wanted, each, slacks[wanted.text]) for wanted in requirements
              if wanted.figure == "bandwidth" and wanted.sense > 0}  # fmt: skip
-    return Candidate(dict(gains), nominal, slacks, corners, rooms)
+    shown = {wanted.text: shown_on_bench(wanted, each) for wanted in requirements}
+    return Candidate(dict(gains), nominal, slacks, corners, rooms, shown)
+
+
+def shown_on_bench(wanted: Requirement, trials: Sequence[BenchFigures]) -> tuple[int, int]:
+    """Return in how many sines and steps the bench shows a figure, and in how many it might."""
+    sines = [s for figures in trials for s in figures.small]
+    if wanted.figure == "bandwidth" and wanted.sense > 0:
+        return len(sines), len(sines)
+    if wanted.figure in ("bandwidth", "crossover", "phase_margin"):
+        name = "bandwidth" if wanted.figure == "bandwidth" else "crossover"
+        return sum(not math.isnan(getattr(s, name)) for s in sines), len(sines)
+    steps = sum(bool(figures.step) for figures in trials) if wanted.figure in STEP_FIGURES else 0
+    return steps, steps
 
 
 def _room(wanted: Requirement, rows: Sequence[BenchFigures], slack: float) -> float:

@@ -12,10 +12,10 @@ from bywire.core.errors import ParameterError
 from bywire.core.interrupts import interrupt_heard
 from bywire.core.typing import Array, Progress
 from bywire.synthesis.floors import linear_floors
-from bywire.synthesis.linear_case import LinearCase, room, slack, values_of
+from bywire.synthesis.linear_case import LinearCase, room, slack, state_of, values_of
 from bywire.synthesis.optimizer import KEPT_MISSED, UNSTABLE, Problem, Search, starts_of
 from bywire.synthesis.outcome import MISSED, Binding, Conflict, Design, Status
-from bywire.synthesis.requirement import FIGURES, Requirement
+from bywire.synthesis.requirement import FIGURES, LESS_IS_BETTER, Requirement
 from bywire.synthesis.stages import piece, stage
 
 _FINE = 4000  # points of the grid for what is reported
@@ -237,17 +237,18 @@ def _judged(
     gains = problem.gains(z)
     every = {case.label: case.figures(gains, _FINE) for case in problem.cases}
     rows = {label: values_of(figures) for label, figures in every.items()}
-    stable = all(figures.is_stable for figures in every.values())
+    states = {label: state_of(figures) for label, figures in every.items()}
     bindings = [
         Binding(wanted, label, rows[label][wanted.figure], room(every[label], wanted))
         for label in rows for wanted in problem.requirements
     ]  # fmt: skip
     bindings.sort(key=lambda binding: binding.slack)
-    slack = bindings[0].slack if stable else -np.inf
+    is_sound = set(states.values()) == {""}
+    slack = bindings[0].slack if is_sound else -np.inf
     worst = {}
     for name in FIGURES:
-        sign = -1.0 if name.endswith(("peak", "error", "time", "overshoot", "noise_gain")) else 1.0
-        label = min(rows, key=lambda case: sign * rows[case][name])
+        sign = -1.0 if name in LESS_IS_BETTER else 1.0
+        label = min(rows, key=lambda case: _size(sign * rows[case][name]))
         worst[name] = (rows[label][name], label)
     return Design(
         gains=gains,
@@ -258,4 +259,10 @@ def _judged(
         conflicts=conflicts,
         slack=float(slack),
         evaluations=problem.evaluations,
+        unsound={label: state for label, state in states.items() if state},
     )
+
+
+def _size(value: float) -> float:
+    """Return a figure by which models are ordered: nothing is worse than one without it."""
+    return -np.inf if np.isnan(value) else value

@@ -5,7 +5,8 @@ for a phase margin alone needs no integral action. The disk margin :math:`\alpha
 Seiler, A. Packard, P. Gahinet, "An Introduction to Disk Margins", IEEE Control Systems Magazine
 40(5), 2020, section on disk-based gain and phase margins)
 
-.. math:: g_m \ge \frac{2 + \alpha}{2 - \alpha}, \quad \varphi_m \ge 2 \arctan\frac{\alpha}{2}
+.. math:: g_m \ge \frac{2 + \alpha}{2 - \alpha}, \quad
+    g_l \le \frac{2 - \alpha}{2 + \alpha}, \quad \varphi_m \ge 2 \arctan\frac{\alpha}{2}
 
 and by it the user's own requirements of margins tell how much less is wanted.
 """
@@ -88,8 +89,11 @@ def _implied(wanted: Requirement) -> float:
         disk = 2.0 * math.tan(math.radians(0.5 * wanted.limit))
     elif wanted.figure == "gain_margin":
         disk = 2.0 * (wanted.limit - 1.0) / (wanted.limit + 1.0)
+    elif wanted.figure == "lower_gain_margin":
+        disk = 2.0 * (1.0 - wanted.limit) / (1.0 + wanted.limit)
     elif wanted.figure == "sensitivity_peak":  # |S - T| = |2 S - 1| <= 2 max|S| + 1
         return (1.0 if wanted.sense < 0 else 0.5) * 2.0 / (2.0 * wanted.limit + 1.0)
     else:
         return math.inf
-    return max(disk * (1.0 if wanted.sense > 0 else 0.5), 1e-3)
+    is_least = (wanted.sense > 0) != (wanted.figure == "lower_gain_margin")
+    return max(disk * (1.0 if is_least else 0.5), 1e-3)

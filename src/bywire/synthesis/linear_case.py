@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
@@ -10,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from bywire.analysis.crossings import DROP
+from bywire.analysis.linear.corners import CornerError
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop
 from bywire.analysis.loop_figures import LoopFigures
+from bywire.analysis.margins import NO_LOOP
 from bywire.core.errors import InputError, ParameterError
 from bywire.core.interrupts import interrupts_deferred
 from bywire.core.parameters import ParameterSet, leaf_fields
@@ -50,8 +53,17 @@ class LinearCase:
             return LoopFigures(*self.build(gains), points)
 
 
+def state_of(figures: LoopFigures) -> str:
+    """Return why a model has no figures of a loop; empty where it has."""
+    if not figures.has_loop:
+        return NO_LOOP
+    return "" if figures.is_stable else "unstable"
+
+
 def values_of(figures: LoopFigures) -> dict[str, float]:
-    """Return every figure that can be required, by name."""
+    """Return every figure that can be required, by name; NaN where it is not defined."""
+    if not figures.is_stable:
+        return dict.fromkeys(FIGURES, math.nan)
     return {name: float(getattr(figures, name)) for name in FIGURES}
 
 
@@ -68,6 +80,8 @@ def slack(figures: LoopFigures, requirement: Requirement) -> float:
     """
     if requirement.figure != "bandwidth" or requirement.sense < 0:
         return room(figures, requirement)
+    if not figures.answers:
+        return -math.inf
     below = figures.T[figures.frequencies < requirement.limit]
     at = figures.closed.response(np.array([requirement.limit]))[:, 0, 0]
     size = float(np.min(np.abs(np.append(below, at))))
@@ -153,6 +167,9 @@ def case_of(
     base = par.replace(changes)
 
     def build(gains: Mapping[str, float]) -> tuple[LinearModel, LinearModel]:
-        return loop.gain_and_closed(base.replace(gains), at)
+        try:
+            return loop.gain_and_closed(base.replace(gains), at)
+        except CornerError as error:
+            raise CornerError(error if label == NOMINAL else f"{label}: {error}") from None
 
     return LinearCase(label, build, changes, at)

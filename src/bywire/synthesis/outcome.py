@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from bywire.core.parameters import ParameterSet, leaf_fields
@@ -84,6 +84,8 @@ class Design:
         Loops that were computed.
     kept
         What was kept besides the requirements, see `floors`.
+    unsound
+        Models without figures, by label: unstable, or no loop.
     """
 
     gains: Mapping[str, float]
@@ -95,6 +97,7 @@ class Design:
     slack: float
     evaluations: int
     kept: tuple[Requirement, ...] = ()
+    unsound: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def binds(self) -> bool:

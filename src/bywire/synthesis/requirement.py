@@ -11,6 +11,8 @@ from itertools import combinations
 from bywire.core import units
 from bywire.core.errors import ParameterError, UnitError, quoted, unknown_name
 
+GAINS = ("gain_margin", "lower_gain_margin")
+"""figures that are factors, and may be given in dB"""
 _TEXT = re.compile(r"\s*([A-Za-z][\w -]*?)\s*(<=|>=|<|>)\s*(.+?)\s*", re.DOTALL)
 _ZERO = 1e-3
 """What counts as zero where the limit is zero; all figures that can be zero are in %."""
@@ -44,6 +46,9 @@ FIGURES: Mapping[str, Kind] = {
     "crossover": Kind("Hz", 0.0, math.inf, "highest frequency at which the loop gain falls to 1"),
     "phase_margin": Kind("degree", 0.0, 180.0, "smallest phase margin of all gain crossovers"),
     "gain_margin": Kind("1", 1.0, math.inf, "factor by which the loop gain may grow; also in dB"),
+    "lower_gain_margin": Kind(
+        "1", 0.0, 1.0, "factor to which the loop gain may fall; also in dB, below 0"
+    ),
     "delay_margin": Kind("s", 0.0, math.inf, "dead time that the loop can take in addition"),
     "disk_margin": Kind("1", 0.0, 2.0, "symmetric disk margin"),
     "sensitivity_peak": Kind("1", 1.0, math.inf, "largest magnitude of 1/(1 + L)"),
@@ -58,6 +63,13 @@ FIGURES: Mapping[str, Kind] = {
     ),
 }
 """figures that can be required"""
+
+
+LESS_IS_BETTER = frozenset({
+    "lower_gain_margin", "sensitivity_peak", "complementary_peak", "noise_gain", "overshoot",
+    "settling_time", "steady_state_error",
+})  # fmt: skip
+"""figures of which a smaller value is better"""
 
 
 @dataclass(frozen=True)
@@ -143,7 +155,7 @@ def _read(text: str) -> Requirement:
 
 def _limit(text: str, figure: str, kind: Kind) -> float:
     name = f"requirement {figure}"
-    if figure == "gain_margin" and text.endswith("dB"):
+    if figure in GAINS and text.endswith("dB"):
         return float(10.0 ** (units.parse(text.removesuffix("dB").strip(), "1", name) / 20.0))
     if kind.unit == "%":
         if not text.endswith("%") and not re.fullmatch(r"0+\.?0*", text):

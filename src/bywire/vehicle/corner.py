@@ -45,7 +45,9 @@ class Corner(Assembly[ParT, MemoryT]):
     corner = Part(corner_body, par="corner.body", outside=True, state={"v": "v_x"})
     tyre = Part(tyre, par="corner.tyre")
     road = Part(road, par="corner.road")
-    E_tyre = Integral("J", "tyre: slip and deflection", role=_sink("tyre"))
+    E_tyre = Integral(
+        "J", "tyre: slip and deflection", role=Role("sink", "tyre", book=BOOK, returns="taken")
+    )
     W_slope = Integral("J", "work of gravity", role=Role("source", "slope", book=BOOK))
     t_locked = Integral("s", "time in which the wheel stands")
 
@@ -55,7 +57,9 @@ class Corner(Assembly[ParT, MemoryT]):
     slip = Shown("1", "braking slip", 0.1)
     sliding = Shown("1", "tyre slides")
     a = Shown("m/s**2", "deceleration", 10.0)
-    E_body = Shown("J", "energy of the body", role=_sink("body"))
+    E_body = Shown(
+        "J", "energy of the body", role=Role("sink", "body", book=BOOK, returns="any")
+    )
 
     def wheel(self, w: Self) -> WheelSpeed:
         """Return how fast the wheel turns."""

@@ -21,7 +21,7 @@ _SLOW = disc_heat.State._fields
 
 
 def _sink(label: str) -> Role:
-    return Role("sink", label, book=_BOOK)
+    return Role("sink", label, book=_BOOK, returns="any")
 
 
 class HotBrakes(TwoWheeler[ParT, MemoryT]):

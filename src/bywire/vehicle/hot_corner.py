@@ -26,7 +26,7 @@ class HotCornerParameters(CornerParameters):
 
 
 def _sink(label: str) -> Role:
-    return Role("sink", label, book=_BOOK)
+    return Role("sink", label, book=_BOOK, returns="any")
 
 
 class HotCorner(Corner[ParT, MemoryT]):
@@ -43,8 +43,9 @@ class HotCorner(Corner[ParT, MemoryT]):
     E_pads = Shown("J", "heat in the pads", role=_sink("pads"))
     E_fluid = Shown("J", "heat in the caliper", role=_sink("caliper"))
     E_brake = Shown(
-        "J", "energy that the brake takes from the wheel", role=Role("sink", "brake", book=BOOK)
-    )
+        "J", "energy that the brake takes from the wheel",
+        role=Role("sink", "brake", book=BOOK, returns="any"),
+    )  # fmt: skip
 
     def braked(self, w: Self) -> float:
         """Return what the brake has taken from the wheel [J]."""

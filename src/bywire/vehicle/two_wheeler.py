@@ -38,6 +38,11 @@ def _sink(label: str) -> Role:
     return Role("sink", label, book=BOOK)
 
 
+def _tyre(label: str) -> Role:
+    """Return the role of a tyre, whose deflection comes back."""
+    return Role("sink", label, book=BOOK, returns="taken")
+
+
 class TwoWheeler(Assembly[ParT, MemoryT]):
     """Body, two wheels on their tyres, and a road; parameters stand in ``vehicle``."""
 
@@ -56,8 +61,8 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     E_brake_f = Integral("J", "heat of the front brake", role=_sink("front brake"))
     E_brake_r = Integral("J", "heat of the rear brake", role=_sink("rear brake"))
     E_roll = Integral("J", "rolling resistance", role=_sink("rolling resistance"))
-    E_tyre_f = Integral("J", "front tyre: slip and deflection", role=_sink("front tyre"))
-    E_tyre_r = Integral("J", "rear tyre: slip and deflection", role=_sink("rear tyre"))
+    E_tyre_f = Integral("J", "front tyre: slip and deflection", role=_tyre("front tyre"))
+    E_tyre_r = Integral("J", "rear tyre: slip and deflection", role=_tyre("rear tyre"))
     W_slope = Integral("J", "work of gravity", role=Role("source", "slope", book=BOOK))
     W_pitch = Integral(
         "J", "work of the braking forces on pitching", role=Role("source", "pitching", book=BOOK)
@@ -80,7 +85,9 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     mu_f = Shown("1", "front braking force over load")
     mu_r = Shown("1", "rear braking force over load")
     a = Shown("m/s**2", "deceleration", 10.0)
-    E_vehicle = Shown("J", "energy of the vehicle", role=_sink("vehicle"))
+    E_vehicle = Shown(
+        "J", "energy of the vehicle", role=Role("sink", "vehicle", book=BOOK, returns="any")
+    )
 
     def brake_torques(self, w: Self) -> tuple[float, float]:
         """Return what the front and the rear brake can hold [N m], >= 0."""
@@ -189,7 +196,8 @@ def _loads(w: Any, cosine: float, front: tyre.Input, rear: tyre.Input) -> two_wh
     """Return the loads of both wheels, lagged or at once."""
     par = w.body.par
     if par.load == "lagged":
-        return two_wheeler_body.loads(ops.fmax(w.body.x.N_lag, 0.0), cosine, par)
+        N_r = two_wheeler_body.carried_load(w.body.x.N_lag, cosine, par)
+        return two_wheeler_body.loads(N_r, cosine, par)
     N_r = two_wheeler_body.rigid_rear_load(
         tyre.force_over_load(w.front_tyre.x, front, w.front_tyre.par),
         tyre.force_over_load(w.rear_tyre.x, rear, w.rear_tyre.par),

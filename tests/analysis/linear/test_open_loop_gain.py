@@ -10,6 +10,8 @@ import pytest
 from bywire.analysis.crossings import margin
 from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.open_loop import open_loop
+from bywire.analysis.loop import LOOPS
+from bywire.analysis.margins import margins
 from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop
 from bywire.brakes.wedge.laws import moment_control
 from bywire.brakes.wedge.model import WedgeBrake, state_at
@@ -17,6 +19,8 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.start import force_for, memory_at, travel_for
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.core.model import Task
+from systems.sampled_lag import LAG, Memory, SampledLag, State
 
 FRICTIONLESS = {
     "bearing.C_0": 0.0, "bearing.C_2": 0.0, "bearing.T_nu": 0.0, "screw.eta_f": 1.0,
@@ -103,3 +107,35 @@ def test_pressure_loop_agrees_with_its_chain() -> None:
     assert apart[0] < 0.01
     assert np.all(np.diff(apart) > 0.0)
     assert apart[-1] < 0.2
+
+
+class Idle(SampledLag):
+    """A controller that looks at the lag by its gain alone, k - 2."""
+
+    def tasks(self, par):
+        """Return the controller."""
+
+        def tick(x, m, u, p):
+            return Memory(m.seen, (p.k - 2.0) * (u.wanted - x.y))
+
+        return (Task("law", par.T_s, tick),)
+
+
+def test_a_gain_of_zero_leaves_no_loop_wherever_it_is_cut() -> None:
+    at = (State(0.0), Memory(0.0, 0.0))
+    for k in (4.0, 2.0):
+        for cut in ("y", "drive"):
+            gain = open_loop(Idle(), LAG.replace({"k": k}), *at, cut=cut)
+            L = gain.response([0.5])[0, 0, 0]
+            assert (abs(L) > 0.1) == (k > 2.0)
+            assert gain.period == LAG.T_s
+    with pytest.raises(UnknownNameError):
+        open_loop(Idle(), LAG, *at, cut="x")
+
+
+def test_an_analog_loop_without_gain_is_none() -> None:
+    loop, par = LOOPS.find("drive-current"), parameters("roberts2003")
+    usual, idle = par, par.replace({"drive.k_p": 0.0, "drive.k_i": 0.0})
+    assert abs(loop.gain(usual, 0.0).response([100.0])[0, 0, 0]) > 0.1
+    assert loop.gain(idle, 0.0).response([100.0])[0, 0, 0] == 0.0
+    assert margins(loop, idle, 0.0).state == "no loop"

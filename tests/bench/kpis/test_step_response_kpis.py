@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from bywire.bench.kpis import hysteresis, release, sine_sweep, static_gain, step_response, tracking
 from bywire.bench.kpis.registry import evaluate
 from bywire.bench.kpis.step_response import Setting
+from bywire.bench.requirements import judge
 from bywire.core.errors import ParameterError, UnknownNameError
 
 
@@ -113,3 +115,78 @@ def test_a_wrong_signal_is_an_input_error():
         evaluate("step_response", recording, Setting("q", 1.0))
     with pytest.raises(ParameterError, match="select one case"):
         evaluate("step_response", recording.expand_dims(case=2), Setting("p", 1.0))
+
+
+def judged(y, **setting):
+    """Return the figures of a response at 0..1 s to a step from 0 to 1 at time zero."""
+    t = np.linspace(0.0, 1.0, y.size)
+    recording = xr.Dataset({"y": ("time", y, {"units": "m"})}, {"time": t})
+    chosen = step_response.Setting("y", 0.0, **{"start": 0.0, "end": 1.0, **setting})
+    return evaluate("step_response", recording, chosen)
+
+
+def outcomes(kpis, **limits):
+    """Return the outcome of each requirement."""
+    return [each.outcome for each in judge(limits, list(kpis.values()))]
+
+
+ROWS = np.linspace(0.0, 1.0, 1001)
+
+
+@pytest.mark.parametrize("level", [0.0, 0.04, 1.0])
+def test_a_brake_that_does_not_move_has_no_figures_of_a_step(level):
+    found = judged(np.linspace(0.0, level, 1001) if level < 1.0 else np.ones(1001))
+    for name in ("dead_time", "rise_time", "settling_time", "overshoot", "ripple"):
+        assert math.isnan(found[name].value), name
+        assert found[name].is_open, name
+        assert "does not move" in found[name].note, name
+    assert outcomes(found, overshoot="<= 15 %", settling_time="<= 2 s") == ["undecided"] * 2
+    assert outcomes(judged(np.ones(1001), end=None), overshoot="<= 15 %") == ["undecided"]
+
+
+def test_a_response_that_still_moves_leaves_open_how_far_it_goes():
+    rising = judged(0.5 * ROWS)  # drifts by 5 % from half to half of the last fifth
+    assert outcomes(rising, overshoot="<= 15 %", steady_state_error="<= 1 m",
+                    ripple="<= 1 m") == ["undecided"] * 3  # fmt: skip
+    assert "by 5 % of the step height" in rising["overshoot"].note
+    assert rising["dead_time"].value == pytest.approx(0.1)
+    assert outcomes(rising, settling_time="<= 0.5 s") == ["missed"]
+    swinging = judged(1.0 + 0.3 * ROWS * np.sin(40.0 * ROWS))
+    assert swinging["overshoot"].is_open
+    without = judged(0.5 * ROWS, end=None)
+    assert all(kpi.is_open for name, kpi in without.items() if name != "steady_state_error")
+
+
+def test_a_response_at_rest_has_its_figures():
+    rippled = judged(1.0 - np.exp(-20.0 * ROWS) + 0.03 * np.sin(2.0 * np.pi * 50.0 * ROWS))
+    assert rippled["ripple"].value == pytest.approx(0.06, rel=1e-2)
+    assert rippled["overshoot"].value == pytest.approx(3.0, rel=1e-2)
+    stuck = judged(0.6 * (1.0 - np.exp(-20.0 * ROWS)))  # at rest, and short of the set point
+    assert stuck["steady_state_error"].value == pytest.approx(0.4, rel=1e-3)
+    assert outcomes(stuck, overshoot="<= 15 %", steady_state_error="<= 0.1 m",
+                    settling_time="<= 1 s") == ["undecided", "missed", "missed"]  # fmt: skip
+    lag = judged(1.0 - np.exp(-20.0 * ROWS))
+    assert outcomes(lag, overshoot="<= 15 %") == ["met"]
+
+
+def test_other_families_have_no_figures_of_what_does_not_move():
+    zero = np.zeros(ROWS.size)
+    signals = {"y": zero, "u": np.sin(2.0 * np.pi * 5.0 * ROWS), "held": np.full(ROWS.size, 0.7)}
+    recording = xr.Dataset(
+        {name: ("time", values, {"units": "m"}) for name, values in signals.items()},
+        {"time": ROWS},
+    )
+    settings = {
+        "static_gain": static_gain.Setting("y", 0.0, 0.5, "A"),
+        "release": release.Setting("y", 0.02),
+        "sine_sweep": sine_sweep.Setting("u", "held", ((5.0, 0.2, 0.8),)),
+        "hysteresis": hysteresis.Setting("u", "held"),
+        "tracking": tracking.Setting("held", "u"),
+    }
+    found = {}
+    for family, setting in settings.items():
+        found |= evaluate(family, recording, setting)
+    for name in ("static_gain", "time_to_empty", "sweep_gain", "sweep_peak", "sweep_bandwidth",
+                 "sweep_lag", "loop_width_mid", "loop_area", "tracking_lag"):  # fmt: skip
+        assert math.isnan(found[name].value), name
+        assert found[name].is_open, name

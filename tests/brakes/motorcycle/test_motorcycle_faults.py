@@ -283,13 +283,13 @@ def test_fluid_that_warms_behind_a_blocked_port_presses_the_pads_on():
 def test_a_port_that_gets_blocked_keeps_what_a_caliper_expands():
     heated = {"fault": "caliper.heated", "value": "2 K/s", "onset": 0.6, "lasts": 1.0}
     bench = Bench(
-        "release", "dardanelli2010", {"port.law": "dead-stroke"},
+        "pressure-release", "dardanelli2010", {"port.law": "dead-stroke"},
         options={"p_from": "5 bar", "duration": "2 s"},
         faults=[heated, {"fault": "port.blocked", "onset": -9.0}],
     )  # fmt: skip
     left = bar(run(bench).recording)[-1]
     opened = Bench(
-        "release", "dardanelli2010", {"port.law": "dead-stroke"},
+        "pressure-release", "dardanelli2010", {"port.law": "dead-stroke"},
         options={"p_from": "5 bar", "duration": "2 s"}, faults=[heated],
     )  # fmt: skip
     assert left > bar(run(opened).recording)[-1] + 0.5

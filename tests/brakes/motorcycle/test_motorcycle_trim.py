@@ -93,7 +93,7 @@ def test_bench_that_starts_beyond_the_end_stop_is_refused() -> None:
     stimulus = {"kind": "step", "start": 0, "end": "1 A", "t_step": 0}
     with pytest.raises(ParameterError, match=r"60 bar is not admissible.*<= 51\.27 bar"):
         bywire.Bench(
-            "open-loop", "dardanelli2010", options={"p_start": "60 bar"}, stimulus=stimulus
+            "motor-open-loop", "dardanelli2010", options={"p_start": "60 bar"}, stimulus=stimulus
         ).cases()
 
 
@@ -111,7 +111,7 @@ def test_memory_of_a_source_holds_no_ecu(mode: str) -> None:
 @pytest.mark.parametrize("source", ["current", "voltage"])
 def test_converters_live_in_open_loop(source: str) -> None:
     bench = bywire.Bench(
-        "open-loop", "dardanelli2010", {"adc.noise": 1e-4},
+        "motor-open-loop", "dardanelli2010", {"adc.noise": 1e-4},
         {"source": source, "p_start": "10 bar", "duration": "0.3 s"},
         {"kind": "step", "start": 0, "end": "6 A" if source == "current" else "3 V", "t_step": 0},
     )  # fmt: skip

@@ -15,7 +15,7 @@ DEAD = {"port.law": "dead-stroke"}
 
 
 def released(overrides: dict[str, Any]) -> Any:
-    bench = bywire.Bench("release", "dardanelli2010", overrides, {"duration": "1 s"})
+    bench = bywire.Bench("pressure-release", "dardanelli2010", overrides, {"duration": "1 s"})
     return run_once(bench).recording
 
 

@@ -32,7 +32,8 @@ def test_current_beyond_the_sensor() -> None:
 
 
 def released(law: str) -> list[str]:
-    bench = bywire.Bench("release", "dardanelli2010", {"port.law": law}, {"duration": "1 s"})
+    options = {"duration": "1 s"}
+    bench = bywire.Bench("pressure-release", "dardanelli2010", {"port.law": law}, options)
     return run_once(bench).warnings
 
 

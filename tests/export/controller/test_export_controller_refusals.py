@@ -98,7 +98,7 @@ def test_description_names_what_is_read(tmp_path: Path) -> None:
     text = (tmp_path / "wedge_brake.a2l").read_text()
     assert text.count("/begin CHARACTERISTIC") == len(made.program.parameters())
     assert text.count("/begin") == text.count("/end")
-    assert 'SYMBOL_LINK "wedge_brake_parameters.control.moment.f_c" 0' in text
+    assert 'SYMBOL_LINK "wedge_brake_calibration.control.moment.f_c" 0' in text
     assert 'SYMBOL_LINK "wedge_brake_memory.i_1_ref" 0' in text
 
 

@@ -13,7 +13,9 @@ from fmpy.fmi2 import FMU2Slave
 class Client:
     """One instance; ``said`` gathers what it logged."""
 
-    def __init__(self, path: Path, folder: Path) -> None:
+    def __init__(
+        self, path: Path, folder: Path, start: float = 0.0, stop: float | None = None
+    ) -> None:
         self.description = read_model_description(str(path))
         self.references = {v.name: v.valueReference for v in self.description.modelVariables}
         if not (folder / "modelDescription.xml").exists():
@@ -24,9 +26,9 @@ class Client:
             modelIdentifier=self.description.coSimulation.modelIdentifier,
         )  # fmt: skip
         self.fmu.instantiate(loggingOn=True)
-        self.fmu.setupExperiment(startTime=0.0)
+        self.fmu.setupExperiment(startTime=start, stopTime=stop)
         self.fmu.enterInitializationMode()
-        self.time = 0.0
+        self.time = start
 
     def begin(self, **parameters: float) -> Client:
         for name, value in parameters.items():

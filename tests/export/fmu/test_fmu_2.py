@@ -50,6 +50,12 @@ def slip(folder: Path) -> ExportedFmu:
     return export_fmu(SLIP, folder)
 
 
+@pytest.fixture(scope="module")
+def parts(folder: Path) -> list[ExportedFmu]:
+    """Plant and ECU of the motorcycle brake."""
+    return [export_fmu(MOTORCYCLE, folder, part=part) for part in ("plant", "ecu")]
+
+
 @pytest.fixture
 def client(motorcycle: ExportedFmu) -> Client:
     return Client(motorcycle.path, motorcycle.path.with_suffix(""))
@@ -130,6 +136,20 @@ def test_a_value_that_is_refused_leaves_it_usable(
     client.begin().follow(1e-3, 0, 3)
 
 
+def test_an_input_outside_its_declared_range_is_refused(
+    wedge: ExportedFmu, capfd: pytest.CaptureFixture[str]
+) -> None:
+    client = Client(wedge.path, wedge.path.with_suffix("")).begin()
+    for value in (2.0, -0.5, float("nan")):
+        with pytest.raises(FMICallException):
+            client["power_off"] = value
+    assert "power_off = 2 is not admissible: it must be >= 0 and <= 1" in capfd.readouterr().out
+    client["power_off"] = 1.0
+    client.follow(1e-3, 0, 2)
+    (described,) = (v for v in client.description.modelVariables if v.name == "power_off")
+    assert (float(described.min), float(described.max)) == (0.0, 1.0)
+
+
 def test_fixed_parameters_stay_and_those_of_the_ecu_alone_are_tuned(
     client: Client, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -164,11 +184,13 @@ def test_changed_parameters_begin_at_rest(client: Client) -> None:
         assert client["p_mc"] == pytest.approx(recorded["p_mc"][row + 1], rel=1e-7)
 
 
-def test_plant_and_ecu_together_are_the_whole(folder: Path) -> None:
-    plant, ecu = (export_fmu(MOTORCYCLE, folder, part=part) for part in ("plant", "ecu"))
+def test_plant_and_ecu_together_are_the_whole(
+    parts: list[ExportedFmu], motorcycle: ExportedFmu
+) -> None:
+    plant, ecu = parts
     brake = Client(plant.path, plant.path.with_suffix("")).begin()
     control = Client(ecu.path, ecu.path.with_suffix("")).begin()
-    whole = Client(folder / "short_stop_brake.fmu", folder / "short_stop_brake").begin()
+    whole = Client(motorcycle.path, motorcycle.path.with_suffix("")).begin()
     reference = whole.reference()
     stimuli = whole.of("input")
     readings = [name for name in control.of("input") if name not in stimuli]
@@ -185,6 +207,71 @@ def test_plant_and_ecu_together_are_the_whole(folder: Path) -> None:
         assert brake["E_stored"] == reference["E_stored"][row + 1]
 
 
+@pytest.mark.parametrize("start", [1.0, -0.3, 1e5 + 1.0 / 3.0])
+def test_a_coupled_run_from_any_start_time_is_the_run_from_zero(
+    parts: list[ExportedFmu], start: float
+) -> None:
+    def coupled(begin: float) -> list[list[float]]:
+        plant, ecu = (
+            Client(each.path, each.path.with_suffix(""), begin).begin() for each in parts
+        )
+        demand, rows = ecu.reference()["p_set"], list[list[float]]()
+        readings = [name for name in ecu.of("input") if name in plant.of("output")]
+        held = plant.of("input")
+        for row in range(120):
+            ecu["p_set"] = demand[row]
+            ecu.set(readings, plant.values(readings))
+            now, then = begin + row * 1e-3, begin + (row + 1) * 1e-3
+            ecu.fmu.doStep(now, then - now)
+            plant.set(held, ecu.values(held))
+            plant.fmu.doStep(now, then - now)
+            rows.append(plant.values(plant.of("output")))
+        assert plant.fmu.getRealStatus(2) == pytest.approx(begin + 0.12, abs=1e-9)
+        return rows
+
+    assert coupled(start) == coupled(0.0)
+
+
+def test_steps_that_add_up_are_taken_and_those_of_another_time_refused(
+    motorcycle: ExportedFmu, capfd: pytest.CaptureFixture[str]
+) -> None:
+    client = Client(motorcycle.path, motorcycle.path.with_suffix(""), 86400.0).begin()
+    client.follow(1e-3, 0, 100)  # the client adds 1 ms up, and rounds each time
+    with pytest.raises(FMICallException):
+        client.fmu.doStep(0.1, 1e-3)
+    assert "the step begins at 0.1 s, but the run is at 86400.1 s" in capfd.readouterr().out
+
+
+def test_a_step_beyond_the_stop_time_is_refused(
+    motorcycle: ExportedFmu, capfd: pytest.CaptureFixture[str]
+) -> None:
+    client = Client(motorcycle.path, motorcycle.path.with_suffix(""), 1.0, 1.003).begin()
+    client.follow(1e-3, 0, 3)
+    with pytest.raises(FMICallException):
+        client.step(1e-3)
+    assert "the step ends at 1.004 s, but the stop time is 1.003 s" in capfd.readouterr().out
+    for start, stop in ((float("nan"), None), (float("inf"), None), (2.0, 1.0)):
+        with pytest.raises(FMICallException):
+            Client(motorcycle.path, motorcycle.path.with_suffix(""), start, stop)
+
+
+def test_a_state_keeps_the_time_of_its_run(motorcycle: ExportedFmu) -> None:
+    folder = motorcycle.path.with_suffix("")
+    client = Client(motorcycle.path, folder, 1.0).begin()
+    client.follow(1e-3, 0, 5)
+    content = client.fmu.serializeFMUState(client.fmu.getFMUState())
+    other = Client(motorcycle.path, folder, 7.0).begin()
+    other.fmu.setFMUState(other.fmu.deserializeFMUState(content))
+    other.time = client.time
+    assert other.follow(1e-3, 5, 10) == client.follow(1e-3, 5, 10)
+    client.fmu.reset()
+    client.fmu.setupExperiment(startTime=2.0)
+    client.fmu.enterInitializationMode()
+    client.fmu.exitInitializationMode()
+    client.time = 2.0
+    client.follow(1e-3, 0, 2)
+
+
 def test_the_same_bench_gives_the_same_bytes(motorcycle: ExportedFmu, tmp_path: Path) -> None:
     again = export_fmu(MOTORCYCLE, tmp_path)
     assert again.path.read_bytes() == motorcycle.path.read_bytes()
@@ -194,7 +281,7 @@ def test_what_cannot_be_exported_is_said(tmp_path: Path, monkeypatch: pytest.Mon
     with pytest.raises(ParameterError, match="makes 9 runs, and one is exported"):
         export_fmu("friction-sweep", tmp_path)
     with pytest.raises(ParameterError, match="without any run"):
-        export_fmu("stribeck", tmp_path)
+        export_fmu("seal-stribeck", tmp_path)
     with pytest.raises(UnknownNameError, match="part 'plants': did you mean 'plant'"):
         export_fmu(MOTORCYCLE, tmp_path, part="plants")
     failing = [{"fault": "motor.demagnetized", "onset": "50 ms"}]

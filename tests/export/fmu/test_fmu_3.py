@@ -27,7 +27,10 @@ BENCHES = {
 class Client:
     """One instance of an FMU of version 3.0."""
 
-    def __init__(self, path: Path, *, has_events: bool = False, may_return_early: bool = False):
+    def __init__(
+        self, path: Path, *, has_events: bool = False, may_return_early: bool = False,
+        start: float = 0.0,
+    ):  # fmt: skip
         folder = path.with_suffix("")
         if not folder.exists():
             extract(str(path), unzipdir=str(folder))
@@ -44,7 +47,7 @@ class Client:
         self.fmu.instantiate(
             loggingOn=True, eventModeUsed=has_events, earlyReturnAllowed=may_return_early
         )
-        self.fmu.enterInitializationMode()
+        self.fmu.enterInitializationMode(startTime=start)
         path = folder / "documentation" / "reference.csv"
         self.reference = np.genfromtxt(path, delimiter=",", names=True)
 
@@ -92,6 +95,27 @@ def test_with_clocks_results_are_those_of_the_bench(path: Path) -> None:
             client.fmu.doStep(at * frame, frame)
             client.fmu.enterEventMode()
             at += 1
+
+
+def test_with_clocks_it_starts_at_any_time(path: Path) -> None:
+    frame = float(Client(path).description.coSimulation.fixedInternalStepSize)
+
+    def rows(start: float) -> list[list[float]]:
+        client = Client(path, has_events=True, start=start)
+        client.fmu.exitInitializationMode()
+        made = []
+        for k in range(20):
+            client.drive(0)
+            client.tick(k * frame)
+            made.append(client.values(client.of("output")))
+            client.fmu.enterStepMode()
+            client.fmu.doStep(start + k * frame, frame)
+            client.fmu.enterEventMode()
+        time = client.fmu.getFloat64([client.references["time"]])[0]
+        assert time == pytest.approx(start + 20 * frame, abs=1e-9)
+        return made
+
+    assert rows(1234.5) == rows(0.0)
 
 
 @pytest.mark.parametrize("rows", [1, 5])

@@ -21,7 +21,8 @@ TICK = 1e-3
 MODES = ["mode.omega", "mode.p_mc", "mode.contact_1", "mode.changes"]
 # Pressure builds up, the piston sticks, is thrown back to its end stop, and touches it again.
 THROWN = bywire.Bench(
-    "open-loop", "dardanelli2010", options={"settle": 0.02, "duration": 0.12, "source": "voltage"},
+    "motor-open-loop", "dardanelli2010",
+    options={"settle": 0.02, "duration": 0.12, "source": "voltage"},
     stimulus={"kind": "table", "times": [0.0, 0.025, 0.04, 0.08],
               "values": [6.0, 0.6, -7.2, -2.4], "between": "hold"},
 )  # fmt: skip
@@ -58,6 +59,21 @@ def solved(
 @pytest.fixture(scope="module")
 def thrown(tmp_path_factory: pytest.TempPathFactory) -> ExportedFmu:
     return export_fmu(THROWN, tmp_path_factory.mktemp("exchange"), kind="model-exchange")
+
+
+def test_a_solver_may_start_at_any_time(thrown: ExportedFmu) -> None:
+    def pressure(start: float) -> np.ndarray:
+        rows = simulate_fmu(
+            str(thrown.path), start_time=start, stop_time=start + 0.03, output=["time", "p_mc"],
+            output_interval=TICK, relative_tolerance=1e-7, record_events=False,
+            start_values={"v_source": 6.0},
+        )  # fmt: skip
+        np.testing.assert_allclose(rows["time"], start + TICK * np.arange(31), rtol=1e-12)
+        return rows["p_mc"]
+
+    at_zero = pressure(0.0)
+    assert np.ptp(at_zero) > 1e5
+    np.testing.assert_allclose(pressure(4.0), at_zero, atol=5.0)
 
 
 def test_frictions_limits_and_contacts_are_met_as_the_kernel_meets_them(

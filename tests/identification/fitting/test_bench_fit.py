@@ -33,7 +33,7 @@ def bench(p_start: float | None = 10e5, f: str = "4 Hz", **overrides: float) -> 
     options = KNOWN if p_start is None else {**KNOWN, "p_start": p_start}
     changed = {name.replace("__", "."): value for name, value in overrides.items()}
     return bywire.Bench(
-        "open-loop", "dardanelli2010", overrides=changed, options=options,
+        "motor-open-loop", "dardanelli2010", overrides=changed, options=options,
         stimulus={**SINE, "f": f},
     )  # fmt: skip
 
@@ -100,9 +100,10 @@ def test_derivatives_of_a_closed_loop_follow_the_controllers_start() -> None:
     still = {"ecu.dither.waveform": "off"}
     stimulus = {**SINE, "mean": "0 bar", "amplitude": "5 bar", "f": "2 Hz"}
     made_on, on = (
-        bywire.Bench("open-loop", "dardanelli2010", overrides=still, stimulus=stimulus, options={
-            "source": "pressure", "add_holding": True, "duration": 0.12, **start,
-        })
+        bywire.Bench(
+            "motor-open-loop", "dardanelli2010", overrides=still, stimulus=stimulus,
+            options={"source": "pressure", "add_holding": True, "duration": 0.12, **start},
+        )
         for start in ({"p_start": 10e5}, {})
     )  # fmt: skip
     question = Question(outputs=TWO.outputs, unknowns={"motor.K_e": "", "caliper.K_pd": ""})

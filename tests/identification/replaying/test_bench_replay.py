@@ -28,7 +28,7 @@ def stop() -> xr.Dataset:
 @pytest.fixture(scope="module")
 def ramp() -> xr.Dataset:
     bench = bywire.Bench(
-        "open-loop", "dardanelli2010", options={"source": "current", "duration": 0.6},
+        "motor-open-loop", "dardanelli2010", options={"source": "current", "duration": 0.6},
         stimulus={"kind": "step", "start": 1.0, "end": 3.0, "t_step": 0.2},
     )  # fmt: skip
     return run_once(bench).recording
@@ -59,7 +59,8 @@ def test_a_motorcycle_starts_at_the_measured_pressure(ramp: xr.Dataset) -> None:
     later = ramp[["i", "p_mc"]].sel(time=slice(0.0, None)).rename(i="current")
     later = later.assign_coords(time=later["time"] + 7.0)
     bench = bywire.Bench(
-        "open-loop", "dardanelli2010", stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
+        "motor-open-loop", "dardanelli2010",
+        stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
     )  # fmt: skip
     found = replay(bench, later, {"i_set": "current"})
     assert list(found.outputs) == ["p_mc"]
@@ -71,7 +72,7 @@ def test_a_motorcycle_starts_at_the_measured_pressure(ramp: xr.Dataset) -> None:
 
 def test_wrong_parameters_show(ramp: xr.Dataset) -> None:
     bench = bywire.Bench(
-        "open-loop", "dardanelli2010", overrides={"master_cylinder.A_mc": 2e-4},
+        "motor-open-loop", "dardanelli2010", overrides={"master_cylinder.A_mc": 2e-4},
         stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
     )  # fmt: skip
     found = replay(bench, ramp[["i", "p_mc"]], {"i_set": "i"})
@@ -82,7 +83,7 @@ def test_wrong_parameters_show(ramp: xr.Dataset) -> None:
 def test_figures_know_their_error_from_the_step(ramp: xr.Dataset) -> None:
     """True errors, against steps of 2 us; and a tolerance that is closer is undecided."""
     coarse, fine = (
-        bywire.replay(ramp, "open-loop", {"simulation.step": step, "motor.R_m": "0.4 ohm"},
+        bywire.replay(ramp, "motor-open-loop", {"simulation.step": step, "motor.R_m": "0.4 ohm"},
                       inputs={"i_set": "i"}, outputs=["p_mc"])
         for step in ("100 us", "2 us")
     )  # fmt: skip
@@ -92,12 +93,12 @@ def test_figures_know_their_error_from_the_step(ramp: xr.Dataset) -> None:
         assert figures[name].error > 0.0
         assert abs(figures[name].value - true[name]) <= 3.0 * figures[name].error
     rmse = figures["rmse"]
-    for limit, outcome in ((rmse.value + 0.5 * rmse.error, "undecided"),
-                           (rmse.value + 2.0 * rmse.error, "met")):  # fmt: skip
+    for limit, outcome in ((rmse.value + 0.5 * rmse.bound, "undecided"),
+                           (rmse.value + 2.0 * rmse.bound, "met")):  # fmt: skip
         (verdict,) = judge_fit({"rmse": f"<= {limit!r} Pa"}, "p_mc", [rmse])
         assert verdict.outcome == outcome
     plain = bywire.replay(
-        ramp, "open-loop", inputs={"i_set": "i"}, outputs=["p_mc"], estimate_error=False
+        ramp, "motor-open-loop", inputs={"i_set": "i"}, outputs=["p_mc"], estimate_error=False
     )
     assert all(math.isnan(k.error) for k in plain.fits[0].kpis)
 
@@ -169,7 +170,8 @@ def test_errors_are_bounded_both_ways() -> None:
 
 def test_missing_samples_are_named(ramp: xr.Dataset) -> None:
     bench = bywire.Bench(
-        "open-loop", "dardanelli2010", stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
+        "motor-open-loop", "dardanelli2010",
+        stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
     )  # fmt: skip
     gap = ramp[["i", "p_mc"]].copy(deep=True)
     gap["p_mc"][40:70] = np.nan
@@ -183,7 +185,8 @@ def test_missing_samples_are_named(ramp: xr.Dataset) -> None:
 
 def test_by_default_what_a_sensor_could_have_measured_is_compared(ramp: xr.Dataset) -> None:
     bench = bywire.Bench(
-        "open-loop", "dardanelli2010", stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
+        "motor-open-loop", "dardanelli2010",
+        stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
     )  # fmt: skip
     found = replay(bench, ramp, {"i_set": "i"})
     assert {"p_mc", "omega"} <= set(found.outputs)
@@ -228,7 +231,8 @@ def test_files_of_segments(tmp_path: Path) -> None:
 
 def test_what_does_not_fit_is_refused(ramp: xr.Dataset) -> None:
     bench = bywire.Bench(
-        "open-loop", "dardanelli2010", stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
+        "motor-open-loop", "dardanelli2010",
+        stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
     )  # fmt: skip
     with pytest.raises(ParameterError, match="nothing measured drives the model"):
         replay(bench, ramp[["i", "p_mc"]])
@@ -244,7 +248,7 @@ def test_what_does_not_fit_is_refused(ramp: xr.Dataset) -> None:
 
 def test_a_replay_whose_energy_balance_is_open_says_so(ramp: xr.Dataset) -> None:
     bench = bywire.Bench(
-        "open-loop", "dardanelli2010", overrides={"pipeline.k_lf": 3.2e-19},
+        "motor-open-loop", "dardanelli2010", overrides={"pipeline.k_lf": 3.2e-19},
         stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
     )  # fmt: skip
     replayed = replay(bench, ramp[["i", "p_mc"]], {"i_set": "i"})

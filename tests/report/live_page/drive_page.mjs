@@ -6,7 +6,7 @@ const text = readFileSync(page, "utf8");
 const block = (id) => JSON.parse(text.match(new RegExp(`id="${id}">(.*?)</script>`, "s"))[1]);
 for (const name of ["values.js", "unpack.js", "figures.js", "loops.js", "margins.js", "curves.js"]) runInThisContext(readFileSync(`${scripts}/${name}`, "utf8"));
 runInThisContext(block("loader"));
-const { description, digest, judged, keep, loops, text: file } = block("bench");
+const { description, digest, judged, keep, loops, units, text: file } = block("bench");
 const parameters = description.parameters.filter(({ used }) => used);
 const brake = await runInThisContext("load")(await runInThisContext("unpacked")(block("kernel")), description);
 const call = (name, ...given) => runInThisContext(name)(...given);
@@ -21,6 +21,9 @@ const tries = {
   loops({ changes }) {
     brake.run(changes);
     return loops.map((loop) => call("loopAt", brake.exports, loop));
+  },
+  quantities({ texts }) {
+    return parameters.map((parameter) => texts.map((text) => call("quantityOf", text, parameter, units)));
   },
   link: ({ changes }) => call("changesOf", call("linkOf", digest, changes), digest, parameters),
   hostile: ({ link }) => call("changesOf", link.replace("DIGEST", digest), digest, parameters),

@@ -17,8 +17,10 @@ from page_benches import BENCHES, VARIED, needs_node, tried
 import bywire
 from bywire.bench.bench_file import read
 from bywire.bench.experiment import EXPERIMENTS
-from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.core.errors import InputError, ParameterError, UnknownNameError
 from bywire.core.parameters import leaf_fields
+from bywire.core.quantities import display_unit
+from bywire.core.units import convert, parse
 from bywire.report.live_page.dependence import dependence
 from bywire.report.live_page.sliders import SLIDERS, first_sliders
 from run_once import run_once
@@ -109,10 +111,10 @@ def test_a_line_through_its_bends_is_within_a_quarter_of_a_pixel_of_every_point(
     ("link", "text"),
     [
         ("bench=0123&motor.R_m=0.5", "another version"),
-        ("bench=DIGEST&motor.R_m=-1", "motor.R_m = -1 ohm is not admissible: it must be > 0 ohm"),
-        ("bench=DIGEST&motor.R_m=1e999", "not admissible"),
-        ("bench=DIGEST&motor.R_m=", "not admissible"),
-        ("bench=DIGEST&motor.R_m=alert(1)", "not admissible"),
+        ("bench=DIGEST&motor.R_m=-1", "motor.R_m must be > 0 ohm, not -1 ohm"),
+        ("bench=DIGEST&motor.R_m=1e999", 'must be > 0 ohm, not "1e999"'),
+        ("bench=DIGEST&motor.R_m=", "must be > 0 ohm, not empty"),
+        ("bench=DIGEST&motor.R_m=alert(1)", 'not "alert(1)": type a number in Ω'),
         ("bench=DIGEST&__proto__=1", "no parameter here"),
         ("bench=DIGEST&ecu.T_s=1e-4", "no parameter here"),  # the run's plan follows it
         ("bench=DIGEST&%3Cscript%3E=1", "no parameter here"),
@@ -121,6 +123,45 @@ def test_a_line_through_its_bends_is_within_a_quarter_of_a_pixel_of_every_point(
 def test_hostile_links_are_refused_in_words(pages, tmp_path, link, text):
     (said,) = tried(pages["motorcycle"], tmp_path, {"kind": "hostile", "link": link})
     assert text in said["error"]
+
+
+TYPED = [
+    "V", "mV", "kV", "A", "mA", "uA", "µA", "ohm", "Ω", "mohm", "kΩ", "W", "kW", "J", "N", "kN",
+    "mN", "Nm", "kNm", "N*m", "N·m", "Pa", "kPa", "MPa", "bar", "mbar", "m", "mm", "um", "cm", "s",
+    "ms", "us", "min", "h", "Hz", "kHz", "rad", "mrad", "deg", "°", "rev", "rpm", "rad/s", "1/s",
+    "l", "ml", "kg", "g", "mH", "H", "K", "degC", "°C", "%", "V*s/rad", "V*s", "N*m/A", "mN*m/A",
+    "bar/A", "A/bar", "A/Pa", "A/(bar*s)", "A*s/bar", "mm/rad", "m/rad", "mm**2", "mm^2", "mm²",
+    "cm**3", "Pa*s", "Pa*s/m**3", "kg*m**2", "kg*mm^2", "g*cm^2", "J/K", "W/K", "1/K", "1/A",
+    "1/(A*s)", "N*s/m", "N*m*s/rad", "m**3/Pa", "ml/bar", "N/mm", "m**2", "m**3", "Pa/s", "apples",
+    "bar)", "(bar", "/s", "bar/", "A//s", "mm**22", "m/s/s",
+]
+
+
+@needs_node
+def test_fields_read_quantities_as_commands_do(pages, name, tmp_path):
+    others = ["-3e-2bar", "1e", "", "0x10", "1 2", "NaN", "+.5 mm"]
+    texts = [*(f"2.5 {unit}" for unit in TYPED), *others]
+    (each,) = tried(pages[name], tmp_path, {"kind": "quantities", "texts": texts})
+    read = 0
+    for (dotted, parameter), values in zip(used(pages[name]).items(), each["answer"], strict=True):
+        for text, value in zip(texts, values, strict=True):
+            try:
+                wanted = parse(text, parameter["unit"], dotted)
+            except InputError:
+                assert value == "NaN", (dotted, parameter["unit"], text)
+                continue
+            assert value == pytest.approx(wanted, rel=2e-15, abs=0.0), (dotted, text)
+            read += 1
+    assert read > 2 * len(each["answer"])
+
+
+@needs_node
+def test_a_number_alone_is_in_the_unit_shown(pages, name, tmp_path):
+    known = used(pages[name])
+    (each,) = tried(pages[name], tmp_path, {"kind": "quantities", "texts": ["2.5"]})
+    for parameter, (value,) in zip(known.values(), each["answer"], strict=True):
+        shown = convert(value, parameter["unit"], display_unit(parameter["unit"]))
+        assert shown == pytest.approx(2.5, rel=1e-14)
 
 
 @needs_node
@@ -216,7 +257,7 @@ def test_parameters_that_drive_the_run_are_held(pages):
         ({"vary": ["motor.R"]}, UnknownNameError, "motor.R_m"),
         ({"vary": ["motor_heat.R_wh"]}, bywire.BywireError, "motor_heat"),
         ({"bench": "force-cycle"}, ParameterError, "choose it"),
-        ({"bench": "stribeck"}, ParameterError, "without any run"),
+        ({"bench": "seal-stribeck"}, ParameterError, "without any run"),
     ],
 )
 def test_what_makes_no_page_is_said(tmp_path, given, error, text):

@@ -15,7 +15,9 @@ from bywire.export.loop_source import loop_source
 
 SAME = 1e-9
 CANCELED = 1e-12  # of a loop gain, beside the 1 that matters
-NAMES = {"gain", "phase", "crossover", "delay", "disk", "sensitivity", "complementary"}
+NAMES = {
+    "gain", "lower_gain", "phase", "crossover", "delay", "disk", "sensitivity", "complementary",
+}  # fmt: skip
 BENCH_OF = {
     "pressure": (BENCHES["motorcycle"], VARIED["motorcycle"]),
     "moment": (BENCHES["wedge"], (*VARIED["wedge"], "flywheel.Omega_0")),
@@ -77,6 +79,20 @@ def test_where_a_contact_closes_there_is_no_loop(tmp_path):
     assert "contact" in made["answer"][0]["reason"]
     with pytest.raises(bywire.BywireError):
         bywire.margins("pressure", overrides=reached)
+
+
+@needs_node
+def test_corners_and_loops_without_gain_are_said(tmp_path):
+    page = bywire.page(BENCHES["motorcycle"], tmp_path / "page.html")
+    at = LOOPS.find("pressure").at.default + 101325.0
+    gains = {f"ecu.pressure.{name}": 0.0 for name in ("k_p", "k_i", "k_d")}
+    cases = ({"pressure_sensor.p_high": at}, {"pressure_sensor.p_high": 1.1 * at}, gains)
+    answers = tried(page, tmp_path, *({"kind": "loops", "changes": each} for each in cases))
+    corner, usual, none = (each["answer"][0] for each in answers)
+    assert "corner of the model" in corner["reason"]
+    assert "bywire margins pressure" in corner["reason"]
+    assert usual["margins"]["hasLoop"]
+    assert none["margins"] == {"isStable": True, "hasLoop": False}
 
 
 def test_what_cannot_follow_parameters_is_left_out():

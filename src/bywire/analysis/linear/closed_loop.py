@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.sampled_system import SampledSystem, sampled_system
+from bywire.analysis.linear.sampled_system import SampledSystem, sampled_models
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
@@ -60,11 +60,16 @@ def closed_loop(
     ------
     ParameterError
         When the model has no task, or a contact just touches.
+    CornerError
+        As `bywire.analysis.linear.linearize.linearize`.
     UnknownNameError
         When a name is unknown.
     """
-    system = sampled_system(model, par, (state, memory, stimulus), inputs, outputs, locked, step)
-    return closed_again(model, system, inputs)
+    return sampled_models(
+        model, par, (state, memory, stimulus),
+        lambda system: (closed_again(model, system, inputs),),
+        inputs=inputs, outputs=outputs, locked=locked, step=step,
+    )[0]  # fmt: skip
 
 
 def closed_again(model: Model, system: SampledSystem, inputs: Sequence[str]) -> LinearModel:

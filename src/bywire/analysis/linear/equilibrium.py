@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bywire.analysis.linear.linearize import Friction, linearize
+from bywire.analysis.linear.linearize import Friction, plant_model, smooth_point
 from bywire.core.errors import ParameterError
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
@@ -67,7 +67,8 @@ def equilibrium(
     names = [*(model.State._fields[k] for k in free), *inputs]
     size = np.array([known[name].nominal for name in names])
     for _ in range(_TURNS):
-        at = linearize(model, par, state, memory, inputs=inputs, outputs=(), friction=friction)
+        # On a corner any side will do: the search only passes there.
+        at = plant_model(smooth_point(model, par, (state, memory, None), friction), inputs, ())
         A = at.A.copy()
         if tied:
             columns = [model.State._fields.index(name) for name in tied]

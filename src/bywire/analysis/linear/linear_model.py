@@ -40,6 +40,9 @@ class LinearModel:
         dx/dt at the operating point, shape (n,); zero in equilibrium.
     period
         Sample time [s]; 0 for a continuous model.
+    corners
+        On which side of an operation's corner the model is taken, where the operating point lies
+        on one; see `bywire.analysis.linear.corners`.
     """
 
     name: str
@@ -55,6 +58,7 @@ class LinearModel:
     output_units: tuple[str, ...]
     rate: Array
     period: float = 0.0
+    corners: tuple[str, ...] = ()
 
     def state_space(self) -> Any:
         """Return it as ``control.StateSpace`` with named signals, for any of its methods.
@@ -140,7 +144,9 @@ class LinearModel:
         """
         poles = self.poles()
         if self.period:
-            return bool(np.abs(poles).max() < 1.0 + _ON_BORDER)
+            return bool(np.abs(poles).max(initial=0.0) < 1.0 + _ON_BORDER)
+        if not poles.size:
+            return True
         return bool(poles.real.max() < _ON_BORDER * np.abs(poles).max())
 
     @property

@@ -6,18 +6,24 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import cache
 from itertools import combinations
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from bywire.analysis.linear.corners import Jacobians, Linearization, linear_models, magnitudes
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.smooth_functions import SmoothFunctions, smooth_functions, vector
+from bywire.analysis.linear.smooth_functions import (
+    SmoothFunctions,
+    SmoothPoint,
+    smooth_functions,
+    vector,
+)
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
-from bywire.core.signals import signals_of
+from bywire.core.signals import signals_of, zeros
 from bywire.core.typing import Array
 
 Friction = Literal["removed", "sliding", "stuck"]
@@ -66,18 +72,97 @@ def linearize(
     ParameterError
         When a contact just touches, a friction is at rest with ``friction="sliding"``, or moves
         with ``"stuck"``.
+    CornerError
+        When the point lies on the corner of an operation (a limit, a dead band, a magnitude)
+        whose sides have different models, and no side is stated; see `corners.taking`.
 
     Notes
     -----
     The Jacobian is exact: ``x`` and the value-only ``xe`` of the protocol are the same here.
     """
     _require_known("input", inputs, model.Memory._fields)
-    _require_known("output", outputs, (*model.State._fields, *model.Output._fields))
-    functions = smooth_functions(model, par)
-    K = _stiffness(model, functions, state, vector(par))
-    directions, moving = _frictions(model, state, friction)
-    values = functions.plant(list(state), list(memory), vector(par), K, directions, moving)
-    A, B, C, D, rate = (np.array(value, dtype=float) for value in values)
+    require_outputs(model, outputs)
+    point = smooth_point(model, par, (state, memory, None), friction)
+    free = free_signals(point, model.State._fields, inputs, ())
+    return linear_models(
+        Linearization(
+            point, free,
+            lambda at: jacobians(at, at.plant(), outputs, free),
+            lambda at: (plant_model(at, inputs, outputs),),
+            outputs=bool(outputs),
+            ticks=False,
+        )
+    )[0]  # fmt: skip
+
+
+def smooth_point(
+    model: Model,
+    par: ParameterSet,
+    at: tuple[NamedTuple, NamedTuple, NamedTuple | None],
+    friction: Friction | Mapping[str, Friction] = "removed",
+) -> SmoothPoint:
+    """Return an operating point with its closed contacts and what dry friction does there.
+
+    Parameters
+    ----------
+    at
+        State, Memory and Stimulus; None for a stimulus of zeros.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+        As `linearize`.
+    """
+    state, memory, stimulus = at
+    K = _stiffness(model, smooth_functions(model, par), state, vector(par))
+    given = zeros(cast(Any, model.Stimulus)) if stimulus is None else stimulus
+    x, m, u = (np.array([float(v) for v in values]) for values in (state, memory, given))
+    return SmoothPoint(model, par, x, m, u, K, *_frictions(model, state, friction))
+
+
+def free_signals(
+    point: SmoothPoint, states: Sequence[str], memory: Sequence[str], stimulus: Sequence[str]
+) -> NDArray[np.bool_]:
+    """Return which of state, memory and stimulus, in a row, are named and do not stick."""
+    model = point.model
+    stuck = [name for name, g in zip(model.frictions, point.moving, strict=True) if not g]
+    moving = {*states} - {*stuck}
+    pairs = ((model.State, moving), (model.Memory, memory), (model.Stimulus, stimulus))
+    return np.array([name in free for kind, free in pairs for name in kind._fields], dtype=bool)
+
+
+def jacobians(
+    point: SmoothPoint,
+    plant: Sequence[Array],
+    outputs: Sequence[str],
+    free: NDArray[np.bool_],
+    ticks: Sequence[Sequence[Array]] = (),
+) -> Jacobians:
+    """Return the numbers of a linear model by its free signals, see `Jacobians`."""
+    model = point.model
+    A, B, C, D, rate, y = plant
+    C, D = _rows(model, outputs, C, D)
+    kept = [model.Output._fields.index(name) for name in outputs if name in model.Output._fields]
+    values = [rate[:, 0], np.zeros(len(outputs))]
+    recorded = [k for k, name in enumerate(outputs) if name in model.Output._fields]
+    values[1][recorded] = y[kept, 0]
+    nothing = np.zeros((len(A) + len(outputs), point.stimulus.size))
+    rows = [np.hstack([np.vstack([A, C]), np.vstack([B, D]), nothing])]
+    names = [*model.State._fields, *("" for _ in outputs)]
+    for M_x, M_m, M_u, renewed in ticks:
+        rows.append(np.hstack([M_x, M_m, M_u]))
+        values.append(renewed[:, 0])
+        names += [f"{name}[k]" for name in model.Memory._fields]
+    slopes = np.vstack(rows)[:, free] * magnitudes(point)[free]
+    return Jacobians(slopes, np.concatenate(values), tuple(names))
+
+
+def plant_model(
+    point: SmoothPoint, inputs: Sequence[str], outputs: Sequence[str]
+) -> LinearModel:
+    """Return the Jacobians of the smooth part at a point, which may lie on a corner."""
+    model = point.model
+    A, B, C, D, rate, _ = point.plant()
     C, D = _rows(model, outputs, C, D)
     columns = [model.Memory._fields.index(name) for name in inputs]
     B, D = B[:, columns], D[:, columns]
@@ -200,6 +285,17 @@ def _active(C: Array, d: Array) -> tuple[float, Array, Array]:
 def _subsets(n: int) -> tuple[NDArray[np.intp], ...]:
     chosen = (s for size in range(n + 1) for s in combinations(range(n), size))
     return tuple(np.array(s, dtype=np.intp) for s in chosen)
+
+
+def require_outputs(model: Model, outputs: Sequence[str]) -> None:
+    """Refuse names that are neither outputs nor states.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names.
+    """
+    _require_known("output", outputs, (*model.State._fields, *model.Output._fields))
 
 
 def _require_known(kind: str, names: Sequence[str], known: Sequence[str]) -> None:

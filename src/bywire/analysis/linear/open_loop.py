@@ -10,7 +10,8 @@ import numpy as np
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.linear.sampled_system import Jacobians, SampledSystem, sampled_system
+from bywire.analysis.linear.sampled_system import Jacobians, SampledSystem, sampled_models
+from bywire.analysis.linear.smooth_functions import smooth_functions
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
@@ -53,14 +54,20 @@ def open_loop(
     ParameterError
         When no controller reads or writes the field, several do, another one runs more slowly,
         or nobody takes what is handed on.
+    CornerError
+        As `bywire.analysis.linear.linearize.linearize`.
     """
-    system = sampled_system(model, par, (state, memory, stimulus), (), (), locked)
-    return cut_open(model, system, cut)
+    return sampled_models(
+        model, par, (state, memory, stimulus), lambda system: (cut_open(model, system, cut),),
+        locked=locked,
+    )[0]  # fmt: skip
 
 
 def cut_open(model: Model, system: SampledSystem, cut: str) -> LinearModel:
     """Return `open_loop` of a system that was made for any inputs and outputs."""
     fields, states = model.Memory._fields, system.plant.states
+    if _is_without_gain(system, cut):
+        return _nothing(model, cut, system.common * system.frame)
     if cut not in (*states, *fields):
         raise unknown_name("field of state and memory", cut, (*states, *fields))
     if cut in states:
@@ -85,6 +92,40 @@ def cut_open(model: Model, system: SampledSystem, cut: str) -> LinearModel:
         (*system.plant.state_units, *(held[name].unit for name in fields)), (unit,), (unit,),
         np.zeros(size), system.common * system.frame,
     )  # fmt: skip
+
+
+def _is_without_gain(system: SampledSystem, cut: str) -> bool:
+    """Return whether a field would be read or taken, but for gains or openings of 0."""
+    if cut not in system.plant.inputs:
+        is_read = cut in system.plant.states and any(
+            X[:, system.plant.states.index(cut)].any() for X, _, _ in system.ticks
+        )
+        return not is_read and any(cut in names for names in system.reads)
+    row = system.plant.inputs.index(cut)
+    is_taken = system.plant.B[:, row].any() or any(
+        np.delete(M[:, row], row).any() for _, M, _ in system.ticks
+    )
+    return not is_taken and cut in system.takes
+
+
+def _nothing(model: Model, cut: str, period: float) -> LinearModel:
+    """Return the gain of a loop that feeds nothing back."""
+    unit = (signals_of(model.State) | signals_of(model.Memory))[cut].unit
+    return LinearModel(
+        f"{model.name}, cut at {cut}",
+        np.zeros((0, 0)),
+        np.zeros((0, 1)),
+        np.zeros((1, 0)),
+        np.zeros((1, 1)),
+        (),
+        (cut,),
+        (cut,),
+        (),
+        (unit,),
+        (unit,),
+        np.zeros(0),
+        period,
+    )
 
 
 def _cut_reading(system: SampledSystem, column: int, cut: str) -> tuple[Jacobians, Any]:
@@ -190,11 +231,19 @@ def analog_gain(
     whole = linearize(model, par, state, memory, inputs=(), outputs=(cut,))
     kept = [name for name in whole.live if name not in locked]
     plant = whole.reduced(kept, held=bool(locked))
+    if cut in locked:
+        raise ParameterError(f"{cut} cannot be cut: it is locked")
+    if cut not in plant.states:
+        return _nothing(model, cut, 0.0)
     k = plant.states.index(cut)
     A, B = plant.A.copy(), plant.A[:, k : k + 1].copy()
     B[k] = 0.0  # the state's own decay is no feedback through the controller: it stays
     A[:, k] -= B[:, 0]
     if not B.any():
+        by = smooth_functions(model, par).driven[0][:, model.State._fields.index(cut)]
+        readers = {name for name, reads in zip(model.State._fields, by, strict=True) if reads}
+        if readers - {cut, *locked}:  # it is read, but for gains of 0
+            return _nothing(model, cut, 0.0)
         raise ParameterError(f"{cut} cannot be cut: nothing in {model.name} reads it")
     return replace(
         plant, name=f"{model.name}, cut at {cut}", A=A, B=B, C=-plant.C, D=np.zeros((1, 1)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from bywire.analysis.linear.corners import taking
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import Friction
 from bywire.analysis.loop import Quantity
@@ -52,6 +53,8 @@ class Plant:
         Frequency [Hz] up to which it is usually looked at.
     whole
         The model that this one simplifies, of the same inputs and outputs; None for the exact one.
+    side
+        As of `bywire.analysis.loop.Loop`.
     """
 
     name: str
@@ -61,6 +64,17 @@ class Plant:
     model: Callable[[ParameterSet, PlantPoint], LinearModel]
     band: float
     whole: Callable[[ParameterSet, PlantPoint], LinearModel] | None = None
+    side: str = ""
+
+    def linear(self, par: ParameterSet, point: PlantPoint) -> LinearModel:
+        """Return `model` on the plant's side of corners."""
+        with taking(self.side):
+            return self.model(par, point)
+
+    def exact(self, par: ParameterSet, point: PlantPoint) -> LinearModel | None:
+        """Return the model that this one simplifies, likewise; None for the exact one."""
+        with taking(self.side):
+            return None if self.whole is None else self.whole(par, point)
 
     @property
     def usual(self) -> PlantPoint:

@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from bywire.analysis.linear.corners import Linearization, linear_models
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.linear.smooth_functions import smooth_functions, vector
+from bywire.analysis.linear.linearize import (
+    free_signals,
+    jacobians,
+    plant_model,
+    require_outputs,
+    smooth_point,
+)
+from bywire.analysis.linear.smooth_functions import SmoothPoint, smooth_functions
 from bywire.core.errors import ParameterError, StepError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
-from bywire.core.signals import zeros
 
 Jacobians = list[Any]
 """of the new memory by states, memory and inputs"""
@@ -33,6 +40,10 @@ class SampledSystem:
         Exact model of the plant over a frame, driven by all fields of the Memory.
     names, ticks
         Tasks and their Jacobians, in the order in which they run.
+    reads
+        States that each task may read, whatever its gains.
+    takes
+        Fields of the Memory that the plant may take, likewise.
     every
         Frames per tick of each task.
     frame
@@ -42,6 +53,8 @@ class SampledSystem:
     plant: LinearModel
     names: tuple[str, ...]
     ticks: tuple[Jacobians, ...]
+    reads: tuple[frozenset[str], ...]
+    takes: frozenset[str]
     every: tuple[int, ...]
     frame: float
 
@@ -70,21 +83,25 @@ class SampledSystem:
         return np.block([[A + B @ M_x, B @ M_m], [M_x, M_m]]), np.vstack([B @ M_u, M_u])
 
 
-def sampled_system(
+def sampled_models(
     model: Model,
     par: ParameterSet,
     point: tuple[NamedTuple, NamedTuple, NamedTuple | None],
-    inputs: Sequence[str],
-    outputs: Sequence[str],
+    build: Callable[[SampledSystem], tuple[LinearModel, ...]],
+    *,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
     locked: Sequence[str] = (),
     step: float = 0.0,
-) -> SampledSystem:
-    """Return plant and controllers at an operating point; dry friction is removed.
+) -> tuple[LinearModel, ...]:
+    """Return linear models of plant and controllers at an operating point; friction is removed.
 
     Parameters
     ----------
     point
         State, Memory and Stimulus; None for a stimulus of zeros.
+    build
+        Makes the models of a system.
     inputs, outputs, locked, step
         As in ``closed_loop``.
 
@@ -92,6 +109,8 @@ def sampled_system(
     ------
     ParameterError
         When the model has no task, or a contact just touches.
+    CornerError
+        As `linearize`.
     UnknownNameError
         When a name is unknown.
     """
@@ -101,19 +120,43 @@ def sampled_system(
     for name in inputs:
         if name not in model.Stimulus._fields:
             raise unknown_name("signal of the stimulus", name, model.Stimulus._fields)
-    state, memory, stimulus = point
-    plant = linearize(model, par, state, memory, inputs=model.Memory._fields, outputs=outputs)
-    kept = [name for name in plant.live if name not in locked]
-    frame, every = frames_of([task.period for task in tasks])
-    at = zeros(cast(Any, model.Stimulus)) if stimulus is None else stimulus
-    moving = plant.reduced(kept, held=bool(locked))
-    return SampledSystem(
-        plant=stepped(moving, frame, step) if step else moving.sampled(frame),
-        names=tuple(task.name for task in tasks),
-        ticks=_ticks(model, par, (state, memory, at), inputs, kept),
-        every=tuple(every),
-        frame=frame,
-    )
+    require_outputs(model, outputs)
+    at = smooth_point(model, par, point)
+    states = [name for name in model.State._fields if name not in locked]
+    free = free_signals(at, states, model.Memory._fields, inputs)
+    functions = smooth_functions(model, par)
+    reads = tuple(_named(model.State._fields, row) for row in functions.reads)
+    takes = _named(model.Memory._fields, functions.driven[1].any(axis=0))
+    periods = {task.name: task.period for task in tasks}
+    frame, every = frames_of([*periods.values()])
+
+    def system(at: SmoothPoint) -> SampledSystem:
+        plant = plant_model(at, model.Memory._fields, outputs)
+        kept = [name for name in plant.live if name not in locked]
+        moving = plant.reduced(kept, held=bool(locked))
+        return SampledSystem(
+            plant=stepped(moving, frame, step) if step else moving.sampled(frame),
+            names=tuple(periods),
+            ticks=_ticks(at, inputs, kept),
+            reads=reads,
+            takes=takes,
+            every=tuple(every),
+            frame=frame,
+        )
+
+    return linear_models(
+        Linearization(
+            at, free,
+            lambda at: jacobians(at, at.plant(), outputs, free, at.ticks()),
+            lambda at: build(system(at)),
+            outputs=bool(outputs),
+            ticks=True,
+        )
+    )  # fmt: skip
+
+
+def _named(names: Sequence[str], chosen: NDArray[np.bool_]) -> frozenset[str]:
+    return frozenset(name for name, is_chosen in zip(names, chosen, strict=True) if is_chosen)
 
 
 def frames_of(periods: Sequence[float]) -> tuple[float, list[int]]:
@@ -127,22 +170,12 @@ def frames_of(periods: Sequence[float]) -> tuple[float, list[int]]:
 
 
 def _ticks(
-    model: Model,
-    par: ParameterSet,
-    point: tuple[Any, Any, Any],
-    inputs: Sequence[str],
-    kept: Sequence[str],
+    point: SmoothPoint, inputs: Sequence[str], kept: Sequence[str]
 ) -> tuple[Jacobians, ...]:
     """Return the Jacobians of every task's new memory by kept states, memory and inputs."""
-    rows = [model.State._fields.index(name) for name in kept]
-    columns = [model.Stimulus._fields.index(name) for name in inputs]
-    state, memory, stimulus = point
-    jacobians = []
-    for tick in smooth_functions(model, par).ticks:
-        values = tick(list(state), list(memory), list(stimulus), vector(par))
-        M_x, M_m, M_u = (np.array(value, dtype=float) for value in values)
-        jacobians.append([M_x[:, rows], M_m, M_u[:, columns]])
-    return tuple(jacobians)
+    rows = [point.model.State._fields.index(name) for name in kept]
+    columns = [point.model.Stimulus._fields.index(name) for name in inputs]
+    return tuple([M_x[:, rows], M_m, M_u[:, columns]] for M_x, M_m, M_u, _ in point.ticks())
 
 
 def stepped(model: LinearModel, period: float, step: float) -> LinearModel:

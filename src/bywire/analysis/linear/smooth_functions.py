@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from threading import Lock
 from typing import Any, cast
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bywire.core.model import Model
+from bywire.core.ops import where
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
+from bywire.core.typing import Array
+from bywire.simulation.buffered_call import BufferedCall
 from bywire.simulation.engine import structure_of
 
 _BUILT: dict[tuple[object, ...], SmoothFunctions] = {}
@@ -22,16 +31,49 @@ class SmoothFunctions:
     contacts
         ``(x, p) -> (C of each group..., all overlaps)``.
     plant
-        ``(x, m, p, K, s, g) -> (A, B, C, D, rate)`` with the stiffness K of closed contacts, the
-        direction s of each friction (0: removed) and g, 0 for each velocity that is stuck and 1
-        else; B and D by all of the Memory, C and D for all of the Output.
+        ``(x, m, p, K, s, g) -> (A, B, C, D, rate, y)`` with the stiffness K of closed contacts,
+        the direction s of each friction (0: removed) and g, 0 for each velocity that is stuck and
+        1 else; B and D by all of the Memory, C, D and y for all of the Output.
     ticks
-        ``(x, m, u, p) -> (by x, by m, by u)`` of each task's new memory.
+        ``(x, m, u, p) -> (by x, by m, by u, renewed)``: each task's new memory and its Jacobians.
+    reads
+        Of each task, which states its new memory may depend on, whatever the parameters.
+    driven
+        Which states' rates may depend on which states, and on which fields of the Memory.
+    model
+        What they were made of: kept alive, for its parts tell structures apart by identity.
     """
 
     contacts: Any
     plant: Any
     ticks: tuple[Any, ...]
+    reads: tuple[NDArray[np.bool_], ...]
+    driven: tuple[NDArray[np.bool_], NDArray[np.bool_]]
+    model: Model
+
+    @cached_property
+    def plant_at(self) -> _Evaluated:
+        """`plant` on arrays."""
+        return _Evaluated(self.plant)
+
+    @cached_property
+    def ticks_at(self) -> tuple[_Evaluated, ...]:
+        """`ticks` on arrays."""
+        return tuple(map(_Evaluated, self.ticks))
+
+
+class _Evaluated:
+    """A function of dense results on arrays; converting CasADi's matrices takes most of a call."""
+
+    def __init__(self, function: Any) -> None:
+        self._call, self._lock = BufferedCall(function), Lock()
+        self._shapes = [function.size_out(k) for k in range(function.n_out())]
+
+    def __call__(self, *arguments: Any) -> list[Array]:
+        with self._lock:
+            columns = self._call(*arguments)
+            pairs = zip(columns, self._shapes, strict=True)
+            return [np.array(column.reshape(shape, order="F")) for column, shape in pairs]
 
 
 def smooth_functions(model: Model, par: ParameterSet) -> SmoothFunctions:
@@ -57,44 +99,92 @@ def _build(model: Model, par: ParameterSet) -> SmoothFunctions:
     m = ca.SX.sym("m", len(model.Memory._fields))
     u = ca.SX.sym("u", len(model.Stimulus._fields))
     at, held = cast(Any, model.State)(*_split(x)), cast(Any, model.Memory)(*_split(m))
-    ticks = []
+    ticks, reads = [], []
     for k, task in enumerate(model.tasks(par)):
         stimulus = cast(Any, model.Stimulus)(*_split(u))
         renewed = ca.vertcat(*task.tick(at, held, stimulus, symbolic))
         parts = [ca.jacobian(renewed, by) for by in (x, m, u)]
-        ticks.append(ca.Function(f"tick_{k}", [x, m, u, p], parts))
+        reads.append(_pattern(parts[0]).any(axis=0))
+        results = [ca.densify(each) for each in (*parts, renewed)]
+        ticks.append(ca.Function(f"tick_{k}", [x, m, u, p], results))
     groups = [C for C in model.compliance(symbolic) if C]
     gap = _column([d for group in model.gap(at, at, symbolic) for d in group])
     matrices = [ca.SX(ca.vertcat(*(ca.horzcat(*row) for row in C))) for C in groups]
+    plant, driven = _plant(model, symbolic, (x, m, p), at, held, gap)
     return SmoothFunctions(
         contacts=ca.Function("contacts", [x, p], [*matrices, gap]),
-        plant=_plant(model, symbolic, (x, m, p), at, held, gap),
+        plant=plant,
         ticks=tuple(ticks),
+        reads=tuple(reads),
+        driven=driven,
+        model=model,
     )
 
 
 def _plant(
     model: Model, par: ParameterSet, symbols: tuple[Any, Any, Any], x: Any, held: Any, gap: Any
-) -> Any:
-    """Return the function of rates and outputs and their Jacobians."""
+) -> tuple[Any, tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
+    """Return the function of rates and outputs and their Jacobians, and what rates depend on."""
     import casadi as ca
 
     K = ca.SX.sym("K", gap.shape[0], gap.shape[0])
     s = ca.SX.sym("s", len(model.frictions))
     g = ca.SX.sym("g", len(model.frictions))
     contact = tuple(_split(K @ gap))
+    rates, outputs = equations(model, par, (x, held), contact, _split(s), _split(g))
+    rate, y = _column(rates), _column(outputs)
+    parts = [ca.jacobian(a, b) for a in (rate, y) for b in symbols[:2]]
+    results = [ca.densify(each) for each in (*parts, rate, y)]
+    function = ca.Function("plant", [*symbols, K, s, g], results)
+    return function, (_pattern(parts[0]), _pattern(parts[1]))
+
+
+def _pattern(matrix: Any) -> NDArray[np.bool_]:
+    """Return which entries of a symbolic matrix are there."""
+    pattern = np.zeros(matrix.shape, dtype=bool)
+    pattern[tuple(matrix.sparsity().get_triplet())] = True
+    return pattern
+
+
+def equations(
+    model: Model,
+    par: ParameterSet,
+    at: tuple[Any, Any],
+    contact: tuple[Any, ...],
+    directions: Sequence[Any],
+    moving: Sequence[Any],
+    *,
+    outputs: bool = True,
+) -> tuple[list[Any], list[Any]]:
+    """Return rates and outputs of a model's smooth part, on numbers of any kind.
+
+    Parameters
+    ----------
+    model, par
+        The system and its parameters.
+    at
+        State and Memory.
+    contact
+        Forces of the contacts.
+    directions, moving
+        Of each friction: its direction, 0 where it is removed; 0 where its velocity is stuck.
+    outputs
+        Whether outputs are wanted; else there are none.
+    """
+    x, held = at
     force = dict(zip(x._fields, model.balance(x, x, held, par, contact), strict=True))
     reaction: list[Any] = [0.0] * (len(model.frictions) + len(model.limits))
     bounds = model.bounds(x, x, held, par, contact)
     for k, (name, (low, high)) in enumerate(zip(model.frictions, bounds, strict=True)):
-        reaction[k] = ca.if_else(s[k] > 0, low, ca.if_else(s[k] < 0, high, 0.0))
-        force[name] = g[k] * (force[name] + reaction[k])
+        s = directions[k]
+        reaction[k] = where(s > 0, low, where(s < 0, high, 0.0))
+        force[name] = moving[k] * (force[name] + reaction[k])
     mass = model.mass(x, par)
-    rate = _column([force[name] / getattr(mass, name) for name in x._fields])
-    out = model.output(x, held, par, contact, tuple(reaction), zeros(cast(Any, model.Flow)))
-    y = _column(list(out))
-    parts = [ca.densify(ca.jacobian(a, b)) for a in (rate, y) for b in symbols[:2]]
-    return ca.Function("plant", [*symbols, K, s, g], [*parts, ca.densify(rate)])
+    rates = [force[name] / getattr(mass, name) for name in x._fields]
+    if not outputs:
+        return rates, []
+    flow = zeros(cast(Any, model.Flow))
+    return rates, list(model.output(x, held, par, contact, tuple(reaction), flow))
 
 
 def _split(symbols: Any) -> list[Any]:
@@ -107,3 +197,49 @@ def _column(values: list[Any]) -> Any:
     import casadi as ca
 
     return ca.vertcat(*(ca.SX(value) for value in values)) if values else ca.SX(0, 1)
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothPoint:
+    """Numbers at which a model's smooth part and its controllers are evaluated.
+
+    Parameters
+    ----------
+    model, par
+        The system and its parameters.
+    state, memory, stimulus
+        Operating point, as arrays.
+    K
+        Stiffness of the closed contacts.
+    directions, moving
+        As of `equations`.
+    """
+
+    model: Model
+    par: ParameterSet
+    state: Array
+    memory: Array
+    stimulus: Array
+    K: Array
+    directions: Sequence[float]
+    moving: Sequence[float]
+
+    def moved(self, by: Array) -> SmoothPoint:
+        """Return the point displaced in state, memory and stimulus, in a row."""
+        n, m = self.state.size, self.memory.size
+        return replace(
+            self, state=self.state + by[:n], memory=self.memory + by[n : n + m],
+            stimulus=self.stimulus + by[n + m :],
+        )  # fmt: skip
+
+    def plant(self) -> list[Array]:
+        """Return A, B, C, D, rate and y; by all of the Memory and for all of the Output."""
+        return smooth_functions(self.model, self.par).plant_at(
+            self.state, self.memory, vector(self.par), self.K.ravel(order="F"), self.directions,
+            self.moving,
+        )  # fmt: skip
+
+    def ticks(self) -> list[list[Array]]:
+        """Return of each task its Jacobians by state, memory and stimulus, and the new memory."""
+        at = (self.state, self.memory, self.stimulus, vector(self.par))
+        return [tick(*at) for tick in smooth_functions(self.model, self.par).ticks_at]

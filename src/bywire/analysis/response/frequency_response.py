@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
-import threading
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +15,7 @@ from bywire.analysis.response.cases import Cases, cases_of
 from bywire.analysis.response.dataset import Sweep, as_dataset
 from bywire.analysis.response.window import interval, require_measurable, sine_window, spread_of
 from bywire.core.errors import ParameterError
+from bywire.core.interrupts import thread_pool
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array, Complex, Progress
 from bywire.simulation.repetition import Repeated, repeat
@@ -96,34 +94,28 @@ def frequency_response(
     require_measurable(run, sweep)
     cases = cases_of(run, sweep, points)
     plans = [sine_window(run, f, sweep) for f in sweep.frequencies]
-    names, stop = list(run.par.leaves()), threading.Event()
+    names = list(run.par.leaves())
     least = STILL * signals_of(run.model.Output)[sweep.output].nominal
 
     def measure(plan: tuple[float, int]) -> dict[str, Array]:
         window, periods = plan
         windowed = replace(run, duration=window, record=interval(run))
-        repeated = _repeated(windowed, sweep, cases, periods, lanes, stop)
+        repeated = _repeated(windowed, sweep, cases, periods, lanes)
         measured = _measured(repeated, cases.sizes, periods, least)
         measured |= sweep.shares(repeated.values, cases.matrix, names)
         return {name: value.reshape(cases.shape) for name, value in measured.items()}
 
     done: list[dict[str, Array]] = []
-    pool = ThreadPoolExecutor((os.cpu_count() or 1) if lanes else 1)
-    try:
+    with thread_pool(None if lanes else 1) as pool:
         for k, figures in enumerate(pool.map(measure, plans)):
             done.append(figures)
             if progress is not None:
                 progress("frequency response", (k + 1) / len(plans))
-    except KeyboardInterrupt:
-        stop.set()  # for the threads, which it does not reach
-        raise
-    finally:  # waits for what runs, and starts nothing more
-        pool.shutdown(cancel_futures=True)
     return as_dataset(run, sweep, [periods / window for window, periods in plans], done)
 
 
 def _repeated(
-    windowed: Run, sweep: Sweep, cases: Cases, periods: int, lanes: bool, stop: threading.Event
+    windowed: Run, sweep: Sweep, cases: Cases, periods: int, lanes: bool
 ) -> Repeated:
     """Run all amplitudes and variants at one frequency until they repeat."""
     columns = [windowed.model.Stimulus._fields.index(name) for name in sweep.inputs]
@@ -145,7 +137,7 @@ def _repeated(
 
     return repeat(
         windowed, cases.matrix, sines, sweep.recorded, figures, sweep.tolerance, sweep.most,
-        starts=cases.starts, lanes=lanes, stop=stop,
+        starts=cases.starts, lanes=lanes,
     )  # fmt: skip
 
 

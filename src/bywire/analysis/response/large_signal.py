@@ -14,13 +14,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.crossings import fall, measured_margin
+from bywire.analysis.crossings import (
+    fall,
+    gain_factors,
+    lower_factor,
+    measured_margin,
+    upper_factor,
+)
 from bywire.analysis.loop import Loop, Point
+from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.response.dataset import complex_values
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
@@ -54,8 +62,16 @@ class Variant:
         """Return the response of the linear closed loop, shape (frequencies,)."""
         return self.loop.closed(self.par, self.value).response(frequencies)[:, 0, 0]
 
+    @cached_property
+    def has_loop(self) -> bool:
+        """Whether anything is fed back, see `LoopFigures`."""
+        gain, closed = self.loop.gain_and_closed(self.par, self.value)
+        return LoopFigures(gain, closed).has_loop
+
     def gain(self, closed: Complex, frequencies: Array) -> Complex:
         """Return the loop gain behind a measured closed response, both of shape (n,)."""
+        if not self.has_loop:
+            return np.zeros_like(closed)
         T = self.linear(frequencies)
         L = self.loop.gain(self.par, self.value).response(frequencies)[:, 0, 0]
         H = T * (1.0 + L) / L  # the plant has dropped out: T = C_r P/(1 + L), L = C_y P
@@ -90,11 +106,16 @@ class Width:
     crossover, phase_margin
         Of the loop gain's describing function [Hz, degree]; NaN where the frequencies hold no
         crossover or more than one controller acts, crossover infinity beyond the highest.
+    gain_margin, lower_gain_margin
+        Factors by which the gain of the describing function may grow, and to which it may fall;
+        NaN where the frequencies hold no such factor.
     """
 
     bandwidth: float
     crossover: float
     phase_margin: float
+    gain_margin: float = math.nan
+    lower_gain_margin: float = math.nan
 
 
 def width(variant: Variant, response: xr.Dataset) -> Width:
@@ -110,10 +131,18 @@ def width(variant: Variant, response: xr.Dataset) -> Width:
     start = float(np.abs(variant.linear(np.zeros(1))[0]))
     values, f = complex_values(response), response["frequency"].values
     bandwidth, known = fall(response["gain"].values, f, start), np.isfinite(values)
+    if start == 0.0:  # the output does not answer: nothing falls
+        bandwidth = math.nan
     if not variant.loop.single or not known.any():
         return Width(bandwidth, math.nan, math.nan)
-    margin = measured_margin(f[known], variant.gain(values[known], f[known]))
-    return Width(bandwidth, margin.crossover, margin.phase)
+    L = variant.gain(values[known], f[known])
+    margin, factors = measured_margin(f[known], L), gain_factors(f[known], L)
+    upper, lower = upper_factor(factors), lower_factor(factors)
+    return Width(
+        bandwidth, margin.crossover, margin.phase,
+        upper.factor if math.isfinite(upper.frequency) else math.nan,
+        lower.factor if math.isfinite(lower.frequency) else math.nan,
+    )  # fmt: skip
 
 
 def widths(variants: Sequence[Variant], response: xr.Dataset) -> list[list[Width]]:
@@ -126,8 +155,11 @@ def widths(variants: Sequence[Variant], response: xr.Dataset) -> list[list[Width
 
 
 def with_widths(response: xr.Dataset, figures: Sequence[Sequence[Width]]) -> xr.Dataset:
-    """Return a response with bandwidth, crossover and phase margin by variant and amplitude."""
-    units = {"bandwidth": "Hz", "crossover": "Hz", "phase_margin": "degree"}
+    """Return a response with its figures by variant and amplitude, see `Width`."""
+    units = {
+        "bandwidth": "Hz", "crossover": "Hz", "phase_margin": "degree", "gain_margin": "1",
+        "lower_gain_margin": "1",
+    }  # fmt: skip
     rows = {
         name: [[getattr(figure, name) for figure in row] for row in figures] for name in units
     }

@@ -7,7 +7,8 @@ import xarray as xr
 
 from bywire.core.typing import Array
 
-FIGURES = ("gain", "phase", "bandwidth", "crossover", "phase_margin")
+FIGURES = ("gain", "phase", "bandwidth", "crossover", "phase_margin", "gain_margin",
+           "lower_gain_margin")  # fmt: skip
 """what gets an error; phases and margins in degree"""
 
 

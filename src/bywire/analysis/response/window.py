@@ -18,6 +18,8 @@ from bywire.core.units import shown
 from bywire.simulation.repetition import KEPT
 from bywire.simulation.run import Run
 
+MOST_SAMPLES = 10_000_000
+"""samples of a window: 160 MB, at a kilohertz the period of a frequency of 0.2 mHz twice"""
 _LOWEST = 10  # periods of the lowest frequency in a window of lines: it is rounded to one of them
 _CHOICES = 24  # numbers of periods tried for a window close to the wanted frequency
 _CLOSE = 1e-4  # share that a frequency may be off before a longer window is worth its time
@@ -94,7 +96,20 @@ def sine_window(run: Run, f: float, sweep: Sweep) -> tuple[float, int]:
     close = [length for off, length, _ in choices if off <= _CLOSE]
     longest = 2.0 * min(close, default=math.inf)
     _, length, whole = min(choice for choice in choices if choice[1] <= longest)
+    _require_short(run, length, f, length * f)
     return length, whole
+
+
+def _require_short(run: Run, length: float, f: float, periods: float) -> None:
+    """Refuse a window of more samples than are held at once, before anything is computed."""
+    samples = length / interval(run)
+    if not samples <= MOST_SAMPLES:
+        lowest = periods / (MOST_SAMPLES * interval(run))
+        raise ParameterError(
+            f"frequency {shown(f, 'Hz')}: its window would hold {samples:.3g} samples, and "
+            f"{MOST_SAMPLES:.0e} are taken at most: ask for frequencies from "
+            f"{shown(float(f'{lowest:.2g}'), 'Hz')} on, or a lower sample rate"
+        )
 
 
 def line_window(run: Run, sweep: Sweep) -> tuple[float, list[int]]:
@@ -105,7 +120,7 @@ def line_window(run: Run, sweep: Sweep) -> tuple[float, list[int]]:
     Raises
     ------
     ParameterError
-        When the frequencies do not ascend.
+        When the frequencies do not ascend, or one is so low that its window is too long.
     """
     f = list(sweep.frequencies)
     apart = [b - a for a, b in itertools.pairwise(f)]
@@ -114,6 +129,7 @@ def line_window(run: Run, sweep: Sweep) -> tuple[float, list[int]]:
     common = common_interval(run, sweep.whole)
     wanted = max(max(sweep.least, _LOWEST) / f[0], sweep.shortest, *(2.0 / step for step in apart))
     # Half a line more: rounded to lines, neighbors keep one between them.
+    _require_short(run, wanted * 1.25, f[0], wanted * 1.25 * f[0])
     length = math.ceil(wanted * 1.25 / common) * common
     return length, [math.floor(frequency * length + 0.5) for frequency in f]
 

@@ -138,8 +138,10 @@ def of_cases(each: Sequence[Iterable[Kpi]]) -> Iterator[KpiOfCases]:
     """Yield the key figures of cases, each of which gave the same ones, by figure."""
     for kpis in zip(*each, strict=True):
         values, notes = np.array([kpi.value for kpi in kpis]), [kpi.note for kpi in kpis]
-        first = kpis[0]
-        yield KpiOfCases(first.name, values, first.unit, first.definition, notes.__getitem__)
+        first, opened = kpis[0], [kpi.is_open for kpi in kpis]
+        yield KpiOfCases(
+            first.name, values, first.unit, first.definition, notes.__getitem__, opened.__getitem__
+        )
 
 
 def _together(
@@ -205,7 +207,7 @@ def _in_c(
     return {
         figure.name: KpiOfCases(
             figure.name, values, units.get(figure.unit, figure.unit), figure.definition,
-            partial(told, figure, why),
+            partial(told, figure, why), np.isin(why, how.open).tolist().__getitem__,
         )
         for figure, values, why in zip(figures, *given, strict=True)
     }  # fmt: skip

@@ -98,6 +98,11 @@ class Loop:
         return "" if loops == 1 else f"{loops} loops: cut the recording to one"
 
     @property
+    def is_open(self) -> bool:
+        """Whether no figure is defined because drive or response does not move."""
+        return not (np.ptp(self.drive) and np.ptp(self.response))
+
+    @property
     def note(self) -> str:
         """How the samples were treated, and what response is left at the end."""
         left = abs(float(self.response[-1] - self.response[0]))

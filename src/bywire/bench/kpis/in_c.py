@@ -38,6 +38,8 @@ class InC:
         Fields of the family's setting that name signals, in the order of the C.
     reasons
         In short, for pages: why one figure is not defined, from the C's 1 on.
+    open
+        Which of these, from 1 on, leave open what the figure is.
     failures
         In short likewise: why there are none at all, from the C's 1 on.
     packed
@@ -56,6 +58,7 @@ class InC:
 
     signals: tuple[str, ...]
     reasons: tuple[str, ...] = ()
+    open: tuple[int, ...] = ()
     failures: tuple[str, ...] = (UNSOUND,)
     packed: Callable[[Any, int], Array] = lambda setting, cases: np.zeros(1)
     note: Callable[[Any], str] = lambda setting: ""

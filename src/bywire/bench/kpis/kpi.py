@@ -2,7 +2,9 @@
 
 A family (one file) has a data class with what its figures need and one function per figure,
 declared with `measure`. A figure that is not defined for a recording is NaN with a reason in
-its note, never an exception and never a number that stands for something else.
+its note, never an exception and never a number that stands for something else. Where the recording
+leaves open what the figure is (nothing moved, or it still moves at the end), the figure is *open*:
+a requirement on it is undecided, neither met nor missed.
 
 The functions of a family whose ``Setting`` declares ``BY_CASE`` take the signals of many cases as
 those of one: shape ``(..., n)``, time last. They give `Values`, NaN for the cases that do not
@@ -22,6 +24,8 @@ import numpy as np
 from bywire.core.errors import unknown_name
 from bywire.core.typing import Array
 from bywire.core.undefined import EqualWhereUndefined
+
+_BOUND = 3.0  # of errors that do not converge: 95 % of the true ones lie within
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +47,11 @@ class Kpi(EqualWhereUndefined):
     error
         Estimated error from the step, in ``unit``; infinite where not even half the step shows
         how large it is, NaN where it was not estimated.
+    is_open
+        Whether it is not defined because the recording leaves open what it is.
+    converges
+        Whether runs in several steps show the order of the scheme; else ``error`` is no more than
+        a scale.
     """
 
     name: str
@@ -51,6 +60,21 @@ class Kpi(EqualWhereUndefined):
     definition: str
     note: str = ""
     error: float = math.nan
+    is_open: bool = False
+    converges: bool = True
+
+    @property
+    def bound(self) -> float:
+        """How far it may be off by the step, in ``unit``: three times the error of no order."""
+        return self.error if self.converges else _BOUND * self.error
+
+
+@dataclass(frozen=True)
+class Undefined:
+    """A key figure that these data do not define, why, and whether they leave it open."""
+
+    reason: str
+    is_open: bool = False
 
 
 class Figures:
@@ -86,7 +110,7 @@ class Figures:
         return {f"{name}{e}": unit for e in endings for name, (unit, _) in self.declared.items()}
 
     def __call__(
-        self, ending: str = "", /, **values: SupportsFloat | tuple[float, str]
+        self, ending: str = "", /, **values: SupportsFloat | tuple[float, str] | Undefined
     ) -> tuple[Kpi, ...]:
         """Return those figures that have a value, in the order of their declaration.
 
@@ -95,7 +119,8 @@ class Figures:
         ending
             What follows their names.
         values
-            Value by name, in the declared unit, NaN where it is not defined; or value and note.
+            Value by name, in the declared unit, NaN where it is not defined; or value and note;
+            or why there is none.
         """
         unknown = values.keys() - self.declared.keys()
         if unknown:
@@ -103,25 +128,35 @@ class Figures:
         kpis = []
         for name in (name for name in self.declared if name in values):
             unit, definition = self.declared[name]
-            given = values[name]
-            if isinstance(given, tuple):
+            given, is_open = values[name], False
+            if isinstance(given, Undefined):
+                value, note, is_open = math.nan, given.reason, given.is_open
+            elif isinstance(given, tuple):
                 value, note = given
             else:
                 value = float(given)
                 note = "" if math.isfinite(value) else self.undefined
-            kpis.append(Kpi(name + ending, float(value), unit, definition, note))
+            kpis.append(Kpi(name + ending, float(value), unit, definition, note, is_open=is_open))
         return tuple(kpis)
 
 
 @dataclass(frozen=True)
-class Undefined:
-    """A key figure that these data do not define, and why."""
+class Why:
+    """Where a figure is not defined, and why.
 
-    reason: str
+    Parameters
+    ----------
+    where
+        Cases without the figure, shape ``(...)``.
+    say
+        ``say(case)``: the reason for one of these.
+    is_open
+        Whether the recording leaves open what the figure is.
+    """
 
-
-Why = tuple[Any, Callable[[Any], str]]
-"""where a figure is not defined, shape ``(...)``, and ``say(case)``, the reason for one of these"""
+    where: Any
+    say: Callable[[Any], str]
+    is_open: bool = False
 
 
 class Values:
@@ -138,23 +173,33 @@ class Values:
     def __init__(self, values: Any, *reasons: Why) -> None:
         self.reasons = reasons
         self.values = np.asarray(values, dtype=np.float64)
-        for wrong, _ in reasons:
-            self.values = np.where(wrong, math.nan, self.values)
+        for why in reasons:
+            self.values = np.where(why.where, math.nan, self.values)
 
     def reason(self, case: Any = ()) -> str:
         """Return why the figure of a case is not defined; empty where it is."""
-        for wrong, say in self.reasons:
-            where = np.asarray(wrong)
+        why = self._first(case)
+        return "" if why is None else why.say(case)
+
+    def is_open(self, case: Any = ()) -> bool:
+        """Return whether the recording of a case leaves open what the figure is."""
+        why = self._first(case)
+        return why is not None and why.is_open
+
+    def _first(self, case: Any) -> Why | None:
+        for why in self.reasons:
+            where = np.asarray(why.where)
             if where[case] if where.ndim else where:
-                return say(case)
-        return ""
+                return why
+        return None
 
 
 @dataclass(frozen=True)
 class KpiOfCases:
     """A key figure of many cases; fields as of `Kpi`.
 
-    ``values``: shape ``(cases,)``; ``told``: ``told(case)``, the note of a case.
+    ``values``: shape ``(cases,)``; ``told``: ``told(case)``, the note of a case; ``opened``:
+    ``opened(case)``, whether its figure is open.
     """
 
     name: str
@@ -162,10 +207,14 @@ class KpiOfCases:
     unit: str
     definition: str
     told: Callable[[Any], str]
+    opened: Callable[[Any], bool] = lambda case: False
 
     def case(self, k: Any) -> Kpi:
         """Return the figure of one case."""
-        return Kpi(self.name, float(self.values[k]), self.unit, self.definition, self.told(k))
+        return Kpi(
+            self.name, float(self.values[k]), self.unit, self.definition, self.told(k),
+            is_open=self.opened(k),
+        )  # fmt: skip
 
 
 class Data(Protocol):
@@ -178,7 +227,10 @@ class Data(Protocol):
 
     @property
     def defect(self) -> str:
-        """Why no figure at all is defined; empty for sound data."""
+        """Why no figure at all is defined; empty for sound data.
+
+        Data with an attribute ``is_open`` say by it whether that leaves the figures open.
+        """
         ...
 
     @property
@@ -225,13 +277,17 @@ class Measure(Generic[D]):
     def of_cases(self, data: D) -> KpiOfCases:
         """Return the figure of all cases that the data hold."""
         unit, note = data.units.get(self.unit, self.unit), data.note
-        value: Any = Undefined(data.defect) if data.defect else self.__wrapped__(data)
+        value: Any = (
+            Undefined(data.defect, getattr(data, "is_open", False)) if data.defect
+            else self.__wrapped__(data)
+        )  # fmt: skip
         if isinstance(value, Undefined):
             reason = value.reason
-            value = Values(math.nan, (True, lambda _: reason))
+            value = Values(math.nan, Why(True, lambda _: reason, value.is_open))
         figure = value if isinstance(value, Values) else Values(value)
         return KpiOfCases(
-            self.name, figure.values, unit, self.definition, lambda k: figure.reason(k) or note
+            self.name, figure.values, unit, self.definition, lambda k: figure.reason(k) or note,
+            figure.is_open,
         )
 
 

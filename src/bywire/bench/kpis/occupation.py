@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.kpis.in_c import InC
-from bywire.bench.kpis.kpi import Undefined, Values, measure
+from bywire.bench.kpis.kpi import Undefined, Values, Why, measure
 from bywire.bench.kpis.samples import defect, integral, signal
 from bywire.core.typing import Array
 
@@ -116,4 +116,5 @@ def _share(t: Array, mode: Array | None, label: str) -> Values | Undefined:
         return Undefined(f"the mode '{label}' is not recorded")
     other = ~np.all((mode == 0.0) | (mode == 1.0), axis=-1)
     share = integral(t, mode) / (t[-1] - t[0])
-    return Values(share, (other, lambda _: f"the mode '{label}' holds other values than 0 and 1"))
+    text = f"the mode '{label}' holds other values than 0 and 1"
+    return Values(share, Why(other, lambda _: text))

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.kpi import Values, measure
+from bywire.bench.kpis.kpi import Values, Why, measure
 from bywire.bench.kpis.samples import defect, sample, signal
 from bywire.core.typing import Array
 
@@ -90,8 +90,11 @@ def time_to_empty(data: Release) -> Values:
     with np.errstate(all="ignore"):  # where it never was above
         share = (here - data.empty) / (here - there)
         left = t[k] + share * (t[k + 1] - t[k])
-    emptied = np.where(above.any(axis=-1), left, 0.0)
-    return Values(emptied, (full, lambda _: "it does not empty in the recorded time"))
+    return Values(
+        left,
+        Why(full, lambda _: "it does not empty in the recorded time"),
+        Why(~above.any(axis=-1), lambda _: "it was empty already at the release", is_open=True),
+    )
 
 
 @measure("level")

@@ -65,6 +65,29 @@ static inline double bw_least(int64_t n, const double *y) {
   return least;
 }
 
+/* Return how far a response moves from one half of its steady state's window to the other: by their
+ * means, or by extremes of the later half beyond those of the earlier one. */
+static inline double bw_drift(int64_t n, const double *t, const double *y) {
+  const int64_t k = (n - 1) / 2, later = n - 1 - k;
+  if (k < 1) return 0.0;
+  const double first = bw_integral(k + 1, t, y) / (t[k] - t[0]);
+  const double then = bw_integral(k + 1, t + later, y + later) / (t[n - 1] - t[later]);
+  const double below = bw_least(k + 1, y) - bw_least(k + 1, y + later);
+  const double above = bw_largest(k + 1, y + later) - bw_largest(k + 1, y);
+  const double beyond = below > above ? below : above, apart = __builtin_fabs(then - first);
+  return apart > beyond ? apart : beyond;
+}
+
+/* Return how far a response goes from its first level. */
+static inline double bw_reach(int64_t n, const double *y) {
+  double most = 0.0;
+  for (int64_t j = 1; j < n; ++j) {
+    const double off = __builtin_fabs(y[j] - y[0]);
+    most = off > most ? off : most;
+  }
+  return most;
+}
+
 /* Return how many times come before one; those that equal it, too, where they are passed. */
 static inline int64_t bw_place(int64_t n, const double *t, double at, int pass_equal) {
   int64_t low = 0, high = n;

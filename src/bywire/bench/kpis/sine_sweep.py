@@ -21,6 +21,8 @@ from bywire.bench.kpis.samples import defect, signal
 from bywire.core.typing import Array
 
 _HALF_POWER = math.sqrt(0.5)
+_ROUNDED = 1e-12  # of the output's largest magnitude: what moves by less is rounded
+_STILL = Undefined("the output does not move at the lowest frequency", is_open=True)
 
 
 @dataclass(frozen=True)
@@ -83,9 +85,21 @@ class Sweep:
             for window in self.windows[: self.frequencies.size]
         ])  # fmt: skip
 
+    @cached_property
+    def moves(self) -> NDArray[np.bool_]:
+        """Whether the output moves at each of these frequencies, shape (k,)."""
+        least = _ROUNDED * float(np.max(np.abs(self.response)))
+        return np.array([
+            np.ptp(self.response[self._rows(begin, end)]) > least
+            for _, begin, end in self.windows[: self.frequencies.size]
+        ])  # fmt: skip
+
+    def _rows(self, begin: float, end: float) -> slice:
+        return slice(*np.searchsorted(self.t, [begin - 1e-9, end + 1e-9]))
+
     def _line(self, y: Array, f: float, begin: float, end: float) -> complex:
         """Return the Fourier coefficient of a signal over a window."""
-        k = slice(*np.searchsorted(self.t, [begin - 1e-9, end + 1e-9]))
+        k = self._rows(begin, end)
         t, turned = self.t[k], y[k] * np.exp(-2j * np.pi * f * self.t[k])
         return complex(np.sum(0.5 * (turned[1:] + turned[:-1]) * np.diff(t)))
 
@@ -110,18 +124,16 @@ def select(recording: xr.Dataset, setting: Setting) -> Sweep:
 
 
 @measure("gain")
-def sweep_gain(data: Sweep) -> float:
+def sweep_gain(data: Sweep) -> float | Undefined:
     """Gain of the output at the lowest frequency: its amplitude over that of the input."""
-    return float(np.abs(data.values[0]))
+    return float(np.abs(data.values[0])) if data.moves[0] else _STILL
 
 
 @measure("1")
 def sweep_peak(data: Sweep) -> float | Undefined:
     """Largest gain over that at the lowest frequency."""
     gains = np.abs(data.values)
-    if gains[0] == 0.0:
-        return Undefined("the output does not move at the lowest frequency")
-    return float(np.max(gains) / gains[0])
+    return float(np.max(gains) / gains[0]) if data.moves[0] else _STILL
 
 
 @measure("Hz")
@@ -132,8 +144,8 @@ def sweep_bandwidth(data: Sweep) -> float | Undefined:
     """
     gains, f = np.abs(data.values), data.frequencies
     below = np.flatnonzero(gains < _HALF_POWER * gains[0])
-    if gains[0] == 0.0:
-        return Undefined("the output does not move at the lowest frequency")
+    if not data.moves[0]:
+        return _STILL
     if not below.size:
         return Undefined(f"above {f[-1]:g} Hz, the highest frequency")
     k = int(below[0])
@@ -145,6 +157,9 @@ def sweep_bandwidth(data: Sweep) -> float | Undefined:
 
 
 @measure("deg")
-def sweep_lag(data: Sweep) -> float:
+def sweep_lag(data: Sweep) -> float | Undefined:
     """Phase by which the output lags behind the input at the highest frequency."""
+    if not data.moves.all():
+        f = data.frequencies[np.argmin(data.moves)]
+        return Undefined(f"the output does not move at {f:g} Hz", is_open=True)
     return float(-np.rad2deg(np.unwrap(np.angle(data.values))[-1]))

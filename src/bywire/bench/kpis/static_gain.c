@@ -4,7 +4,7 @@
 
 enum { STATIC_GAIN };
 enum { T_STEP, SMOOTHING, HAS_WINDOW, WINDOW_BEGIN, WINDOW_END, DRIVES };
-enum { NOTHING_STEPPED = 1 };
+enum { NOTHING_STEPPED = 1, FLAT_RESPONSE, STILL_RESPONSE, CALM_RESPONSE, UNSTEADY_RESPONSE };
 /* what there is instead of figures */
 enum { UNSOUND = 1, STEP_OUTSIDE, WINDOW_EMPTY };
 
@@ -27,14 +27,10 @@ int32_t bw_static_gain(int64_t cases, int64_t n, const double *t, const bw_signa
   if (setting[HAS_WINDOW] != 0.0) a = setting[WINDOW_BEGIN], b = setting[WINDOW_END];
   const int64_t from = bw_place(rows, after, a, 0), until = bw_place(rows, after, b, 1);
   if (until - from < 2) return WINDOW_EMPTY;
-  const int64_t before = earlier > first ? earlier : first + 1; /* the step's instant among them */
   for (int64_t k = 0; k < cases; ++k) {
     const double *y = bw_case(&signals[0], k);
-    if (period > 0.0) {
-      bw_primitive(&average, n, t, y);
-      bw_means(&average, 0, before, y, smooth);
-      bw_means(&average, here + from, here + until, y, smooth);
-    } else for (int64_t j = 0; j < n; ++j) smooth[j] = y[j];
+    if (period > 0.0) bw_smoothed(&average, n, t, y, smooth);
+    else for (int64_t j = 0; j < n; ++j) smooth[j] = y[j];
     double sum = 0.0, *step = smooth + here;
     for (int64_t j = 0; j < earlier; ++j) sum += smooth[j];
     if (t[here] != at) /* the step's instant takes the place of the sample before it */
@@ -42,8 +38,17 @@ int32_t bw_static_gain(int64_t cases, int64_t n, const double *t, const bw_signa
     const double start = earlier ? sum / (double)earlier : step[0];
     const double end = bw_integral(until - from, after + from, step + from)
         / (after[until - 1] - after[from]);
-    const double drive = setting[DRIVES + k];
-    bw_give(&to, STATIC_GAIN, k, (end - start) / drive, drive == 0.0 ? NOTHING_STEPPED : 0);
+    const double drive = setting[DRIVES + k], size = __builtin_fabs(end - start);
+    const double larger = __builtin_fabs(start) > __builtin_fabs(end) ? __builtin_fabs(start)
+        : __builtin_fabs(end);
+    const int64_t count = until - from;
+    const double band = bw_largest(count, step + from) - bw_least(count, step + from);
+    const int32_t why = drive == 0.0 ? NOTHING_STEPPED
+        : !bw_is_finite(size) || size <= 1e-12 * larger ? FLAT_RESPONSE
+        : bw_reach(rows, step) <= 0.05 * size ? STILL_RESPONSE
+        : size <= band ? CALM_RESPONSE
+        : bw_drift(count, after + from, step + from) > 0.02 * size ? UNSTEADY_RESPONSE : 0;
+    bw_give(&to, STATIC_GAIN, k, (end - start) / drive, why);
   }
   return 0;
 }

@@ -15,7 +15,7 @@ import xarray as xr
 
 from bywire.bench.kpis import step_response
 from bywire.bench.kpis.in_c import UNSOUND, InC
-from bywire.bench.kpis.kpi import Values, measure
+from bywire.bench.kpis.kpi import Values, Why, measure
 from bywire.bench.kpis.smoothing import treatment
 from bywire.bench.kpis.step_response import StepResponse
 from bywire.core.typing import Array
@@ -64,7 +64,12 @@ def _units(level: str, setting: Setting) -> dict[str, str]:
 
 IN_C = InC(
     signals=("signal",),
-    reasons=("nothing is stepped",),
+    reasons=(
+        "nothing is stepped", "the step height is zero", "the response does not move",
+        "the response changes by less than its ripple: no step is seen",
+        "the response still moves at the end",
+    ),
+    open=(2, 3, 4, 5),
     failures=(
         UNSOUND,
         "the step is outside the recording",
@@ -117,4 +122,5 @@ def static_gain(data: Gain) -> Values:
     drive = np.asarray(data.drive, dtype=np.float64)
     with np.errstate(all="ignore"):  # where nothing is stepped
         gains = np.asarray((data.response.end - data.response.start) / drive)
-    return Values(gains, (drive == 0.0, lambda _: "nothing is stepped"))
+    nothing = Why(drive == 0.0, lambda _: "nothing is stepped")
+    return Values(gains, nothing, *data.response.blind)

@@ -5,7 +5,8 @@
 enum { DEAD_TIME, RISE_TIME, SETTLING_TIME, OVERSHOOT, STEADY_STATE_ERROR, RIPPLE };
 enum { T_STEP, SMOOTHING, HAS_START, HAS_END, HAS_WINDOW, WINDOW_BEGIN, WINDOW_END, LEVELS };
 enum {
-  FLAT = 1, CALM, NEVER_REACHED, THERE_ALREADY, NEVER_SETTLES, SETTLES_LATE, NO_SET_POINT, NO_WINDOW
+  FLAT = 1, CALM, NEVER_REACHED, THERE_ALREADY, NEVER_SETTLES, SETTLES_LATE, NO_SET_POINT, NO_WINDOW,
+  STILL, UNSTEADY, SHORT
 };
 /* what there is instead of figures */
 enum { UNSOUND = 1, STEP_OUTSIDE, WINDOW_EMPTY };
@@ -60,8 +61,13 @@ static int32_t bw_judge(const bw_figures *to, int64_t k, int64_t n, const double
   const double larger = __builtin_fabs(start) > __builtin_fabs(end) ? __builtin_fabs(start)
       : __builtin_fabs(end);
   bw_course c = {n, t, z, 0};
-  if (!bw_is_finite(height) || size <= 1e-12 * larger) c.blind = FLAT;
+  const int flat = !bw_is_finite(height) || size <= 1e-12 * larger;
+  const int still = bw_reach(n, y) <= 0.05 * size;
+  const int unsteady = !flat && has_window && bw_drift(count, t + from, y + from) > 0.02 * size;
+  if (flat) c.blind = FLAT;
+  else if (still) c.blind = STILL;
   else if (!tracks && size <= band) c.blind = CALM;
+  else if (!tracks && unsteady) c.blind = UNSTEADY;
   double most = 0.0;
   if (!c.blind) {
     for (int64_t j = 0; j < n; ++j) z[j] = (y[j] - start) / height;
@@ -74,10 +80,14 @@ static int32_t bw_judge(const bw_figures *to, int64_t k, int64_t n, const double
   bw_give(to, DEAD_TIME, k, first, early);
   bw_give(to, RISE_TIME, k, nearly - tenth, low ? low : high);
   bw_give(to, SETTLING_TIME, k, settling, settles);
-  bw_give(to, OVERSHOOT, k, 100.0 * (excess > 0.0 ? excess : 0.0), c.blind);
+  const int32_t moving = unsteady ? UNSTEADY : 0;
+  const int32_t falls_short = settles == NEVER_SETTLES && !(excess > 0.0) ? SHORT : 0;
+  bw_give(to, OVERSHOOT, k, 100.0 * (excess > 0.0 ? excess : 0.0),
+      c.blind ? c.blind : moving ? moving : falls_short);
   bw_give(to, STEADY_STATE_ERROR, k, __builtin_fabs(end - mean),
-      !tracks ? NO_SET_POINT : has_window ? 0 : NO_WINDOW);
-  bw_give(to, RIPPLE, k, band, has_window ? 0 : NO_WINDOW);
+      !tracks ? NO_SET_POINT : has_window ? moving : NO_WINDOW);
+  bw_give(to, RIPPLE, k, band,
+      !has_window ? NO_WINDOW : !tracks && flat ? FLAT : still ? STILL : moving);
   return 0;
 }
 

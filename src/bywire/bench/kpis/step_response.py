@@ -4,6 +4,11 @@ All levels are relative to the step: 0 % is ``start``, 100 % is ``end``; steps d
 alike. Crossings are interpolated linearly between samples. Ripple (dither) makes first crossings
 early, last ones late, by up to its amplitude over the local slope, and adds to the overshoot;
 the setting's ``smoothing`` averages first and says so in every note.
+
+A response that never leaves its first level by more than 5 % of the step height does not answer: of
+these figures it has the steady-state error alone. One that still moves in the window of the steady
+state leaves open how far it will go: its overshoot, error and ripple are not defined. Without a set
+point, none of the figures is.
 """
 
 from __future__ import annotations
@@ -24,6 +29,7 @@ from bywire.bench.kpis.smoothing import smoothed, treatment
 from bywire.core.typing import Array
 
 _DEAD, _BAND = 0.05, 0.02  # of the step height: end of the dead time; half settling band
+_MOVING = 0.02  # of the step height, between both halves of the window of the steady state
 _LAST = 0.2  # of the time after the step: the window of the steady state, by default
 _SETTLED = 0.1  # of the time after the step: must lie inside the band, else nothing is proved
 
@@ -83,7 +89,11 @@ IN_C = InC(
         "enters the band only shortly before the recording ends",
         "no set point is given",
         "the steady state's window holds < 2 samples",
+        "the response does not move",
+        "the response still moves at the end",
+        "ends short of the set point and never exceeds it",
     ),
+    open=(1, 2, 6, 9, 10, 11),
     failures=(
         UNSOUND,
         "the step is outside the recording",
@@ -135,20 +145,69 @@ class StepResponse:
         return self.problem or defect(self.t, self.y)
 
     @cached_property
-    def blind(self) -> tuple[Why, ...]:
-        """Where there is no step to be seen, and why."""
+    def flat(self) -> Why:
+        """Where the step height is zero."""
         start, end = np.asarray(self.start), np.asarray(self.end)
         height = np.abs(end - start)
         least = 1e-12 * np.maximum(np.abs(start), np.abs(end))
-        flat: Why = (
+        return Why(
             ~np.isfinite(height) | (height <= least),
             lambda c: f"the step height is zero ({_at(start, c):g} to {_at(end, c):g})",
+            is_open=True,
         )
+
+    @cached_property
+    def still(self) -> Why:
+        """Where the response never leaves its first level by more than 5 % of the step height."""
+        height = np.abs(np.asarray(self.end) - np.asarray(self.start))
+        way, unit = np.asarray(np.max(np.abs(self.y - self.y[..., :1]), axis=-1)), self.unit
+        return Why(
+            way <= _DEAD * height,
+            lambda c: f"the response does not move: {_at(way, c):.3g} of a step of "
+            f"{_at(height, c):.3g} {unit} at most",
+            is_open=True,
+        )
+
+    @cached_property
+    def blind(self) -> tuple[Why, ...]:
+        """Where there is no step to be seen, and why."""
         if self.is_tracking:
-            return (flat,)
+            return (self.flat, self.still)
+        height = np.abs(np.asarray(self.end) - np.asarray(self.start))
         inside = self.y if isinstance(self.steady, Undefined) else self.steady[1]
         text = "the response changes by less than its ripple: no step is seen"
-        return (flat, (height <= np.ptp(inside, axis=-1), lambda _: text))
+        calm = Why(height <= np.ptp(inside, axis=-1), lambda _: text, is_open=True)
+        return (self.flat, self.still, calm, self.unsteady)
+
+    @cached_property
+    def unsteady(self) -> Why:
+        """Where the response still moves in the window of the steady state.
+
+        The means of both halves of the window, of as many intervals each, differ by more than 2 %
+        of the step height, or the extremes of the later half go beyond those of the earlier one by
+        more than that. Ripple of several periods does neither.
+        """
+        height = np.abs(np.asarray(self.end) - np.asarray(self.start))
+        none = Why(np.zeros(height.shape, dtype=bool), lambda _: "")
+        if isinstance(self.steady, Undefined):
+            return none
+        t, y = self.steady
+        k = (t.size - 1) // 2
+        if k < 1:
+            return none
+        halves = [(t[: k + 1], y[..., : k + 1]), (t[t.size - 1 - k :], y[..., t.size - 1 - k :])]
+        (first, low, high), (then, lower, higher) = (
+            (integral(s, z) / (s[-1] - s[0]), np.min(z, axis=-1), np.max(z, axis=-1))
+            for s, z in halves
+        )
+        drift = np.maximum(np.abs(then - first), np.maximum(low - lower, higher - high))
+        return Why(
+            (drift > _MOVING * height) & ~self.flat.where,
+            lambda c: "the response still moves at the end: by "
+            f"{100 * _at(drift, c) / _at(height, c):.3g} % of the step height in the window of the "
+            "steady state; record longer",
+            is_open=True,
+        )
 
     @cached_property
     def course(self) -> Array:
@@ -242,14 +301,15 @@ def settling_time(response: StepResponse) -> Values:
     return Values(
         np.where(strayed, entry - t[0], 0.0),
         *response.blind,
-        (
+        Why(
             outside[..., -1],
             lambda c: f"never settles: {100 * z[c][-1]:.4g} % of the step height at the end",
         ),
-        (
+        Why(
             late,
             lambda c: f"enters the band only {t[-1] - entry[c]:.3g} s before the recording ends: "
             "record longer",
+            is_open=True,
         ),
     )
 
@@ -258,15 +318,23 @@ def settling_time(response: StepResponse) -> Values:
 def overshoot(response: StepResponse) -> Values:
     """Largest excess of the response over the step's end, in % of the step height.
 
-    The largest sample counts; 0 where the end is never exceeded.
+    The largest sample counts. It is 0 where the end is never exceeded; a response that does not
+    even settle there leaves open whether it would overshoot.
     """
-    excess = np.max(response.course, axis=-1) - 1.0
-    return Values(100.0 * np.maximum(0.0, excess), *response.blind)
+    z = response.course
+    excess = np.max(z, axis=-1) - 1.0
+    short = Why(
+        (np.abs(z[..., -1] - 1.0) > _BAND) & (excess <= 0.0),
+        lambda c: f"never exceeds the set point, and ends at {100 * z[c][-1]:.4g} % of the step",
+        is_open=True,
+    )
+    reasons = (*response.blind, response.unsteady, short)
+    return Values(100.0 * np.maximum(0.0, excess), *reasons)
 
 
 @measure("level")
-def steady_state_error(response: StepResponse) -> Array | Undefined:
-    """Magnitude of the set point less the mean response in the window of the steady state.
+def steady_state_error(response: StepResponse) -> Values | Undefined:
+    """Magnitude of the set point minus the mean response in the window of the steady state.
 
     Trapezoidal mean over the window's samples, by default the last 20 % of the time after the
     step. Ripple averages out but for an incomplete period.
@@ -274,18 +342,23 @@ def steady_state_error(response: StepResponse) -> Array | Undefined:
     if not response.is_tracking:
         return Undefined("no set point is given")
     mean = _mean(response)
-    return mean if isinstance(mean, Undefined) else np.asarray(np.abs(response.end - mean))
+    if isinstance(mean, Undefined):
+        return mean
+    return Values(np.abs(response.end - mean), response.unsteady)
 
 
 @measure("level")
-def ripple(response: StepResponse) -> Array | Undefined:
+def ripple(response: StepResponse) -> Values | Undefined:
     """Peak to peak of the response in the window of the steady state.
 
-    Largest less smallest sample; a drift in the window counts. Smoothing removes the ripple of
-    its own period from this figure too.
+    Largest minus smallest sample. Smoothing removes the ripple of its own period from this figure
+    too.
     """
     steady = response.steady
-    return steady if isinstance(steady, Undefined) else np.asarray(np.ptp(steady[1], axis=-1))
+    if isinstance(steady, Undefined):
+        return steady
+    motionless = (response.still,) if response.is_tracking else (response.flat, response.still)
+    return Values(np.ptp(steady[1], axis=-1), *motionless, response.unsteady)
 
 
 def _first(response: StepResponse, level: float) -> Values:
@@ -301,12 +374,12 @@ def _first(response: StepResponse, level: float) -> Values:
     return Values(
         time,
         *response.blind,
-        (
+        Why(
             ~reached.any(axis=-1),
             lambda c: f"never reaches {100 * level:g} % of the step height: "
             f"{100 * np.max(z[c]):.4g} % at most",
         ),
-        (
+        Why(
             k == 0,
             lambda c: f"already at {100 * z[c][0]:.4g} % of the step height at the step",
         ),

@@ -15,6 +15,7 @@ from bywire.bench.kpis.smoothing import smoothed, treatment
 from bywire.core.typing import Array
 
 _LONGEST_LAG = 0.3  # s: longer delays are not looked for
+_STILL = 0.05  # of the set point's range: a signal that moves by less does not follow
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,9 @@ class Tracking:
         from scipy import optimize  # slow to load, and only this needs it
 
         if np.ptp(self.demand) == 0.0:
-            return Undefined("the set point does not move")
+            return Undefined("the set point does not move", is_open=True)
+        if np.ptp(self.y) <= _STILL * np.ptp(self.demand):
+            return Undefined("the signal does not move", is_open=True)
 
         def misfit(delay: float) -> float:
             return float(np.mean((self.y - self.delayed(delay)) ** 2))

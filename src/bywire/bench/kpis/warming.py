@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.kpi import Undefined, Values, measure
+from bywire.bench.kpis.kpi import Undefined, Values, Why, measure
 from bywire.bench.kpis.samples import defect, integral, signal, total
 from bywire.core.typing import Array
 
@@ -123,7 +123,8 @@ def derated_after(data: Warming) -> Array | Values | Undefined:
         return Undefined("the mode 'derated' is not recorded")
     on = data.derated > 0.5
     first = data.t[np.argmax(on, axis=-1)]
-    return Values(first, (~np.any(on, axis=-1), lambda _: "the motor is never derated"))
+    never = Why(~np.any(on, axis=-1), lambda _: "the motor is never derated", is_open=True)
+    return Values(first, never)
 
 
 @measure("level")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -13,6 +12,7 @@ from pathlib import Path
 from bywire.benchmark.commands import environment
 from bywire.benchmark.result import Result, at_most, failed
 from bywire.benchmark.suite import Part
+from bywire.core.child_process import python_command
 from bywire.core.extras import how_to_install
 
 COLD, WARM = 180.0, 20.0
@@ -54,7 +54,7 @@ def _made(root: Path) -> subprocess.CompletedProcess[str]:
     """Make the site as ``tasks.py docs`` does."""
     options = ("-q", "-W", "-n", "-b", "html", "docs", "docs/_build")
     return subprocess.run(
-        [sys.executable, "-m", "sphinx", *options], cwd=root, check=False, stdin=subprocess.DEVNULL,
+        python_command("-m", "sphinx", *options), cwd=root, check=False, stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, encoding="utf-8", errors="replace",
         env={"OMP_NUM_THREADS": "1", **environment()},
     )  # fmt: skip

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.control import current_pi, derating, dither, low_pass_2, pedal_map, pressure_pid
 from bywire.core import ops
-from bywire.core.signals import Signal
+from bywire.core.signals import Limited, Signal
 from bywire.plant import adc, current_sensor, h_bridge, pedal, pressure_sensor
 
 
@@ -32,7 +32,7 @@ class Memory(NamedTuple):
     i_star: Annotated[float, Signal("A", "current demand", 5.0)]
     i_dit: Annotated[float, Signal("A", "dither current", 1.0)]
     i_ref: Annotated[float, Signal("A", "current set point", 5.0)]
-    duty: Annotated[float, Signal("1", "duty cycle", 0.3)]
+    duty: Annotated[float, Signal("1", "duty cycle", 0.3), Limited("ecu.current.D_max")]
     v_source: Annotated[float, Signal("V", "source voltage", 5.0)]
     i_source: Annotated[float, Signal("A", "source current", 5.0)]
     sat_current: Annotated[float, Signal("1", "current demand saturated")]

@@ -60,7 +60,11 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     supply = Part(battery_supply, loss="E_supply")
     motor = Part(dc_motor, loss="E_copper")
     gear = Part(ball_screw_gear, output={"x": "x_mc"})
-    E_gear = Integral("J", "loss of gear and screw, signed", role=Role("sink", "gear and screw"))
+    # The source's law gives energy where the load drives the gear, less than it took before.
+    E_gear = Integral(
+        "J", "loss of gear and screw, signed",
+        role=Role("sink", "gear and screw", returns="taken"),
+    )  # fmt: skip
     seal = Part(seal_friction)
     E_seal = Integral("J", "loss of the seals' friction", role=Role("sink", "seal friction"))
     chamber = Part(master_cylinder, par="master_cylinder", state={"p": "p_mc"}, loss="E_damping")
@@ -74,7 +78,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     port = Part(reservoir_port)
     E_port = Integral(
         "J", "energy out through port and leak, less that of fluid that warms",
-        role=Role("sink", "port, leak, warming fluid"),
+        role=Role("sink", "port, leak, warming fluid", returns="any"),  # which expands
     )
     W_shaft = Integral("J", "work of the motor on the gear")
     t_stuck = Integral("s", "time stuck", role=Role("standstill"))

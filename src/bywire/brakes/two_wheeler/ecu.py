@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from annotated_types import Ge
+
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters as Par
 from bywire.control import (
     abs_rules,
@@ -17,21 +19,29 @@ from bywire.control import (
     wheel_speed,
 )
 from bywire.core import ops
-from bywire.core.signals import Signal
+from bywire.core.signals import Limited, Signal
 
 
 class Stimulus(NamedTuple):
     """What the rider demands."""
 
-    p_f_set: Annotated[float, Signal("Pa", "front pressure demand of the rider", 2e6)]
-    p_r_set: Annotated[float, Signal("Pa", "rear pressure demand of the rider", 2e6)]
+    p_f_set: Annotated[float, Signal("Pa", "front pressure demand of the rider", 2e6), Ge(0)]
+    p_r_set: Annotated[float, Signal("Pa", "rear pressure demand of the rider", 2e6), Ge(0)]
 
 
 class Memory(NamedTuple):
     """What the ECU holds between its ticks."""
 
-    p_f_ref: Annotated[float, Signal("Pa", "front pressure set point", 2e6, set_point_of="p_f")]
-    p_r_ref: Annotated[float, Signal("Pa", "rear pressure set point", 2e6, set_point_of="p_r")]
+    p_f_ref: Annotated[
+        float,
+        Signal("Pa", "front pressure set point", 2e6, set_point_of="p_f"),
+        Limited("p_f_set"),
+    ]
+    p_r_ref: Annotated[
+        float,
+        Signal("Pa", "rear pressure set point", 2e6, set_point_of="p_r"),
+        Limited("p_r_set"),
+    ]
     p_f_most: Annotated[float, Signal("Pa", "front demand, build-up limited", 2e6)]
     p_r_most: Annotated[float, Signal("Pa", "rear demand, build-up limited", 2e6)]
     v_hat: Annotated[float, Signal("m/s", "reference speed", 20.0, set_point_of="v")]

@@ -7,11 +7,15 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from annotated_types import Ge, Le
+
 from bywire.brakes.wedge.laws import gap_adjusting, moment_control, screw_offset
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.control import derating, position_pd
 from bywire.core import ops
-from bywire.core.signals import Signal
+from bywire.core.signals import Limited, Signal
+
+_MOST = Limited("control.position.i_max")
 
 
 class Stimulus(NamedTuple):
@@ -22,7 +26,7 @@ class Stimulus(NamedTuple):
     theta_2_set: Annotated[float, Signal("rad", "demanded angle 2", 3.0)]
     i_1_set: Annotated[float, Signal("A", "current demand 1", 5.0)]
     i_2_set: Annotated[float, Signal("A", "current demand 2", 5.0)]
-    power_off: Annotated[float, Signal("1", "power stages switched off")]
+    power_off: Annotated[float, Signal("1", "power stages switched off"), Ge(0), Le(1)]
 
 
 class Memory(NamedTuple):
@@ -44,8 +48,8 @@ class Memory(NamedTuple):
     last_2: Annotated[float, Signal("rad", "encoder 2 at the last sample", 3.0)]
     speed_1: Annotated[float, Signal("rad/s", "measured speed 1", 50.0)]
     speed_2: Annotated[float, Signal("rad/s", "measured speed 2", 50.0)]
-    i_1_ref: Annotated[float, Signal("A", "current demand 1", 5.0)]
-    i_2_ref: Annotated[float, Signal("A", "current demand 2", 5.0)]
+    i_1_ref: Annotated[float, Signal("A", "current demand 1", 5.0), _MOST]
+    i_2_ref: Annotated[float, Signal("A", "current demand 2", 5.0), _MOST]
     rise_winding_1: derating.Rise
     rise_housing_1: derating.Rise
     rise_winding_2: derating.Rise
@@ -153,12 +157,11 @@ def adjuster_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
 
 
 def current_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
-    """Hand the demanded currents to the drives."""
+    """Hand the demanded currents, within their limit, to the drives."""
     on = 1.0 - u.power_off
-    if par.control.derating.law == "off":
-        return m._replace(on=on, i_1_ref=on * u.i_1_set, i_2_ref=on * u.i_2_set)
     m = _derated(m, par)
-    i_1, i_2 = (ops.clip(i, -m.i_most, m.i_most) for i in (u.i_1_set, u.i_2_set))
+    most = par.control.position.i_max if par.control.derating.law == "off" else m.i_most
+    i_1, i_2 = (ops.clip(i, -most, most) for i in (u.i_1_set, u.i_2_set))
     return m._replace(on=on, i_1_ref=on * i_1, i_2_ref=on * i_2)
 
 

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, NamedTuple
 
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.control import position_pd
+from bywire.core import ops
 from bywire.core.model import Bounds
 from bywire.core.signals import Signal
 from bywire.core.wired import Wired
@@ -97,5 +98,5 @@ def command(
         par.control.T_fast,
         par.control.position,
     )
-    i_ref = out.i if mode == "position" else u.i
+    i_ref = out.i if mode == "position" else ops.clip(u.i, -par.drive.i_max, par.drive.i_max)
     return Command(theta_ref=u.theta, last=x.last, speed=x.speed, i_ref=i_ref)

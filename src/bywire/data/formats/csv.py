@@ -5,18 +5,41 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import FileError
+from bywire.core.errors import FileError, quoted
 from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions
-from bywire.data.text_dialect import HEAD, Dialect, dialect_of, with_mark
-from bywire.data.text_rows import LOOKED_AT, require_whole_end, strict_columns
+from bywire.data.text_dialect import (
+    COMMENTS,
+    HEAD,
+    TEXT,
+    UNCLEAR,
+    Dialect,
+    cells_of,
+    dialect_of,
+    head_of_table,
+    with_mark,
+)
+from bywire.data.text_encoding import blocks_of, is_text
+from bywire.data.text_layouts import layout_of
+from bywire.data.text_rows import LOOKED_AT, Seen, require_whole_end, strict_columns
+from bywire.data.time_stamps import (
+    CLOCK,
+    DAY,
+    DIGITS,
+    MOMENT,
+    nanoseconds,
+    of_digits,
+    over_midnight,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,7 +49,11 @@ _BLOCK = 1 << 24  # bytes
 _PIECE = 1 << 18  # bytes of a block with a flaw that are looked at together: cells take much memory
 _ROWS = 1 << 16  # that are written at a time
 _QUOTED = rb'(?m)(?:^|%s) *"[^"\r\n]*"(?=%s|\r?$)'  # a cell, separators around it
-_OTHER_TEXT = (b"\xff\xfe", b"\xfe\xff")  # UTF-16: text still, and refused as such
+_COMMENTS = tuple(mark.encode() for mark in COMMENTS)
+_STAMPS = (CLOCK, MOMENT, DAY)
+
+RASTER = "X_Value"
+"""name of the instants that a file has as a start and a step alone, as LabVIEW calls them"""
 
 
 class TextSource:
@@ -35,114 +62,300 @@ class TextSource:
     def __init__(self, path: Path, dialect: Dialect) -> None:
         self._path = path
         self._dialect = dialect
-        self._index = _names(dialect)
-        self._width = 1
+        self._seen = Seen()
+        names = _names(dialect)
+        self.order: Sequence[str] = names
+        self._index = {name: k for k, name in enumerate(names)}
+        self._day = _day_column(dialect)
+        self.left_out: Mapping[str, str] = {
+            name: reason for name, k in self._index.items() if (reason := self._why_left_out(k))
+        }
+        for k, kind in enumerate(dialect.kinds):
+            if kind in _STAMPS:
+                self._seen.origins[k] = _origin(dialect, k)
+        self.remarks: list[str] = list(dialect.notes)
 
     @property
     def columns(self) -> Mapping[str, Column]:
         """Every column by its title, or by its number from 1 where it has none."""
-        return {n: Column(n, self._dialect.units[k]) for n, k in self._index.items()}
+        columns = {
+            name: Column(name, self._unit(k), clock=self._clock(k))
+            for name, k in self._index.items()
+            if name not in self.left_out
+        }
+        if self._dialect.raster is not None:
+            columns = {name: replace(column, clock=RASTER) for name, column in columns.items()}
+            columns[RASTER] = Column(RASTER, "s")
+        return columns
 
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
         """Return the numbers of some columns; blank cells become NaN."""
-        indices = [self._index[name] for name in names]
-        dialect = with_mark(self._path, self._dialect, indices)
-        size = self._path.stat().st_size
-        growing = GrowingColumns(len(names), 0)
-        line, done, tail = self._dialect.first_line, self._dialect.start, b""
-        for block in _blocks(self._path, self._dialect.start):
-            columns = _fast(block, dialect, indices)
-            if columns is None:
-                columns = _careful(self._path, block, line, dialect, indices)
-            done += len(block)
-            if not growing.rows:  # as many rows as bytes promise, and a hundredth more
-                expected = 1.01 * len(columns[0]) * (size - self._dialect.start) / len(block)
-                growing = GrowingColumns(len(names), int(expected) + 1)
-            growing.append(columns)
-            line += block.count(b"\n")
-            tail = tail[-LOOKED_AT:] + block[-LOOKED_AT:]
-            require_whole_end(self._path, tail, line, dialect)
-            progress(f"reading {self._path.name}", done / max(size, 1))
-        return dict(zip(names, growing.finished(), strict=True))
+        raster = self._dialect.raster
+        plain = [name for name in names if raster is None or name != RASTER]
+        indices = [self._index[name] for name in plain] or [0]
+        is_dated = self._day is not None and any(self._kind(k) == CLOCK for k in indices)
+        if is_dated:
+            indices.append(self._day)  # type: ignore[arg-type]
+        columns = self._columns(indices, progress)
+        for k, column in zip(indices, columns, strict=True):
+            if self._kind(k) == DIGITS:
+                column[:] = of_digits(column)
+            if self._kind(k) == CLOCK and is_dated:
+                column += columns[-1]
+            elif self._kind(k) in (CLOCK, DIGITS) and (days := over_midnight(column)):
+                self.remarks.append(
+                    f"{self._dialect.label(k)}: it goes on over midnight (passed {days} x)"
+                )
+            if self._kind(k) == DIGITS:
+                column -= column[0] if column.size else 0.0
+            if self._kind(k) in (*_STAMPS, DIGITS) and k < len(self._index) and k != self._day:
+                self.remarks.append(f"{self._dialect.label(k)}: it counts from the first row")
+        self._remark()
+        numbers = dict(zip(plain, columns, strict=False))
+        if raster is not None:
+            numbers[RASTER] = raster[0] + raster[1] * np.arange(columns[0].size)
+        return {name: numbers[name] for name in names}
 
     def place(self, name: str, row: int) -> str:
         """Return the line of a row."""
-        seen = -1
-        with self._path.open("rb") as stream:
-            stream.seek(self._dialect.start)
-            for line, text in enumerate(stream, self._dialect.first_line):
-                seen += bool(text.strip())
+        seen, line, rest = -1, self._dialect.first_line - 1, b""
+        for block in _blocks(self._path, self._dialect):
+            for text in (rest + block).splitlines():
+                line += 1
+                is_row = text.strip() and not text.lstrip().startswith(_COMMENTS)
+                seen += bool(is_row)
                 if seen == row:
                     return f"line {line}"
         return f"row {row + 1}"
 
+    def _columns(
+        self, indices: Sequence[int], progress: Progress
+    ) -> list[NDArray[np.float64]]:
+        """Return columns as they are written, block by block."""
+        dialect = with_mark(self._path, self._dialect, indices)
+        size = self._path.stat().st_size
+        if dialect.encoding.startswith("utf-16"):
+            size //= 2
+        growing = GrowingColumns(len(indices), 0)
+        line, done, tail = self._dialect.first_line, self._dialect.start, b""
+        for block in _blocks(self._path, dialect):
+            columns = _fast(block, dialect, indices, self._seen)
+            if columns is None:
+                columns = _careful(self._path, block, line, dialect, indices, self._seen)
+            done += len(block)
+            if not growing.rows:  # as many rows as bytes promise, and a hundredth more
+                expected = 1.01 * len(columns[0]) * max(size - dialect.start, 0) / len(block)
+                growing = GrowingColumns(len(indices), int(expected) + 1)
+            growing.append(columns)
+            line += block.count(b"\n")
+            tail = tail[-LOOKED_AT:] + block[-LOOKED_AT:]
+            require_whole_end(self._path, tail, line, dialect)
+            progress(f"reading {self._path.name}", min(1.0, done / max(size, 1)))
+        return growing.finished()
 
-def _names(dialect: Dialect) -> dict[str, int]:
-    """Return the index of every column by its name; a title that stands twice tells its number."""
-    titles = dialect.titles or ("",) * dialect.width
-    indices = {}
-    for k, title in enumerate(titles):
-        plain = title or str(k + 1)
-        indices[f"{plain}@{k + 1}" if titles.count(title) > 1 and title else plain] = k
-    return indices
+    def _kind(self, column: int) -> str:
+        return self._dialect.kinds[column]
+
+    def _unit(self, column: int) -> str:
+        """Return the unit of a column as written; times and dates become seconds."""
+        if self._kind(column) in (*_STAMPS, DIGITS):
+            return "s"
+        units = self._dialect.units
+        return units[column] if column < len(units) else ""
+
+    def _clock(self, column: int) -> str | None:
+        clock = self._dialect.clocks.get(column)
+        return None if clock is None else self.order[clock]
+
+    def _why_left_out(self, column: int) -> str:
+        kind = self._kind(column)
+        if kind == TEXT:
+            return "it holds text"
+        if kind == UNCLEAR:
+            return "its dates mean different days to different readers: write 2026-11-26"
+        if kind == DAY:
+            clocks = [k for k, other in enumerate(self._dialect.kinds) if other == CLOCK]
+            is_used = self._day == column and clocks
+            return "its dates go with the times of day" if is_used else "it holds dates"
+        return ""
+
+    def _remark(self) -> None:
+        """Note which cells counted as missing, and which rows were left out."""
+        by_column: dict[int, Counter[str]] = {}
+        for (column, mark), count in self._seen.marks.items():
+            by_column.setdefault(column, Counter())[mark] += count
+        for column, marks in by_column.items():
+            cells = ", ".join(f"{c} x {quoted(m)}" for m, c in marks.most_common(3))
+            self.remarks.append(
+                f"{self._dialect.label(column)}: missing samples: {marks.total()} ({cells})"
+            )
+        if self._seen.comments:
+            self.remarks.append(f"lines of comment left out of the table: {self._seen.comments}")
+        if self._seen.empty:
+            self.remarks.append(f"rows of empty cells left out: {self._seen.empty}")
+        self._seen = Seen(origins=self._seen.origins)
 
 
-def _blocks(path: Path, start: int) -> Iterator[bytes]:
-    """Yield the rest of a file in blocks of whole lines."""
-    with path.open("rb") as stream:
-        stream.seek(start)
-        rest = b""
-        while block := stream.read(_BLOCK):
-            block = rest + block
-            cut = block.rfind(b"\n") + 1
-            rest = block[cut:]
-            if len(rest) > HEAD:
-                raise FileError(f"{path}: a line is longer than {HEAD} bytes: is this a table?")
-            if cut:
-                yield block[:cut]
-        if rest.strip():
-            yield rest
+def _names(dialect: Dialect) -> list[str]:
+    """Return the name of every column; a title that stands twice tells its number."""
+    names: list[str] = []
+    for k in range(dialect.width):
+        title = dialect.titles[k] if k < len(dialect.titles) else ""
+        names.append(f"{title}@{k + 1}" if title and dialect.titles.count(title) > 1
+                     else title or str(k + 1))  # fmt: skip
+    taken = Counter(names)
+    names = [f"{name}@{k}" if taken[name] > 1 else name for k, name in enumerate(names, 1)]
+    while len(names) > len(dialect.titles) > 0 and not _holds_cells(dialect, len(names) - 1):
+        names.pop()  # a separator ends every row
+    return names
+
+
+def _holds_cells(dialect: Dialect, column: int) -> bool:
+    rows = (cells_of(line.replace('"', ""), dialect.separator) for line in dialect.rows)
+    return any(column < len(cells) and cells[column] for cells in rows)
+
+
+def _day_column(dialect: Dialect) -> int | None:
+    """Return the column of dates that goes with the times of day; None where it is not clear."""
+    days = [k for k, kind in enumerate(dialect.kinds) if kind == DAY]
+    return days[0] if len(days) == 1 and CLOCK in dialect.kinds else None
+
+
+def _origin(dialect: Dialect, column: int) -> int:
+    """Return the first stamp of a column [ns]."""
+    for line in dialect.rows:
+        cells = cells_of(line, dialect.separator)
+        if column < len(cells):
+            stamp = nanoseconds(cells[column], dialect.kinds[column])
+            if stamp is not None:
+                return stamp
+    return 0
+
+
+def _blocks(path: Path, dialect: Dialect) -> Iterator[bytes]:
+    """Yield the rest of a file as UTF-8 in blocks of whole lines."""
+    rest, skip = b"", dialect.start
+    for part in blocks_of(path, dialect.encoding, _BLOCK):
+        if skip:
+            part, skip = part[skip:], max(0, skip - len(part))
+        block = rest + part
+        cut = block.rfind(b"\n") + 1
+        rest = block[cut:]
+        if len(rest) > HEAD:
+            raise FileError(f"{path}: a line is longer than {HEAD} bytes: is this a table?")
+        if cut:
+            yield block[:cut]
+    if rest.strip():
+        yield rest
 
 
 def _fast(
-    block: bytes, dialect: Dialect, indices: Sequence[int]
+    block: bytes, dialect: Dialect, indices: Sequence[int], seen: Seen
 ) -> list[NDArray[np.float64]] | None:
     """Return the columns of a block without a flaw; None where each line needs a look."""
     import pandas as pd
 
-    separator = dialect.separator.encode()
-    lines = block.count(b"\n") + (not block.endswith(b"\n"))
-    whole = block.count(separator) == lines * (dialect.width - 1)
-    if not whole or b'"' in block or b"\0" in block:
+    width = _width(block, dialect)
+    if width <= max(indices) or b'"' in block or b"\0" in block:
         return None
+    lines = block.count(b"\n") + (not block.endswith(b"\n"))
+    stamps = [k for k in indices if dialect.kinds[k] in _STAMPS]
     options: dict[str, Any] = {"float_precision": "round_trip"}
     if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1):
         options = {}  # rounds right by default, and warns of the option
     try:
         frame = pd.read_csv(
-            io.BytesIO(block), header=None, sep=dialect.separator, decimal=dialect.decimal,
-            usecols=sorted(set(indices)), dtype=np.float64, keep_default_na=False,
-            na_values=["", "nan", "NaN"], engine="c", **options,
+            io.BytesIO(block), header=None, decimal=dialect.decimal,
+            sep=r"\s+" if dialect.separator == " " else dialect.separator,
+            usecols=sorted(set(indices)), keep_default_na=False,
+            dtype={k: np.dtype(object) if k in stamps else np.float64 for k in set(indices)},
+            na_values={k: ["", "nan", "NaN"] for k in set(indices) - set(stamps)},
+            engine="c", **options,
         )  # fmt: skip
     except (ValueError, OverflowError):  # the strict reader finds the cell, and says it better
         return None
-    columns = [frame[k].to_numpy(dtype=np.float64) for k in indices]
-    is_whole = all(len(column) == lines and not np.isinf(column).any() for column in columns)
-    return columns if is_whole else None
+    columns = []
+    for k in indices:
+        numbers = _seconds(frame[k], dialect, k, seen) if k in stamps else frame[k].to_numpy()
+        if numbers is None or len(numbers) != lines or np.isinf(numbers).any():
+            return None
+        columns.append(np.array(numbers, dtype=np.float64))
+    return columns
+
+
+def _width(block: bytes, dialect: Dialect) -> int:
+    """Return how many cells all rows of a block have; 0 where they are not alike."""
+    lines = block.count(b"\n") + (not block.endswith(b"\n"))
+    if dialect.separator == " ":
+        return dialect.width if len(block.split()) == lines * dialect.width else 0
+    width, rest = divmod(block.count(dialect.separator.encode()), lines)
+    is_right = width + 1 == dialect.width or (dialect.is_ragged and width < dialect.width)
+    return width + 1 if is_right and not rest else 0
+
+
+def _seconds(cells: Any, dialect: Dialect, column: int, seen: Seen) -> NDArray[np.float64] | None:
+    """Return time stamps as seconds from the first one; None where one is none."""
+    kind, origin = dialect.kinds[column], seen.origins[column]
+    stamps = [nanoseconds(str(cell).strip(), kind) for cell in cells]
+    if any(stamp is None for stamp in stamps):
+        return None
+    return np.array([stamp - origin for stamp in stamps if stamp is not None]) / 1e9
 
 
 def _careful(
-    path: Path, block: bytes, line: int, dialect: Dialect, indices: Sequence[int]
+    path: Path, block: bytes, line: int, dialect: Dialect, indices: Sequence[int], seen: Seen
 ) -> list[NDArray[np.float64]]:
     """Return the columns of a block with a flaw: line by line where it is, else by a library."""
     parts = []
     for piece in _pieces(block):
-        columns = _fast(_plain(piece, dialect), dialect, indices)
+        plain = _plain(piece, dialect)
+        columns = _fast(plain, dialect, indices, seen)
         if columns is None:
-            columns = strict_columns(path, piece, line, dialect, indices)
+            columns = _with_marks(plain, dialect, indices, seen)
+        if columns is None:
+            columns = strict_columns(path, piece, line, dialect, indices, seen)
         parts.append(columns)
         line += piece.count(b"\n")
     return [np.concatenate(columns) for columns in zip(*parts, strict=True)]
+
+
+def _with_marks(
+    block: bytes, dialect: Dialect, indices: Sequence[int], seen: Seen
+) -> list[NDArray[np.float64]] | None:
+    """Return the columns of lines whose only flaw is cells that say that nothing was measured."""
+    import pandas as pd
+
+    is_split = dialect.separator == " " or any(dialect.kinds[k] in _STAMPS for k in indices)
+    if is_split or _width(block, dialect) <= max(indices) or b'"' in block or b"_" in block:
+        return None
+    frame = pd.read_csv(
+        io.BytesIO(block), header=None, sep=dialect.separator, usecols=sorted(set(indices)),
+        dtype=object, keep_default_na=False, na_filter=False, engine="c", encoding_errors="replace",
+    )  # fmt: skip
+    if len(frame) != block.count(b"\n") + (not block.endswith(b"\n")):
+        return None
+    found, columns = Seen(), []
+    for k in indices:
+        cells = [cell.strip() for cell in frame[k]]
+        marked = np.array([dialect.is_mark(cell) for cell in cells])
+        numbers = np.full(len(cells), np.nan)
+        texts = [cell for cell, mark in zip(cells, marked, strict=True) if not mark]
+        if dialect.decimal == ",":
+            if any("." in text for text in texts):
+                return None
+            texts = [text.replace(",", ".") for text in texts]
+        try:
+            numbers[~marked] = np.array(texts, dtype=np.float64)
+        except ValueError:
+            return None
+        if not np.isfinite(numbers[~marked]).all():
+            return None
+        for cell, mark in zip(cells, marked, strict=True):
+            if mark and cell:
+                found.marks[k, cell] += 1
+        columns.append(numbers)
+    seen.add(found)
+    return columns
 
 
 def _plain(piece: bytes, dialect: Dialect) -> bytes:
@@ -166,13 +379,8 @@ def _pieces(block: bytes) -> Iterator[bytes]:
 
 @contextmanager
 def _open(path: Path, options: ReadOptions) -> Iterator[TextSource]:
-    with path.open("rb") as stream:
-        head = stream.read(HEAD)
-    yield TextSource(path, dialect_of(path, head, options.decimal, options.skip_lines))
-
-
-def _recognizes(head: bytes) -> bool:
-    return head.startswith(_OTHER_TEXT) or b"\0" not in head
+    head = head_of_table(path, options)
+    yield TextSource(path, layout_of(head) or dialect_of(head))
 
 
 def write_table(dataset: xr.Dataset, path: Path, progress: Progress, separator: str) -> None:
@@ -196,7 +404,10 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
     write_table(dataset, path, progress, ",")
 
 
-FORMAT = FileFormat("csv", "a text table", (".csv", ".txt"), _recognizes, _open, _write)
+FORMAT = FileFormat(
+    "csv", "a text table", (".csv", ".txt"), is_text, _open, _write,
+    also_reads=(".lvm", ".vbo", ".asc", ".prn"),
+)  # fmt: skip
 
 
 _GROWTH = 1.25

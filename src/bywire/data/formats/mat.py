@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import FileError, quoted
 from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions
-from bywire.data.matlab_layout import CLOCKS, NOTES, Part, columns_of, described, parts_of
+from bywire.data.matlab_layout import OBJECT, Found, Part, columns_of, described
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,13 +21,22 @@ if TYPE_CHECKING:
 _LARGEST = 2**31 - 2**16  # bytes of a variable that the format can hold
 _LONGEST = 4096  # characters of a unit or label
 _DEEPEST = 8  # structs in structs
+_MOST_STRUCTS = 1000  # in an array of structs
+_OPAQUE = ("MatlabOpaque", "MatlabObject", "MatlabFunction")  # classes of SciPy
+_REASONS = {
+    "cell": "it is an array of cells",
+    "opaque": OBJECT,
+    "object": OBJECT,
+    "sparse": "it is a sparse matrix",
+    "function": "it is a function",
+}
 _VALUES = 1 << 22  # that are handed over at a time
 _NUMBERS = {"double", "single", "logical",
             *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}  # fmt: skip
 
 
 class MatSource:
-    """An open MAT file; structs become dotted names; cells and objects are left out."""
+    """An open MAT file; structs become dotted names, cells and objects are left out."""
 
     def __init__(self, path: Path) -> None:
         from scipy.io import whosmat
@@ -40,16 +49,20 @@ class MatSource:
         if count > 1:
             raise FileError(f"{path} holds {quoted(name)} twice: save each variable once")
         self._inner: dict[str, NDArray[Any]] = {}
-        self._parts: dict[str, Part] = {}
-        texts: dict[str, str] = {}
+        found = Found()
         for name, shape, kind in variables:
             if kind in _NUMBERS:
-                self._parts |= parts_of(name, shape)
+                found.add(name, shape)
             elif kind == "struct":
-                self._walk(name, self._variable(name), texts, 0)
+                self._walk(name, self._variable(name), found, 0)
+            elif kind in _REASONS:
+                found.left_out[name or "an object"] = _REASONS[kind]
         for name, array in self._inner.items():
-            self._parts |= parts_of(name, array.shape)
-        self.columns: Mapping[str, Column] = columns_of(self._parts, texts)
+            found.add(name, array.shape)
+        self.remarks: list[str] = []
+        self.left_out: Mapping[str, str] = found.left_out
+        self.columns: Mapping[str, Column]
+        self.columns, self._parts = columns_of(found, self._is_increasing, self.remarks)
 
     def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
         """Yield the numbers of some columns."""
@@ -62,7 +75,7 @@ class MatSource:
             for name in names:
                 part = self._parts[name]
                 if part.array == array:
-                    column = numbers.reshape(-1) if part.index is None else numbers[:, part.index]
+                    column = _numbers_of(numbers, part)
                     for begin in range(0, part.length, _VALUES):
                         yield name, begin, column[begin : begin + _VALUES]
 
@@ -75,20 +88,40 @@ class MatSource:
             raise FileError(f"{self._path} is damaged: {quoted(name)} cannot be read ({variable})")
         return variable
 
-    def _walk(self, name: str, struct: NDArray[Any], texts: dict[str, str], depth: int) -> None:
-        """Find arrays and texts in a struct that is no table of structs."""
-        if struct.size != 1 or depth > _DEEPEST:
+    def _is_increasing(self, part: Part) -> bool:
+        array = self._inner.get(part.array)
+        column = _numbers_of(self._variable(part.array) if array is None else array, part)
+        return column.dtype.kind in "iuf" and bool(np.all(np.diff(column) > 0))
+
+    def _walk(self, name: str, struct: NDArray[Any], found: Found, depth: int) -> None:
+        """Find arrays and texts in a struct, or in each of an array of structs."""
+        if depth > _DEEPEST or struct.size > _MOST_STRUCTS:
+            found.left_out[name] = "it has too many structs, or structs in structs"
             return
-        for field in struct.dtype.names or ():
-            value = struct.reshape(-1)[0][field]
-            if not isinstance(value, np.ndarray):
-                continue
-            if value.dtype.names:
-                self._walk(f"{name}.{field}", value, texts, depth + 1)
-            elif value.dtype.kind == "U" and value.size == 1 and name in (*NOTES, CLOCKS):
-                texts[f"{name}.{field}"] = str(value.reshape(-1)[0])[:_LONGEST]
-            elif value.dtype.kind in "iufb":
-                self._inner[f"{name}.{field}"] = value
+        for k, element in enumerate(struct.reshape(-1), 1):
+            of_element = name if struct.size == 1 else f"{name}({k})"
+            for field in struct.dtype.names or ():
+                value, inner = element[field], f"{of_element}.{field}"
+                if not isinstance(value, np.ndarray):
+                    continue
+                if type(value).__name__ in _OPAQUE:
+                    found.left_out[inner] = OBJECT
+                elif value.dtype.names:
+                    self._walk(inner, value, found, depth + 1)
+                elif value.dtype.kind == "U" and value.size == 1:
+                    found.texts[inner] = str(value.reshape(-1)[0])[:_LONGEST]
+                elif value.dtype.kind == "O" and value.size:
+                    found.left_out[inner] = _REASONS["cell"]
+                elif value.dtype.kind in "iufb" and value.size == 1:
+                    found.scalars[inner] = float(value.reshape(-1)[0])
+                elif value.dtype.kind in "iufb":
+                    self._inner[inner] = value
+
+
+def _numbers_of(array: NDArray[Any], part: Part) -> NDArray[Any]:
+    if part.index is None:
+        return array.reshape(-1)
+    return array[part.index, :] if part.is_row else array[:, part.index]
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from io import FileIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import FileError
 from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions, library
-from bywire.data.matlab_layout import Part, columns_of, described, parts_of
+from bywire.data.matlab_layout import OBJECT, Found, Part, columns_of, described
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 _VALUES = 1 << 22  # that are read at a time
 _DEEPEST, _MOST = 8, 10_000  # groups in groups; objects in a file
+_MOST_STRUCTS = 1000  # in an array of structs
+_MOST_ROWS = 64
 _LONGEST = 1000  # characters of a text
 _USER_BLOCK = 512
 _HEADER = b"MATLAB 7.3 MAT-file, written by bywire".ljust(116) + bytes(8) + b"\x00\x02IM"
@@ -37,15 +40,16 @@ class Mat73Source:
     """An open HDF5 file; its groups are structs."""
 
     def __init__(self, path: Path, file: Any) -> None:
-        self._path = path
+        self._path, self._file = path, file
         self._is_matlab = file.userblock_size >= _USER_BLOCK
         self._arrays: dict[str, Any] = {}
-        self._texts: dict[str, str] = {}
-        self._walk(file, "", 0)
-        self._parts: dict[str, Part] = {}
+        found = Found()
+        self._walk(file, "", 0, found)
         for name, array in self._arrays.items():
-            self._parts |= parts_of(name, self._shape(array))
-        columns = columns_of(self._parts, self._texts)
+            found.add(name, self._shape(array))
+        self.remarks: list[str] = []
+        self.left_out: Mapping[str, str] = found.left_out
+        columns, self._parts = columns_of(found, self._is_increasing, self.remarks)
         self.columns: Mapping[str, Column] = {n: self._with_unit(c) for n, c in columns.items()}
 
     def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
@@ -58,24 +62,61 @@ class Mat73Source:
                 piece = slice(begin, min(begin + _VALUES, part.length))
                 yield name, begin, array[self._index(array, part, piece)]
 
-    def _walk(self, group: Any, prefix: str, depth: int) -> None:
+    def _walk(self, group: Any, prefix: str, depth: int, found: Found) -> None:
         """Find arrays and texts; links are not followed, neither out of the file nor within."""
         import h5py
 
         for name in group:
-            if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            if name.startswith("#"):
                 continue
-            item = group[name]
-            if isinstance(item, h5py.Group):
-                if depth < _DEEPEST:
-                    self._walk(item, f"{prefix}{name}.", depth + 1)
-            elif isinstance(item, h5py.Dataset) and item.dtype.kind in "iufb" and item.shape:
-                if _attribute(item, "MATLAB_class") == "char":
-                    self._texts[f"{prefix}{name}"] = self._text(item)
-                else:
-                    self._arrays[f"{prefix}{name}"] = item
-            if len(self._arrays) + len(self._texts) > _MOST:
-                raise FileError(f"{self._path} holds more than {_MOST} arrays: choose another file")
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                found.left_out[f"{prefix}{name}"] = "it is a link, and links are not followed"
+                continue
+            self._take(group[name], f"{prefix}{name}", depth, found)
+
+    def _take(self, item: Any, name: str, depth: int, found: Found) -> None:
+        """Take an array, a text, the arrays in a group, or those of an array of structs."""
+        import h5py
+
+        if len(self._arrays) + len(found.texts) + len(found.scalars) > _MOST:
+            raise FileError(f"{self._path} holds more than {_MOST} arrays: choose another file")
+        if isinstance(item, h5py.Group):
+            if depth < _DEEPEST:
+                self._walk(item, f"{name}.", depth + 1, found)
+            return
+        if not isinstance(item, h5py.Dataset) or not item.shape:
+            return
+        kind = _attribute(item, "MATLAB_class")
+        if "MATLAB_object_decode" in item.attrs:
+            found.left_out[name] = OBJECT
+        elif kind == "char":
+            found.texts[name] = self._text(item)
+        elif item.dtype.kind in "iufb" and item.size == 1 and self._is_matlab:
+            found.scalars[name] = float(item[()].reshape(-1)[0])
+        elif item.dtype.kind in "iufb":
+            self._arrays[name] = item
+        elif h5py.check_ref_dtype(item.dtype) is h5py.Reference and not kind:
+            self._take_structs(item, name, depth, found)
+        else:
+            found.left_out[name] = (
+                "it is an array of cells" if kind == "cell" else "it holds no real numbers"
+            )
+
+    def _take_structs(self, item: Any, name: str, depth: int, found: Found) -> None:
+        """Take a field of an array of structs, which refers to an array for each."""
+        if item.size > _MOST_STRUCTS or depth >= _DEEPEST:
+            found.left_out[name] = f"it is an array of {item.size} structs"
+            return
+        outer, _, field = name.rpartition(".")
+        for k, reference in enumerate(item[()].reshape(-1), 1):
+            if reference:
+                self._take(self._file[reference], f"{outer}({k}).{field}", depth + 1, found)
+
+    def _is_increasing(self, part: Part) -> bool:
+        array = self._arrays[part.array]
+        if array.is_virtual or array.external or array.size > _VALUES * _MOST_ROWS:
+            return False
+        return bool(np.all(np.diff(array[self._index(array, part, slice(0, part.length))]) > 0))
 
     def _text(self, array: Any) -> str:
         if array.size > _LONGEST or array.dtype != np.uint16:
@@ -88,7 +129,7 @@ class Mat73Source:
         array = self._arrays[self._parts[column.name].array]
         unit = column.unit or _attribute(array, "units") or _attribute(array, "unit")
         label = column.label or _attribute(array, "long_name")
-        return Column(column.name, unit, column.length, column.clock, label)
+        return replace(column, unit=unit, label=label)
 
     def _shape(self, array: Any) -> tuple[int, ...]:
         """Return the shape in MATLAB, which counts the other way round."""
@@ -96,7 +137,8 @@ class Mat73Source:
 
     def _index(self, array: Any, part: Part, piece: slice) -> tuple[Any, ...]:
         if part.index is not None:
-            return (part.index, piece) if self._is_matlab else (piece, part.index)
+            is_first = self._is_matlab != part.is_row
+            return (part.index, piece) if is_first else (piece, part.index)
         long = max(range(array.ndim), key=lambda axis: array.shape[axis])
         return tuple(piece if axis == long else 0 for axis in range(array.ndim))
 

@@ -21,6 +21,9 @@ _NUMBERS = range(6)  # data types: integers and reals, either byte order
 _VALUE, _MASTER, _VIRTUAL_MASTER, _VIRTUAL = 0, 2, 3, 6
 _TEXTS = range(7, 12)  # conversions to and from texts
 _FORMULA = 3  # conversion
+_CODES, _RANGES = 7, 8  # conversions that have texts for single numbers, and for ranges
+_NO_QUANTITY = ("", "-", "1", "enum", "state", "bool")  # units of states
+_NO_STATE = frozenset({"sna", "snv", "na", "n/a", "not available", "signal not available"})
 _TIME = 1  # what a master channel counts
 # A file that is given by its path is mapped into memory: quick, and too much for large ones.
 _MAPPED = 2**29  # bytes
@@ -34,6 +37,9 @@ class Mdf4Source:
     def __init__(self, path: Path, file: Any, records: int | None) -> None:
         self._path, self._file, self._records = path, file, records
         self._places: dict[str, tuple[int, int]] = {}
+        self._missing: dict[str, Counter[str]] = {}
+        self.left_out: dict[str, str] = {}
+        self.remarks: list[str] = []
         self.columns: Mapping[str, Column] = self._columns()
 
     def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
@@ -45,6 +51,10 @@ class Mdf4Source:
             for begin in range(0, length, step):
                 for name, numbers in self._read(group, wanted, begin, min(step, length - begin)):
                     yield name, begin, numbers
+        for name, texts in self._missing.items():
+            codes = ", ".join(f"{n} x {quoted(text)}" for text, n in texts.most_common(3))
+            self.remarks.append(f"{name}: missing samples: {texts.total()} ({codes})")
+        self._missing = {}
 
     def _columns(self) -> dict[str, Column]:
         groups = self._file.groups
@@ -53,21 +63,34 @@ class Mdf4Source:
         for g, group in enumerate(groups):
             length = group.channel_group.cycles_nr
             master = self._file.masters_db.get(g)
-            if master is None or not length or not _is_time(group.channels[master]):
-                continue
-            names = {
+            every = {
                 c: channel.name if uses[channel.name] == 1 else f"{channel.name}@{g}"
                 for c, channel in enumerate(group.channels)
-                if _is_read(channel, group.channel_dependencies[c])
             }
-            if master not in names:
+            reasons = {
+                c: _why_not(group.channels[c], group.channel_dependencies[c]) for c in every
+            }
+            names = {c: name for c, name in every.items() if not reasons[c]}
+            of_group = (
+                "its group holds no records" if not length
+                else "its group has no instants" if master not in names
+                else "its group counts no time" if not _is_time(group.channels[master])
+                else ""
+            )  # fmt: skip
+            self.left_out |= {
+                name: of_group or reasons[c]
+                for c, name in every.items()
+                if of_group or reasons[c]
+            }
+            if of_group:
                 continue
             for c, name in names.items():
                 channel = group.channels[c]
                 unit = (
                     "s" if c == master else channel.unit or getattr(channel.conversion, "unit", "")
                 )
-                unit = "1" if not unit and _has_texts(channel) else unit
+                if not unit and _has_texts(channel) and not _is_quantity(channel):
+                    unit = "1"
                 clock = None if c == master else names[master]
                 self._places[name] = (g, c)
                 columns[name] = Column(name, (unit or "").strip(), length, clock, "")
@@ -82,12 +105,42 @@ class Mdf4Source:
         for index in {master, *indices}:
             self._require_inside(group, index)
         # With a channel of values come the instants; alone, they are a channel like any other.
-        wanted = [(None, group, index) for index in indices if index != master]
+        values = [index for index in indices if index != master]
+        signals: dict[int, Any] = {}
+        for coded in (False, True):
+            wanted = [i for i in values if _has_codes(self._channel(group, i)) == coded]
+            if wanted or (not values and not coded):
+                signals |= self._selected(group, wanted or [master], begin, size, raw=coded)
+        instants = next(iter(signals.values())).timestamps
+        for name, index in zip(names, indices, strict=True):
+            signal = None if index == master else signals[index]
+            numbers = instants if signal is None else signal.samples
+            if numbers.ndim != 1 or numbers.dtype.kind not in "iufb":
+                raise FileError(
+                    f"{self._path}: channel {name!r} holds no numbers: leave it out"
+                )
+            channel = self._channel(group, index)
+            if signal is not None and _has_codes(channel):
+                numbers = self._without_codes(name, channel, numbers)
+            if signal is not None and signal.invalidation_bits is not None:
+                numbers = numbers.astype(np.float64)
+                invalid = np.asarray(signal.invalidation_bits, dtype=bool)
+                numbers[invalid] = np.nan
+                self._count(name, "marked as invalid", invalid)
+            yield name, numbers
+
+    def _channel(self, group: int, index: int) -> Any:
+        return self._file.groups[group].channels[index]
+
+    def _selected(
+        self, group: int, indices: Sequence[int], begin: int, size: int, *, raw: bool
+    ) -> dict[int, Any]:
+        """Return some records of channels, as they are stored or converted."""
         self._records_read = 0
         # Asked for a number of records, the library is slower by a third.
         signals = self._file.select(
-            wanted or [(None, group, master)], record_offset=begin,
-            record_count=None if self._records is None else size,
+            [(None, group, index) for index in indices], record_offset=begin,
+            record_count=None if self._records is None else size, raw=raw,
             copy_master=False, ignore_value2text_conversions=True, validate=False,
         )  # fmt: skip
         if self._records_read != size:
@@ -96,18 +149,24 @@ class Mdf4Source:
                 f"says, and {self._records_read} could be read: copy it again, or repair it with "
                 "the program that recorded it"
             )
-        instants = signals[0].timestamps
-        for name, index in zip(names, indices, strict=True):
-            signal = None if index == master else signals.pop(0)
-            values = instants if signal is None else signal.samples
-            if values.ndim != 1 or values.dtype.kind not in "iufb":
-                raise FileError(
-                    f"{self._path}: channel {name!r} holds no numbers: leave it out"
-                )
-            if signal is not None and signal.invalidation_bits is not None:
-                values = values.astype(np.float64)
-                values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
-            yield name, values
+        return dict(zip(indices, signals, strict=True))
+
+    def _without_codes(
+        self, name: str, channel: Any, raw: NDArray[Any]
+    ) -> NDArray[np.float64]:
+        """Return numbers with NaN where the file has a text for them, unless these are states."""
+        texts: dict[str, NDArray[np.bool_]] = {}
+        numbers = _converted(channel.conversion, raw, texts)
+        is_quantity = _is_quantity(channel)
+        for text, where in texts.items():
+            if is_quantity or text.casefold() in _NO_STATE:
+                numbers[where] = np.nan
+                self._count(name, text, where)
+        return numbers
+
+    def _count(self, name: str, why: str, where: NDArray[np.bool_]) -> None:
+        if count := int(np.count_nonzero(where)):
+            self._missing.setdefault(name, Counter())[why] += count
 
     def _require_inside(self, group: int, index: int) -> None:
         """Refuse a channel behind the end of its record: the library reads what lies there."""
@@ -141,15 +200,17 @@ def _is_time(master: Any) -> bool:
     return bool(master.sync_type == _TIME)
 
 
-def _is_read(channel: Any, parts: Any) -> bool:
-    """Return whether a channel holds numbers: no text, no array, nothing that is computed."""
-    kinds = (_VALUE, _MASTER, _VIRTUAL_MASTER, _VIRTUAL)
-    return (
-        channel.channel_type in kinds
-        and channel.data_type in _NUMBERS
-        and not parts
-        and not _has_formula(channel.conversion)
-    )
+def _why_not(channel: Any, parts: Any) -> str:
+    """Return why a channel is not read; nothing where it holds numbers."""
+    if parts:
+        return "it is an array or a structure"
+    if channel.data_type not in _NUMBERS:
+        return "it holds text or bytes"
+    if channel.channel_type not in (_VALUE, _MASTER, _VIRTUAL_MASTER, _VIRTUAL):
+        return "it holds no samples of its own"
+    if _has_formula(channel.conversion):
+        return "a formula converts it, and nothing that stands in a file is evaluated"
+    return ""
 
 
 def _has_formula(conversion: Any) -> bool:
@@ -163,6 +224,83 @@ def _has_formula(conversion: Any) -> bool:
 def _has_texts(channel: Any) -> bool:
     """Return whether a channel's numbers stand for texts; the numbers are what is read."""
     return getattr(channel.conversion, "conversion_type", 0) in _TEXTS
+
+
+def _has_codes(channel: Any) -> bool:
+    return getattr(channel.conversion, "conversion_type", 0) in (_CODES, _RANGES)
+
+
+def _is_quantity(channel: Any) -> bool:
+    """Return whether a channel whose conversion has texts measures something, beside states.
+
+    A factor for the other numbers says so, and a unit where the other numbers have no text either.
+    """
+    inner = _blocks(channel.conversion)
+    if any(not isinstance(block, bytes) and _is_numeric(block) for block in inner):
+        return True
+    unit = (channel.unit or getattr(channel.conversion, "unit", "") or "").strip()
+    default = (getattr(channel.conversion, "referenced_blocks", None) or {}).get("default_addr")
+    return unit.casefold() not in _NO_QUANTITY and not default
+
+
+def _is_numeric(conversion: Any) -> bool:
+    if getattr(conversion, "conversion_type", 0) in (_CODES, _RANGES):
+        return any(not isinstance(b, bytes) and _is_numeric(b) for b in _blocks(conversion))
+    return getattr(conversion, "conversion_type", 0) not in _TEXTS
+
+
+def _blocks(conversion: Any) -> list[Any]:
+    blocks = getattr(conversion, "referenced_blocks", None) or {}
+    return [block for block in blocks.values() if block is not None]
+
+
+def _converted(
+    conversion: Any, raw: NDArray[Any], texts: dict[str, NDArray[np.bool_]]
+) -> NDArray[np.float64]:
+    """Return raw numbers as a conversion has them, and for each text where it stands for one."""
+    kind = getattr(conversion, "conversion_type", None)
+    if kind not in (_CODES, _RANGES):
+        plain = conversion.convert(raw, ignore_value2text_conversions=True) if conversion else raw
+        return np.array(plain, dtype=np.float64)
+    numbers = raw.astype(np.float64)
+    rest = np.ones(raw.shape, dtype=bool)
+    for k, where in enumerate(_entries(conversion, kind, raw)):
+        where = where & rest
+        rest &= ~where
+        _fill(conversion.referenced_blocks.get(f"text_{k}"), where, raw, numbers, texts)
+    _fill(conversion.referenced_blocks.get("default_addr"), rest, raw, numbers, texts)
+    return numbers
+
+
+def _entries(conversion: Any, kind: int, raw: NDArray[Any]) -> Iterator[NDArray[np.bool_]]:
+    """Yield where the raw numbers are those of each entry of a conversion."""
+    if kind == _CODES:
+        for k in range(conversion.val_param_nr):
+            yield raw == conversion[f"val_{k}"]
+    else:
+        for k in range(conversion.val_param_nr // 2):
+            low, high = conversion[f"lower_{k}"], conversion[f"upper_{k}"]
+            below = raw < high if raw.dtype.kind == "f" and low != high else raw <= high
+            yield (raw >= low) & below
+
+
+def _fill(
+    block: Any, where: NDArray[np.bool_], raw: NDArray[Any], numbers: NDArray[np.float64],
+    texts: dict[str, NDArray[np.bool_]],
+) -> None:  # fmt: skip
+    """Convert the numbers of one entry, or note where its text stands for them."""
+    if not block or not where.any():
+        return
+    if isinstance(block, bytes):
+        text = block.decode("utf-8", "replace").strip("\0 ")
+        texts[text] = texts.get(text, np.zeros(raw.shape, dtype=bool)) | where
+        return
+    inner: dict[str, NDArray[np.bool_]] = {}
+    numbers[where] = _converted(block, raw[where], inner)
+    for text, inside in inner.items():
+        marked = np.zeros(raw.shape, dtype=bool)
+        marked[np.flatnonzero(where)[inside]] = True
+        texts[text] = texts.get(text, np.zeros(raw.shape, dtype=bool)) | marked
 
 
 @contextmanager
@@ -213,4 +351,5 @@ FORMAT = FileFormat(
     "mdf4", "an MDF file", (".mf4", ".mdf", ".dat"),
     lambda head: head[:3] == b"MDF" or head[:7] == b"UnFinMF", _open, _write,
     has_many_axes=True, libraries=("asammdf",), counts=("record", 0),
+    opening=60.0,  # of thousands of channels it reads every description
 )  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bywire.core.parameters import leaf_fields
 from bywire.core.signals import signals_of
 from bywire.export.controller.c_text import c_name
+from bywire.export.controller.contract import INPUT, RESULT
 from bywire.export.controller.program import Program
 
 _FAR = 1e32
@@ -12,7 +13,10 @@ _FAR = 1e32
 
 
 def a2l(program: Program) -> str:
-    """Return the description; addresses are zero, and found by symbol links in the linked file."""
+    """Return the description; addresses are zero, and found by symbol links in the linked file.
+
+    The links lead to the memory and the parameters of ``NAME_instance.c``, which are in RAM.
+    """
     name = program.name
     kind = "FLOAT32_IEEE" if program.precision.name == "single" else "FLOAT64_IEEE"
     blocks: list[str] = []
@@ -28,7 +32,7 @@ def a2l(program: Program) -> str:
         blocks.append(
             f'    /begin CHARACTERISTIC {place} "{_text(member.note)}"\n'
             f"      {shape} {low:.9g} {high:.9g}{size}\n"
-            f'      SYMBOL_LINK "{name}_parameters.{place}" 0\n    /end CHARACTERISTIC'
+            f'      SYMBOL_LINK "{name}_calibration.{place}" 0\n    /end CHARACTERISTIC'
         )
     signals = signals_of(program.model.Memory)
     for member in program.members(program.model.Memory):
@@ -39,6 +43,14 @@ def a2l(program: Program) -> str:
             f'    /begin MEASUREMENT memory.{field} "{_text(signal.label)}"\n'
             f"      {kind} {unit} 0 0 {-_FAR:.9g} {_FAR:.9g}\n      ECU_ADDRESS 0x0\n"
             f'      SYMBOL_LINK "{name}_memory.{field}" 0\n    /end MEASUREMENT'
+        )
+    for step in program.steps:
+        unit = units.setdefault("1", f"CM_{len(units)}")
+        label = f"status of task {_text(step.task.name)}"
+        blocks.append(
+            f'    /begin MEASUREMENT memory.{step.status} "{label}"\n'
+            f"      ULONG {unit} 0 0 0 {INPUT | RESULT}\n      ECU_ADDRESS 0x0\n"
+            f'      SYMBOL_LINK "{name}_memory.{step.status}" 0\n    /end MEASUREMENT'
         )
     methods = [
         f'    /begin COMPU_METHOD {method} "{_text(unit)}" IDENTICAL "%12.6" "{_text(unit)}"\n'

@@ -9,16 +9,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bywire.core.errors import ModelError
+from bywire.core.errors import ModelError, ParameterError, quoted
 
 WIDTH = 96
 _WORDS = """auto bool break case char const continue default do double else enum extern false float
 for goto if inline int long register restrict return short signed sizeof static struct switch true
 typedef union unsigned void volatile while main NULL INFINITY NAN larger smaller
 whole sine cosine exponential logarithm power_of turned near_angle log_parts upper_part bits memcpy
+is_usual magnitude within
 exp log sqrt sin cos tan fabs floor ceil fmax fmin pow round trunc hypot gamma signgam
 expf logf sqrtf sinf cosf fabsf floorf powf"""
-_RESERVED = frozenset(_WORDS.split())
+_CXX_WORDS = """alignas alignof and and_eq asm bitand bitor catch char8_t char16_t char32_t class
+compl concept consteval constexpr constinit const_cast co_await co_return co_yield decltype delete
+dynamic_cast explicit export friend mutable namespace new noexcept not not_eq nullptr operator or
+or_eq private protected public reinterpret_cast requires static_assert static_cast template this
+thread_local throw try typeid typename using virtual wchar_t xor xor_eq"""
+_RESERVED = frozenset(_WORDS.split()) | frozenset(_CXX_WORDS.split())
+_LONGEST_NAME = 60
+BEGIN_C = '#ifdef __cplusplus\nextern "C" {\n#endif'
+END_C = "#ifdef __cplusplus\n}\n#endif"
+"""what declarations of a header stand between, so that programs in C++ link with them"""
 
 
 @dataclass(frozen=True)
@@ -70,6 +80,31 @@ def c_name(text: str) -> str:
     if name[0].isdigit():
         name = f"n{name}"
     return f"{name}_" if name in _RESERVED else name
+
+
+def checked_name(name: str) -> str:
+    """Return the name that a user chose for an export.
+
+    Raises
+    ------
+    ParameterError
+        When C or C++ cannot use it as an identifier.
+
+    Examples
+    --------
+    >>> checked_name("front_left")
+    'front_left'
+    """
+    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        fault = "is not an identifier of C"
+    elif name in _RESERVED:
+        fault = "is a word that C, C++ or the export itself uses"
+    elif len(name) > _LONGEST_NAME:
+        fault = f"has {len(name)} characters, and {_LONGEST_NAME} are the most"
+    else:
+        return name
+    wanted = "a letter, then letters, digits and underscores, for instance front_brake"
+    raise ParameterError(f"name = {quoted(name)} {fault}: use {wanted}")
 
 
 def unique(name: str, taken: Container[str]) -> str:

@@ -1,6 +1,7 @@
 """``NAME.dbc``, and the C that fills its messages: measurements of an ECU for a CAN bus.
 
-Every field of the memory is a signal of 16 bits with a sign, four to a message of 8 bytes.
+Every field of the memory is a signal of 16 bits with a sign, four to a message of 8 bytes, and
+so is the status of every step. The lowest count says that there is no value.
 """
 
 from __future__ import annotations
@@ -9,14 +10,18 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from bywire.core.signals import signals_of
-from bywire.export.controller.c_text import c_name, comment
+from bywire.export.controller.c_text import BEGIN_C, END_C, c_name, comment
 from bywire.export.controller.program import Program
 
 FIRST = 0x100
 """identifier of the first message"""
 CYCLE = 10
 """interval between messages [ms]"""
+NOT_AVAILABLE = -32768
+"""count of a value that is no number, or infinite: outside the range of every signal"""
 _MOST, _IN_A_MESSAGE, _LONGEST = 32767, 4, 32
 _ROOM = 10.0  # full scale over the usual magnitude of a signal, at least
 
@@ -37,12 +42,16 @@ class CanSignal:
 
 
 def messages(program: Program) -> list[list[CanSignal]]:
-    """Return the signals of every message, in the order of the memory."""
+    """Return the signals of every message, in the order of the memory; then the statuses."""
     signals = signals_of(program.model.Memory)
     each = [
         CanSignal(member.name, found.unit, found.label, _factor(found.nominal))
         for member in program.members(program.model.Memory)
         for found in (signals[member.name],)
+    ]
+    each += [
+        CanSignal(step.status, "1", f"status of task {step.task.name}", 1.0)
+        for step in program.steps
     ]
     return [each[k : k + _IN_A_MESSAGE] for k in range(0, len(each), _IN_A_MESSAGE)]
 
@@ -64,6 +73,10 @@ def dbc(program: Program) -> str:
     lines += ["", f'CM_ "ECU of {_text(program.model.name)}: its memory behind a tick";']
     lines += [
         f'CM_ SG_ {number} {each.name} "{_text(each.label)}";'
+        for number, signals in every for each in signals
+    ]  # fmt: skip
+    lines += [
+        f'VAL_ {number} {each.name} {NOT_AVAILABLE} "not available" ;'
         for number, signals in every for each in signals
     ]  # fmt: skip
     cycle = '"GenMsgCycleTime"'
@@ -100,10 +113,13 @@ def can_header(program: Program) -> str:
         comment([f"Messages of {name}.dbc: their first identifier and number, and their bytes."]),
         f"#ifndef {guard}\n#define {guard}",
         f'#include <stdint.h>\n#include "{name}_ecu.h"',
+        BEGIN_C,
         f"#define {name.upper()}_CAN_FIRST {FIRST}u\n#define {name.upper()}_CAN_COUNT {count}u",
-        comment(["Fill a message, counted from 0; what is beyond full scale stays at it."])
+        comment(["Fill a message, counted from 0. A value beyond full scale stays at it; one that",
+                 f"is no number, or infinite, becomes the count {NOT_AVAILABLE}: not available."])
         + f"\nvoid {name}_can_fill(uint32_t message, const {name}_Memory *memory,\n"
         "        uint8_t data[8]);",
+        END_C,
         "#endif",
     ]) + "\n"  # fmt: skip
 
@@ -112,24 +128,30 @@ def can_source(program: Program) -> str:
     """Return ``NAME_can.c``."""
     name, real, literal = program.name, program.precision.real, program.precision.literal
     most, half = literal(float(_MOST)), literal(0.5)
+    kind = np.float32 if program.precision.name == "single" else np.float64
+    largest = literal(float(np.finfo(kind).max))
+    statuses = {step.status for step in program.steps}
     cases = []
     for number, signals in enumerate(messages(program)):
         lines = [f"    case {number}u:"]
         for k, each in enumerate(signals):
-            value = f"memory->{c_name(each.field)}, {literal(each.factor)}"
+            cast = f"({real})" if each.field in statuses else ""
+            value = f"{cast}memory->{c_name(each.field)}, {literal(each.factor)}"
             lines.append(f"        put(counts({value}), &data[{2 * k}]);")
         cases.append("\n".join([*lines, "        break;"]))
     return f"""{comment([f"Bytes of the messages of {name}.dbc."])}
 
 #include "{name}_can.h"
 
-/* Return the counts of a value, to the nearest one. */
+/* Return the counts of a value, to the nearest one; of none, that which says so. */
 static int32_t counts({real} value, {real} factor)
 {{
     const {real} wanted = value / factor;
     int32_t result;
 
-    if (wanted >= {most}) {{
+    if (!((value >= -{largest}) && (value <= {largest}))) {{
+        result = {NOT_AVAILABLE};
+    }} else if (wanted >= {most}) {{
         result = {_MOST};
     }} else if (wanted <= -{most}) {{
         result = -{_MOST};

@@ -5,12 +5,15 @@ No function of the C library is called, so that every target has Python's bits.
 
 from __future__ import annotations
 
+import math
+import struct
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from bywire.core import elementary_series as double
 from bywire.core import elementary_single as single
 from bywire.export.controller.c_text import Precision
+from bywire.export.controller.contract import LARGEST
 
 MAGNITUDE = frozenset({"whole", "sine", "cosine"})
 """functions that take a magnitude"""
@@ -48,14 +51,66 @@ def elementary(wanted: Collection[str], precision: Precision) -> list[str]:
     return parts
 
 
-def headers(wanted: Collection[str]) -> list[str]:
-    """Return the headers of C that the functions need."""
-    named = []
-    if set(wanted) - {"larger", "smaller"}:
-        named.append("stdint")
-    if {"exponential", "power_of", "logarithm"} & set(wanted):
-        named.append("string")
-    return named
+def contract_functions(precision: Precision, has_limits: bool) -> list[str]:
+    """Return the C of the checks around a step; they look at digits, without arithmetic.
+
+    Infinities and what is no number stay themselves under fast mathematics, and a processor
+    without a unit for doubles takes a few instructions.
+    """
+    real, is_double = precision.real, precision.name == "double"
+    integer, bits = ("uint64_t", 64) if is_double else ("uint32_t", 32)
+    upper = "(uint32_t)(bits >> 32) << 1" if is_double else "bits << 1"
+
+    def magnitude(value: float) -> str:
+        return f"0x{_digits(value, is_double) >> (bits - 32) << 1 & 0xFFFFFFFF:08X}u"
+
+    above = 1 << (bits - 1)  # the sign
+    infinite = f"0x{_digits(math.inf, is_double):X}u"
+    parts = [
+        f"""/* Return the upper digits of a magnitude; those of infinity are above all numbers'. */
+static inline uint32_t magnitude({real} x)
+{{
+    {integer} bits;
+
+    (void)memcpy((unsigned char *)&bits, (const unsigned char *)&x, sizeof bits);
+    return {upper};
+}}
+
+/* Return whether x is a number below 1e15 in magnitude, as inputs and results have to be. */
+static inline bool is_usual({real} x)
+{{
+    return magnitude(x) < {magnitude(LARGEST)};
+}}"""
+    ]
+    if has_limits:
+        parts.append(f"""/*
+ * Return a command within plus and minus its limit; a limit that is negative, or no number, leaves
+ * nothing of it.
+ */
+static inline {real} within({real} command, {real} limit)
+{{
+    {integer} bits;
+    {integer} most;
+    {real} result;
+
+    (void)memcpy((unsigned char *)&bits, (const unsigned char *)&command, sizeof bits);
+    (void)memcpy((unsigned char *)&most, (const unsigned char *)&limit, sizeof most);
+    if (most > {infinite}) {{
+        bits = 0u;
+    }} else if ((bits & {above - 1:#x}u) > most) {{
+        bits = (bits & {above:#x}u) | most;
+    }} else {{
+        /* it is within */
+    }}
+    (void)memcpy((unsigned char *)&result, (const unsigned char *)&bits, sizeof result);
+    return result;
+}}""")
+    return parts
+
+
+def _digits(value: float, is_double: bool) -> int:
+    """Return the digits of a number as a whole number."""
+    return int.from_bytes(struct.pack(">d" if is_double else ">f", value), "big")
 
 
 def _nested(names: Sequence[float], variable: str, lit: Literal) -> str:
@@ -163,7 +218,7 @@ static {real} exponential({real} x)
 {series}    const {integer} exponent = ({integer})((int32_t)k + {bias}) << {shift};
     {real} scale;
 
-    (void)memcpy(&scale, &exponent, sizeof scale);
+    (void)memcpy((unsigned char *)&scale, (const unsigned char *)&exponent, sizeof scale);
     return {result};
 }}"""
 
@@ -182,11 +237,11 @@ static double log_parts(double a, double *low)
     uint64_t bits;
     double m;
 
-    (void)memcpy(&bits, &a, sizeof bits);
+    (void)memcpy((unsigned char *)&bits, (const unsigned char *)&a, sizeof bits);
     const uint64_t lifted = bits + (0x4000000000000000u - 0x3FE6A09E667F3BCDu);
     const int32_t e = (int32_t)(lifted >> 52) - 1024;
     const uint64_t scaled = (lifted & 0x000FFFFFFFFFFFFFu) + 0x3FE6A09E667F3BCDu;
-    (void)memcpy(&m, &scaled, sizeof m);
+    (void)memcpy((unsigned char *)&m, (const unsigned char *)&scaled, sizeof m);
 
     const double f = m - 1.0;
     const double k = (double)e;
@@ -219,9 +274,9 @@ static double upper_part(double a)
     uint64_t bits;
     double upper;
 
-    (void)memcpy(&bits, &a, sizeof bits);
+    (void)memcpy((unsigned char *)&bits, (const unsigned char *)&a, sizeof bits);
     bits &= 0xFFFFFFFFF8000000u;
-    (void)memcpy(&upper, &bits, sizeof upper);
+    (void)memcpy((unsigned char *)&upper, (const unsigned char *)&bits, sizeof upper);
     return upper;
 }
 

@@ -10,6 +10,7 @@ from bywire.export.controller import render
 from bywire.export.controller.a2l import a2l
 from bywire.export.controller.can import can_header, can_source, dbc
 from bywire.export.controller.harness import harness, makefile, vector_header
+from bywire.export.controller.instance import instance_header, instance_source
 from bywire.export.controller.parameter_file import parameter_file
 from bywire.export.controller.program import Program
 from bywire.export.controller.readme import readme
@@ -43,6 +44,8 @@ def files(
     if render.has_io(program):
         made[f"{name}_io.h"] = render.io_header(program)
         made[f"{name}_io.c"] = render.io_source(program)
+    made[f"{name}_instance.h"] = instance_header(program)
+    made[f"{name}_instance.c"] = instance_source(program)
     made[f"{name}_test_vectors.h"] = vector_header(program, every)
     made[f"{name}_harness.c"] = harness(program, every)
     made["Makefile"] = makefile(program, render.has_io(program))

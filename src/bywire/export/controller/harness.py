@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from bywire.export.controller.c_text import c_name, comment
 from bywire.export.controller.parameter_file import parameter_values
 from bywire.export.controller.program import Program
+from bywire.export.controller.trespassing import prepared, stepped, trespassing
 from bywire.export.controller.vectors import Vectors
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wfloat-equal", "-Wshadow",
@@ -58,14 +59,17 @@ def harness(program: Program, every: Sequence[Vectors]) -> str:
     calls = " + ".join(f"differing_{c_name(e.step.task.name)}()" for e in every)
     count = " + ".join(f"VECTORS_{c_name(e.step.task.name)}" for e in every)
     derived = " + differing_derived()" if _derived(program, every) else ""
+    breaches = " + ".join(f"breaches_{c_name(e.step.task.name)}()" for e in every)
     parts = [
         *comparison(program, every, what, "#include <stdio.h>"),
         *_derived(program, every),
-        f"int main(void)\n{{\n    {name}_Memory memory;\n    int wrong;\n\n"
+        f"int main(void)\n{{\n    {name}_Memory memory;\n    int wrong;\n    int breaches;\n\n"
         f"    {name}_ecu_init(&memory);\n    wrong = {calls}{derived};\n"
+        f"    breaches = {breaches};\n"
         f'    printf("%d vectors, %d values differ, bits %08lx\\n", {count}, wrong,\n'
         "            (unsigned long)bits);\n"
-        "    return (wrong == 0) ? 0 : 1;\n}",
+        '    printf("%d breaches of the contract in README.txt\\n", breaches);\n'
+        "    return ((wrong == 0) && (breaches == 0)) ? 0 : 1;\n}",
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -103,11 +107,12 @@ def comparison(
     name = program.name
     return [
         comment([what]),
-        f"#include <stdint.h>\n{include}\n#include <string.h>\n"
+        f"#include <math.h>\n#include <stdint.h>\n{include}\n#include <string.h>\n"
         f'#include "{name}_ecu.h"\n#include "{name}_test_vectors.h"',
         _same(program),
         _mixed(program),
         *(_compared(program, each) for each in every),
+        *trespassing(program, every),
     ]
 
 
@@ -139,31 +144,6 @@ static void mix({real} value)
         bits = (bits ^ bytes[n]) * 16777619u;
     }}
 }}"""
-
-
-def prepared(program: Program, vectors: Vectors) -> list[str]:
-    """Return the statements that set up vector ``k`` of a task."""
-    name, task = program.name, c_name(vectors.step.task.name)
-    types = {"x": f"{name}_Plant", "u": f"{name}_Stimulus", "memory": f"{name}_Memory"}
-    wanted = [short for _, short in vectors.step.arguments]
-    # A structure of which a task reads nothing is given its zeros.
-    lines = [
-        f"{types[kind]} {kind} = {{0}};" for kind in ("x", "u", "memory") if kind in wanted
-    ]
-    for at, (kind, field) in enumerate(vectors.names):
-        if kind in wanted:
-            lines.append(f"{kind}.{c_name(field)} = given_{task}[k][{at}];")
-    if "par" in wanted:
-        chosen = f"(other_{task}[k] == 1) ? &other_parameters : &{name}_parameters"
-        lines.append(f"const {name}_Parameters *par = {chosen};")
-    return [f"        {line}" for line in lines]
-
-
-def stepped(vectors: Vectors) -> str:
-    """Return the call of a task on what ``prepared`` set up."""
-    wanted = [short for _, short in vectors.step.arguments]
-    arguments = ", ".join(each if each == "par" else f"&{each}" for each in wanted)
-    return f"{vectors.step.name}({arguments});"
 
 
 def _compared(program: Program, vectors: Vectors) -> str:

@@ -116,9 +116,9 @@ class SoftwareInTheLoop:
 
     def _tick(self, step: Step, function: Any, par: NDArray[Any]) -> Callable[..., Any]:
         """Return the tick of a compiled task: State, Memory and Stimulus in, Memory out."""
-        held = {
-            short: np.zeros(max(len(at), 1), self._real) for short, at in self._places.items()
-        }
+        # The memory has a status for every step behind its numbers.
+        room = 1 + len(self._made.steps)
+        held = {short: np.zeros(len(at) + room, self._real) for short, at in self._places.items()}
         arguments = [pointer({**held, "par": par}[short]) for _, short in step.arguments]
         kept = self._places["memory"]
 

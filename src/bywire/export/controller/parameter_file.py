@@ -35,6 +35,7 @@ def parameter_file(program: Program, memory: Any, cited: Mapping[str, Cited]) ->
         f"    .{c_name(each.name)} = {literal(getattr(memory, each.name))},"
         for each in program.members(program.model.Memory)
     ]
+    fields += [f"    .{step.status} = 0u," for step in program.steps]
     body = "\n".join(fields)
     parts.append(f"const {name}_Memory {name}_initial_memory = {{\n{body}\n}};")
     return "\n\n".join(parts) + "\n"

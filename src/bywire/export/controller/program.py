@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import FunctionType
 from typing import Any
 
@@ -13,14 +13,22 @@ from bywire.core.errors import ModelError
 from bywire.core.model import Model, Task
 from bywire.core.parameters import ParameterSet
 from bywire.export.controller.body import Body
-from bywire.export.controller.c_text import PRECISIONS, Precision, c_name, unique
+from bywire.export.controller.c_text import PRECISIONS, Precision, c_name, checked_name, unique
 from bywire.export.controller.calls import called
+from bywire.export.controller.contract import (
+    CheckedInput,
+    Command,
+    Held,
+    checked_inputs,
+    commands,
+    held_by,
+)
 from bywire.export.controller.derived import Derivations, Derived
 from bywire.export.controller.execution import Executor
 from bywire.export.controller.functions import CFunction
 from bywire.export.controller.memories import Memories, Site
 from bywire.export.controller.statements import Statement, live
-from bywire.export.controller.structs import Member, Structs
+from bywire.export.controller.structs import Member, Struct, Structs
 from bywire.export.controller.translation import Translation
 from bywire.export.controller.values import (
     Expr,
@@ -35,23 +43,45 @@ from bywire.export.controller.values import (
 
 _ROOMS = frozenset({"plant", "plants", "elements"})
 """folders whose functions are the plant's: converters, sensors, limits of the bridge"""
+OPS = "bywire.core.ops"
+"""module of the elementary functions"""
 _MOST = 30
 
 
 @dataclass(frozen=True)
 class Step:
-    """One task: the arguments that it reads, its statements, and the memory where that is new."""
+    """One task: the arguments that it reads, its statements, and the memory where that is new.
+
+    Parameters
+    ----------
+    inputs
+        What it checks before it computes.
+    commands
+        What it keeps within limits behind that.
+    kept
+        Fields of the memory that it renews and that must be numbers: commands, and those whose
+        value a later tick depends on.
+    """
 
     task: Task
     name: str
     arguments: tuple[tuple[str, str], ...]
     statements: tuple[Statement, ...]
     result: Expr | None
+    commands: tuple[Command, ...] = ()
+    inputs: tuple[CheckedInput, ...] = ()
+    kept: tuple[str, ...] = ()
+
+    @property
+    def status(self) -> str:
+        """Field of the memory that says how its last call went."""
+        return f"status_{c_name(self.task.name)}"
 
     @property
     def uses(self) -> frozenset[Use]:
         """All that it needs."""
         every = [each.value.uses for each in self.statements]
+        every += [each.limit.uses for each in self.commands]
         return frozenset().union(*every, *([self.result.uses] if self.result else []))
 
 
@@ -81,6 +111,28 @@ class Program:
     derived: tuple[Derived, ...]
 
     @property
+    def plant_functions(self) -> list[CFunction]:
+        """Functions of the plant's side of the ticks, which a header shows."""
+        return [each for each in self.functions if each.is_plant and each.module != OPS]
+
+    def shown(self) -> list[Struct]:
+        """Return the structures of the plant's side that the header of the ECU does not show."""
+        names: set[str] = set()
+        for each in self.plant_functions:
+            names |= {a.declaration.removeprefix("const ").split()[0] for a in each.arguments}
+            names.add(each.result)
+            names |= {s.ctype for s in each.statements}
+            names |= {use[1] for use in each.uses if use[0] == "struct"}
+        known = {each.name: each for each in self.structs.ordered()}
+        waiting = [known[n] for n in names if n in known]
+        while waiting:
+            for member in self.structs.kept(waiting.pop()):
+                if member.ctype in known and member.ctype not in names:
+                    names.add(member.ctype)
+                    waiting.append(known[member.ctype])
+        return [each for each in known.values() if each.name in names and not each.public]
+
+    @property
     def libraries(self) -> tuple[str, ...]:
         """Functions of the C library that are called."""
         return tuple(sorted({use[1] for use in self.uses if use[0] == "library"}))
@@ -96,6 +148,13 @@ class Program:
         if cls not in self.structs.known:
             return []
         return self.structs.kept(self.structs.of_tuple(cls))
+
+    @property
+    def memory_size(self) -> int:
+        """Bytes of the memory: its numbers, and a status for every step."""
+        real = 4 if self.precision.name == "single" else 8
+        size = real * len(self.members(self.model.Memory)) + 4 * len(self.steps)
+        return -(-size // real) * real
 
     @property
     def shape(self) -> Shape:
@@ -123,8 +182,15 @@ class Program:
 def program(model: Model, par: ParameterSet, precision: str = "double", name: str = "") -> Program:
     """Translate the tasks of a model for the structure of its parameters.
 
+    Parameters
+    ----------
+    name
+        What its files and symbols begin with; that of the model by default.
+
     Raises
     ------
+    ParameterError
+        When a name is no identifier of C.
     ModelError
         With file, line and operation of what cannot be translated; for a model that holds another
         one with an ECU of its own.
@@ -136,28 +202,38 @@ def program(model: Model, par: ParameterSet, precision: str = "double", name: st
                 "two ECUs are no single one in C; export that of each from an experiment in which "
                 f"it stands alone, as those of {sub.assembly.name}"
             )
-    short = c_name(name or model.name).lower()
+    short = checked_name(name) if name else c_name(model.name).lower()
     used: frozenset[Use] | None = None
     copied: set[Site] = set()
     refused: set[tuple[str, str]] = set()
+    shared: frozenset[type[Any]] = frozenset()
+    held: dict[str, Held] | None = None
     for _ in range(_MOST):
-        before = len(copied), len(refused)
-        made = _translated(model, par, PRECISIONS[precision], short, used, copied, refused)
+        before = len(copied), len(refused), shared
+        made = _translated(model, par, PRECISIONS[precision], short, used, copied, refused, shared,
+                           held)  # fmt: skip
         fields = frozenset(use for use in made.uses if use[0] == "field")
-        if fields == used and (len(copied), len(refused)) == before:
-            return made
+        shown = {each.name for each in made.shown()}
+        shared |= {cls for cls, struct in made.structs.known.items()
+                   if struct.name in shown and isinstance(cls, type)}  # fmt: skip
+        is_settled = fields == used and (len(copied), len(refused), shared) == before
         used = fields
+        if held is None:  # only now, so that the translation tells what it cannot translate
+            held = {task.name: held_by(model, par, task) for task in model.tasks(par)}
+        elif is_settled:
+            return made
     raise ModelError(f"{model.name}: what its ECU reads does not settle")  # pragma: no cover
 
 
 def _translated(
     model: Model, par: ParameterSet, precision: Precision, name: str, used: Any,
-    copied: set[Site], refused: set[tuple[str, str]],
+    copied: set[Site], refused: set[tuple[str, str]], shared: frozenset[type[Any]],
+    held: Mapping[str, Held] | None,
 ) -> Program:  # fmt: skip
     public = {model.Stimulus: f"{name}_Stimulus", model.State: f"{name}_Plant",
               model.Memory: f"{name}_Memory", type(par): f"{name}_Parameters"}  # fmt: skip
-    structs = Structs(precision, used, public, model.Memory, names=set(public.values()),
-                      derivations=Derivations(refused))  # fmt: skip
+    structs = Structs(precision, used, public, model.Memory, name, shared,
+                      names=set(public.values()), derivations=Derivations(refused))  # fmt: skip
     home = type(model).__module__
 
     def is_plant(function: FunctionType, arguments: Mapping[str, Any]) -> bool:
@@ -166,25 +242,36 @@ def _translated(
         classes = {_class_of(each) for each in arguments.values()}
         return function.__module__ == home and model.Memory not in classes
 
-    made = Translation(structs, is_plant, names=set(public.values()), copied=copied)
+    made = Translation(structs, is_plant, name, names=set(public.values()), copied=copied)
     steps: list[Step] = []
     for task in model.tasks(par):
-        steps.append(_step(made, model, par, task, name, {each.name for each in steps}))
+        steps.append(_step(made, model, par, task, name, {each.name for each in steps},
+                           held or {}))  # fmt: skip
     by_name = {each.name: each for each in made.functions.values()}
-    uses, waiting = set(), [each.uses for each in steps]
-    reached: set[str] = set()
-    while waiting:
-        for use in waiting.pop():
-            uses.add(use)
-            if use[0] == "call" and use[1] not in reached:
-                reached.add(use[1])
-                waiting.append(by_name[use[1]].uses)
+    uses: set[Use] = set()
+    for k, step in enumerate(steps):
+        needed = _needed(step.uses, by_name)
+        steps[k] = replace(step, inputs=tuple(checked_inputs(model, structs, needed)))
+        uses |= needed
+    reached = {use[1] for use in uses if use[0] == "call"}
     derived = tuple(structs.derivations.derived(frozenset(uses)))
     uses |= frozenset[Use]().union(*(each.uses for each in derived))
     functions = tuple(each for each in made.functions.values() if each.name in reached)
     constants = {use[1]: use[2] for use in sorted(u for u in uses if u[0] == "constant")}
     return Program(name, precision, model, par, tuple(steps), functions, structs, constants,
                    frozenset(uses), derived)  # fmt: skip
+
+
+def _needed(uses: frozenset[Use], by_name: Mapping[str, CFunction]) -> set[Use]:
+    """Return what a text needs, and the functions that it calls."""
+    found: set[Use] = set()
+    waiting = [uses]
+    while waiting:
+        for use in waiting.pop():
+            if use[0] == "call" and use not in found:
+                waiting.append(by_name[use[1]].uses)
+            found.add(use)
+    return found
 
 
 def _class_of(value: Any) -> Any:
@@ -194,15 +281,16 @@ def _class_of(value: Any) -> Any:
 
 
 def _step(
-    made: Translation, model: Model, par: ParameterSet, task: Task, name: str, taken: set[str]
-) -> Step:
+    made: Translation, model: Model, par: ParameterSet, task: Task, name: str, taken: set[str],
+    held: Mapping[str, Held],
+) -> Step:  # fmt: skip
     """Return the step of a task: its tick, called on what stands behind pointers."""
     structs = made.structs
     step = unique(f"{name}_ecu_step_{c_name(task.name)}", taken)
     body = Body(structs, Counter(), Memories(step, made.copied))
-    held = {"memory": model.Memory, "x": model.State, "u": model.Stimulus}
+    given_as = {"memory": model.Memory, "x": model.State, "u": model.Stimulus}
     given: dict[str, Any] = {}
-    for short, cls in held.items():
+    for short, cls in given_as.items():
         body.fresh(short)
         given[short] = Record(cls, Expr(short, uses=frozenset({("local", short)})), pointer=True)
     body.fresh("par")
@@ -223,12 +311,17 @@ def _step(
     after = frozenset({("local", "memory")}) if result is None else result.uses
     body.memory.read(after)
     statements = live(body.statements, after)
-    needed = {use[1] for each in (after, *(s.value.uses for s in statements)) for use in each
-              if use[0] == "local"}  # fmt: skip
+    renewed = held[task.name].renewed if task.name in held else ()
+    limited = commands(model, renewed, structs, shape_of(par))
+    every = (after, *(s.value.uses for s in statements), *(c.limit.uses for c in limited))
+    needed = {use[1] for each in every for use in each if use[0] == "local"}
     arguments = [(f"{structs.of_tuple(model.Memory).name} *memory", "memory")]
     for short in ("x", "u"):
         if short in needed:
-            arguments.append((f"const {structs.of_tuple(held[short]).name} *{short}", short))
+            arguments.append((f"const {structs.of_tuple(given_as[short]).name} *{short}", short))
     if "par" in needed:
         arguments.append((f"const {structs.of_group(shape_of(par)).name} *par", "par"))
-    return Step(task, step, tuple(arguments), tuple(statements), result)
+    read = frozenset[str]().union(*(each.read for each in held.values()))
+    kept = read | {each.field for each in limited}
+    return Step(task, step, tuple(arguments), tuple(statements), result, tuple(limited),
+                kept=tuple(n for n in renewed if n in kept))  # fmt: skip

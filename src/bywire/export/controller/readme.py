@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Iterable
 
+from bywire.export.controller.c_text import c_name
+from bywire.export.controller.contract import INPUT, LARGEST, RESULT, CheckedInput
 from bywire.export.controller.harness import FLAGS
 from bywire.export.controller.program import Program
 
@@ -26,10 +29,14 @@ def readme(program: Program, files: Iterable[str], count: int) -> str:
         "in this order:",
         *tasks,
         _derived(program),
-        f"Memory ({memory} numbers of {size} bytes) belongs to the caller; the description for "
-        f"calibration tools expects it to be called {name}_memory. Parameters ({values} numbers) "
-        f"are constants in {name}_parameters.c. Nothing is allocated, nothing calls itself, and "
-        "there is no state beside the memory.",
+        f"Memory ({memory} numbers of {size} bytes and a status for each task) belongs to the "
+        f"caller. Parameters ({values} numbers) are constants in {name}_parameters.c. Nothing is "
+        "allocated, nothing calls itself, and there is no state beside the memory.",
+        *_instance(program),
+        *_contract(program),
+        f"Everything that a header shows begins with {name}_, and headers serve C++ too: ECUs of "
+        "other names, and this one in the other precision under another name, link into one "
+        "program.",
         _plant(program),
         f"Compile with {' '.join(FLAGS)} or the like: fast mathematics and fused products change "
         "the last digits. 'make check' compares the compiled ECU with "
@@ -41,6 +48,78 @@ def readme(program: Program, files: Iterable[str], count: int) -> str:
         each if each.startswith("    ") else textwrap.fill(each, 88, break_on_hyphens=False)
         for each in said if each
     ) + "\n"  # fmt: skip
+
+
+def _contract(program: Program) -> list[str]:
+    """Return what a step makes of inputs, memory and parameters, whatever they are."""
+    name, upper = program.name, program.name.upper()
+    ranges = [
+        f"    {each.kind}->{c_name(each.field)}: {_range(each)}"
+        for each in _inputs(program)
+        if math.isfinite(each.low) or math.isfinite(each.high)
+    ]
+    said = [
+        "CONTRACT OF A STEP",
+        f"Inputs. A step checks the inputs that its task reads. Each must be a number below "
+        f"{LARGEST:g} in magnitude, in its SI unit"
+        + (", and within its range:" if ranges else "."),
+        *(["\n".join(ranges)] if ranges else []),
+        "If an input is refused (NaN, infinity, out of range), the step computes nothing. The "
+        f"memory stays as it was, with the last commands, and memory->status_TASK becomes "
+        f"{upper}_STATUS_INPUT ({INPUT}). The next step with valid inputs goes on from there. How "
+        "long commands may be held, and what replaces them, is the caller's decision.",
+        "Results. If a state or a command is no number below that magnitude after a tick, because "
+        "of a wrong parameter or a corrupted memory, the memory begins anew as after "
+        f"{name}_ecu_init, and the status becomes {upper}_STATUS_RESULT ({RESULT}). Otherwise the "
+        "status is 0.",
+    ]
+    limits = [
+        f"    memory->{c_name(each.field)}: "
+        f"{'at most' if each.is_input else 'within plus and minus'} {each.limit.text}"
+        for step in program.steps
+        for each in step.commands
+    ]
+    if limits:
+        said += [
+            "Commands. Whatever inputs, memory and parameters are, these commands stay within "
+            "their limits; a limit that is negative or no number counts as 0:",
+            "\n".join(limits),
+        ]
+    said.append(
+        "Parameters. A step does not check them. "
+        + (
+            f"{name}_instance_apply takes calibrated parameters over only if all of them are "
+            "within the ranges of the A2L; that some belong together is not checked."
+            if program.parameters()
+            else ""
+        )
+    )
+    return said
+
+
+def _inputs(program: Program) -> list[CheckedInput]:
+    """Return the inputs of all tasks, each once."""
+    return list(dict.fromkeys(each for step in program.steps for each in step.inputs))
+
+
+def _range(each: CheckedInput) -> str:
+    if not math.isfinite(each.high):
+        return f"at least {each.low:g}"
+    return f"at most {each.high:g}" if not math.isfinite(each.low) else (
+        f"from {each.low:g} to {each.high:g}"
+    )  # fmt: skip
+
+
+def _instance(program: Program) -> list[str]:
+    name = program.name
+    if not program.parameters():
+        return [f"{name}_instance.c holds {name}_memory, to which {name}.a2l links."]
+    return [
+        f"{name}_instance.c is optional. It holds {name}_memory, and parameters in RAM: a "
+        f"calibration tool changes {name}_calibration, to which {name}.a2l links, and steps are "
+        f"given {name}_active. Call {name}_instance_init in place of {name}_ecu_init, and "
+        f"{name}_instance_apply between two steps to take over what was calibrated."
+    ]
 
 
 def _derived(program: Program) -> str:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
-from bywire.export.controller.c_text import comment, wrapped
-from bywire.export.controller.elementary import elementary, headers
+from bywire.export.controller.c_text import BEGIN_C, END_C, c_name, comment, wrapped
+from bywire.export.controller.contract import INPUT, RESULT, CheckedInput
+from bywire.export.controller.elementary import contract_functions, elementary
 from bywire.export.controller.functions import CFunction
-from bywire.export.controller.program import Program, Step
+from bywire.export.controller.program import OPS, Program, Step
 from bywire.export.controller.statements import Statement
 from bywire.export.controller.structs import Struct
-
-_OPS = "bywire.core.ops"
 
 
 def header(program: Program) -> str:
@@ -23,18 +23,33 @@ def header(program: Program) -> str:
         said = "Renew what follows from other parameters: where these were changed, before a step."
         prototypes += ["", comment([said]), f"{_derive(program)};"]
     for step in program.steps:
-        text = f"Once every {step.task.period:.9g} s: task {step.task.name}."
+        text = f"Once every {step.task.period:.9g} s: task {step.task.name}. Sets {step.status}."
         prototypes += ["", comment([text]), wrapped(f"{_signature_of(step)};")]
     parts = [
         comment([f"The ECU of {program.model.name}, {program.precision.name} precision.",
                  "Written by bywire; a change belongs into the Python of the law."]),
         f"#ifndef {name.upper()}_ECU_H\n#define {name.upper()}_ECU_H",
+        "#include <stdint.h>",
+        _statuses(program),
+        BEGIN_C,
         *(_struct(program, each) for each in structs),
         *_data(program),
         comment(["Set the memory with which the bench begins."]) + "\n" + "\n".join(prototypes),
+        END_C,
         "#endif",
     ]  # fmt: skip
     return "\n\n".join(parts) + "\n"
+
+
+def _statuses(program: Program) -> str:
+    """Return what the status of a step may be."""
+    name = program.name.upper()
+    said = "Status of a step, 0 where it was as it should be; README.txt says what follows."
+    return (
+        f"{comment([said])}\n"
+        f"#define {name}_STATUS_INPUT {INPUT}u /* an input was refused, the memory stays */\n"
+        f"#define {name}_STATUS_RESULT {RESULT}u /* a result was none, the memory began anew */"
+    )
 
 
 def _data(program: Program) -> list[str]:
@@ -53,9 +68,9 @@ def operations(program: Program) -> str:
     name, real = program.name, program.precision.real
     parts = [comment(["Elementary functions, with the meaning that they have in Python."]),
              f"#ifndef {name.upper()}_OPS_H\n#define {name.upper()}_OPS_H",
-             "#include <stdbool.h>"]  # fmt: skip
+             "#include <stdbool.h>\n#include <stdint.h>\n#include <string.h>"]  # fmt: skip
     ours = {use[1] for use in program.uses if use[0] == "own"}
-    named = [*headers(ours), *(["math"] if program.libraries else [])]
+    named = ["math"] if program.libraries else []
     parts[-1] += "".join(f"\n#include <{each}.h>" for each in named)
     if program.constants:
         literal = program.precision.literal
@@ -69,6 +84,8 @@ def operations(program: Program) -> str:
             )
     parts += map(_lines_wrapped, elementary(ours, program.precision))
     parts += [_function(program, each, "static inline ") for each in _of_ops(program)]
+    has_limits = any(not c.is_input for step in program.steps for c in step.commands)
+    parts += contract_functions(program.precision, has_limits)
     return "\n\n".join([*parts, "#endif"]) + "\n"
 
 
@@ -81,29 +98,26 @@ def _lines_wrapped(text: str) -> str:
 
 
 def _of_ops(program: Program) -> list[CFunction]:
-    return [each for each in program.functions if each.module == _OPS]
-
-
-def _plant(program: Program) -> list[CFunction]:
-    return [each for each in program.functions if each.is_plant and each.module != _OPS]
+    return [each for each in program.functions if each.module == OPS]
 
 
 def _laws(program: Program) -> list[CFunction]:
-    return [each for each in program.functions if not each.is_plant and each.module != _OPS]
+    return [each for each in program.functions if not each.is_plant and each.module != OPS]
 
 
 def io_header(program: Program) -> str:
     """Return ``NAME_io.h``: what a target brings instead, converters and limits."""
     name = program.name
-    functions = _plant(program)
-    structs = _needed_by(program, functions)
+    functions = program.plant_functions
     parts = [
         comment(["The plant's side of the ticks: converters, sensors, limits of the power stage.",
                  "On a target the hardware, or its drivers, take the place of these functions."]),
         f"#ifndef {name.upper()}_IO_H\n#define {name.upper()}_IO_H",
         f'#include <stdbool.h>\n#include "{name}_ecu.h"',
-        *(_struct(program, each) for each in structs),
+        BEGIN_C,
+        *(_struct(program, each) for each in program.shown()),
         *(wrapped(f"{signature(each)};") for each in functions),
+        END_C,
         "#endif",
     ]  # fmt: skip
     return "\n\n".join(parts) + "\n"
@@ -114,19 +128,19 @@ def io_source(program: Program) -> str:
     name = program.name
     parts = [comment(["The plant's side of the ticks."]),
              f'#include "{name}_io.h"\n#include "{name}_ops.h"']  # fmt: skip
-    return "\n\n".join([*parts, *(_function(program, f) for f in _plant(program))]) + "\n"
+    return "\n\n".join([*parts, *(_function(program, f) for f in program.plant_functions)]) + "\n"
 
 
 def source(program: Program) -> str:
     """Return ``NAME_ecu.c``: laws, init, and the step of every task."""
     name = program.name
     laws = _laws(program)
-    shown = {each.name for each in _needed_by(program, _plant(program))}
+    shown = {each.name for each in program.shown()}
     structs = [
         each for each in program.structs.ordered() if not each.public and each.name not in shown
     ]
     includes = [f'#include "{name}_ecu.h"', f'#include "{name}_io.h"', f'#include "{name}_ops.h"']
-    if not _plant(program):
+    if not program.plant_functions:
         includes.pop(1)
     init = (f"void {name}_ecu_init({name}_Memory *memory)\n{{\n"
             f"    *memory = {name}_initial_memory;\n}}")  # fmt: skip
@@ -137,7 +151,7 @@ def source(program: Program) -> str:
         *(_function(program, each, "static ") for each in laws),
         init,
         *_derivation(program),
-        *(_step(each) for each in program.steps),
+        *(_step(program, each) for each in program.steps),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -156,25 +170,7 @@ def _derivation(program: Program) -> list[str]:
 
 def has_io(program: Program) -> bool:
     """Return whether the ticks have a plant's side."""
-    return bool(_plant(program))
-
-
-def _needed_by(program: Program, functions: Iterable[CFunction]) -> list[Struct]:
-    """Return the structures of the plant's side that the header of the ECU does not show."""
-    names: set[str] = set()
-    for each in functions:
-        names |= {a.declaration.removeprefix("const ").split()[0] for a in each.arguments}
-        names.add(each.result)
-        names |= {s.ctype for s in each.statements}
-        names |= {use[1] for use in each.uses if use[0] == "struct"}
-    known = {each.name: each for each in program.structs.ordered()}
-    waiting = [known[n] for n in names if n in known]
-    while waiting:
-        for member in program.structs.kept(waiting.pop()):
-            if member.ctype in known and member.ctype not in names:
-                names.add(member.ctype)
-                waiting.append(known[member.ctype])
-    return [each for each in known.values() if each.name in names and not each.public]
+    return bool(program.plant_functions)
 
 
 def _struct(program: Program, struct: Struct) -> str:
@@ -183,6 +179,8 @@ def _struct(program: Program, struct: Struct) -> str:
     for member in program.structs.kept(struct):
         note = f" {comment([member.note])}" if member.note else ""
         lines.append(f"    {member.declaration}{note}")
+    if struct.is_memory:
+        lines += [f"    uint32_t {s.status}; {comment([_status_note(s)])}" for s in program.steps]
     return "\n".join([*lines, f"}} {struct.name};"])
 
 
@@ -237,8 +235,56 @@ def _signature_of(step: Step) -> str:
     return f"void {step.name}({', '.join(text for text, _ in step.arguments)})"
 
 
-def _step(step: Step) -> str:
-    lines = [wrapped(_signature_of(step)), "{", *_statements(step.statements, set())]
+def _status_note(step: Step) -> str:
+    return f"of the last call of {step.name}, 0: as it should be"
+
+
+def _step(program: Program, step: Step) -> str:
+    """Return the function of a task: inputs are checked before it, memory and commands behind."""
+    name = program.name
+    body = _statements(step.statements, set())
     if step.result is not None:
-        lines.append(wrapped(f"*memory = {step.result.text};", "    "))
-    return "\n".join([*lines, "}"])
+        body.append(wrapped(f"*memory = {step.result.text};", "    "))
+    of_inputs = [f"    memory->{c_name(each.field)} = smaller(memory->{c_name(each.field)}, "
+                 f"{each.limit.text});" for each in step.commands if each.is_input]  # fmt: skip
+    if step.kept:
+        numbers = _all([f"is_usual(memory->{c_name(each)})" for each in step.kept], "            ")
+        body += [
+            f"    if (!({numbers})) {{",
+            f"        {name}_ecu_init(memory);",
+            f"        status = {name.upper()}_STATUS_RESULT;",
+            "    }",
+        ]
+    body += of_inputs
+    checks = [check for each in step.inputs for check in _checks(program, each)]
+    begin = "0u"
+    if checks:
+        begin = f"{name.upper()}_STATUS_INPUT"
+        body.insert(0, "    status = 0u;")
+        body = [
+            f"    if ({_all(checks, '            ')}) {{",
+            *("\n".join(f"    {row}" for row in line.split("\n")) for line in body),
+            "    }",
+        ]
+    limited = [
+        wrapped(f"memory->{c_name(each.field)} = within(memory->{c_name(each.field)}, "
+                f"{each.limit.text});", "    ")
+        for each in step.commands if not each.is_input
+    ]  # fmt: skip
+    return "\n".join([
+        wrapped(_signature_of(step)), "{", f"    uint32_t status = {begin};", "", *body, *limited,
+        f"    memory->{step.status} = status;", "}",
+    ])  # fmt: skip
+
+
+def _all(checks: list[str], indent: str) -> str:
+    return f"\n{indent}&& ".join(checks)
+
+
+def _checks(program: Program, each: CheckedInput) -> list[str]:
+    """Return what has to hold of an input."""
+    place, literal = f"{each.kind}->{c_name(each.field)}", program.precision.literal
+    ends = [(">=", each.low), ("<=", each.high)]
+    return [f"is_usual({place})"] + [
+        f"({place} {sign} {literal(end)})" for sign, end in ends if math.isfinite(end)
+    ]

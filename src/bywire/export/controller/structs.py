@@ -19,6 +19,7 @@ from bywire.export.controller.values import (
     Shape,
     Use,
     is_named_tuple,
+    is_parameter_class,
 )
 
 
@@ -64,12 +65,18 @@ class Structs:
         Names of structures that the header shows, by class.
     memory
         The class whose fields are all kept that are written.
+    prefix
+        What names of structures in headers begin with: all parameter sets, and those of ``shared``.
+    shared
+        Further classes whose structures a header shows.
     """
 
     precision: Precision
     used: frozenset[Use] | None
     public: Mapping[type[Any], str]
     memory: type[Any]
+    prefix: str = ""
+    shared: frozenset[type[Any]] = frozenset()
     known: dict[Any, Struct] = field(default_factory=dict)
     names: set[str] = field(default_factory=set)
     derivations: Derivations = field(default_factory=Derivations)
@@ -170,9 +177,12 @@ class Structs:
         if cls in self.public:
             return self.public[cls]
         place = cls.__module__.split(".")
-        name = c_name(f"{place[-1]}_{cls.__name__.lstrip('_')}")
+        is_shown = cls in self.shared or is_parameter_class(cls)
+        begin = f"{self.prefix}_" if is_shown and self.prefix else ""
+        own = f"{place[-1]}_{cls.__name__.lstrip('_')}"
+        name = c_name(f"{begin}{own}")
         if name in self.names and len(place) > 1:
-            name = c_name(f"{place[-2]}_{name}")
+            name = c_name(f"{begin}{place[-2]}_{own}")
         name = unique(name, self.names)
         self.names.add(name)
         return name

@@ -48,10 +48,13 @@ class Translation:
     ----------
     is_plant
         ``is_plant(function, arguments)``: whether a function belongs to the plant's side.
+    prefix
+        What names of functions in headers begin with.
     """
 
     structs: Structs
     is_plant: Callable[[types.FunctionType, Mapping[str, Any]], bool]
+    prefix: str = ""
     functions: dict[Any, CFunction] = field(default_factory=dict)
     names: set[str] = field(default_factory=set)
     constants: dict[str, float] = field(default_factory=dict)
@@ -167,9 +170,11 @@ class Translation:
         node = node_of(function)
         short = "tick" if isinstance(node, ast.Lambda) else node.name
         module = function.__module__
-        name = unique(c_name(f"{module.rpartition('.')[2]}_{short.lstrip('_')}"), self.names)
-        self.names.add(name)
         is_plant = self.is_plant(function, arguments)
+        is_shown = is_plant and module != ops.__name__ and self.prefix
+        own = f"{module.rpartition('.')[2]}_{short.lstrip('_')}"
+        name = unique(c_name(f"{self.prefix}_{own}" if is_shown else own), self.names)
+        self.names.add(name)
         made = CFunction(name, module, description(function), is_plant)
         body = Body(self.structs, stores(node), Memories(name, self.copied))
         scope: dict[str, Any] = {n: Known(v) for n, v in closure.items()}

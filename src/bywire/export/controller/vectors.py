@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from bywire.core.model import Task
 from bywire.core.parameters import ParameterSet
-from bywire.core.signals import signals_of
+from bywire.core.signals import ranges_of, signals_of
 from bywire.core.typing import Array
 from bywire.export.controller.borders import Borders
+from bywire.export.controller.contract import LARGEST
 from bywire.export.controller.draws import CALM, RELATED, WILD, Draw
 from bywire.export.controller.program import Program, Step
 
@@ -89,7 +88,7 @@ def vectors(program: Program, memory: Any, count: int, seed: int = 0) -> list[Ve
     for step in program.steps:
         every = rows[step.task.name]
         parts = [used[cls] for cls in (model.State, model.Stimulus, model.Memory)]
-        every += list(_at_borders(step.task, every, parts, sets, count - len(every), draw))
+        every += list(_at_borders(step, every, parts, sets, count - len(every), draw))
     _filled(rows, drawn, count)
     return [_packed(program, step, rows[step.task.name], other) for step in program.steps]
 
@@ -128,8 +127,9 @@ def _drawn(
                     draw.tuple(cls, used[cls], pool)
                     for cls in (model.Memory, model.State, model.Stimulus)
                 )
+            x, u = _inside(x, number), _inside(u, number)
             for step in program.steps:
-                after = _ticked(step.task, x, m, u, sets[which], number)
+                after = _ticked(step, x, m, u, sets[which], number)
                 if after is None:
                     break
                 yield step.task.name, (x, u, m, after, which)
@@ -146,7 +146,7 @@ def _at_rest(
     """Return the memory behind ticks with unchanged inputs: filters have come to rest."""
     for _ in range(SEGMENT):
         for step in program.steps:
-            after = _ticked(step.task, x, m, u, par, number)
+            after = _ticked(step, x, m, u, par, number)
             if after is None:
                 return m
             m = after
@@ -154,7 +154,7 @@ def _at_rest(
 
 
 def _at_borders(
-    task: Task, rows: list[_Row], used: list[set[str]], sets: list[ParameterSet], count: int,
+    step: Step, rows: list[_Row], used: list[set[str]], sets: list[ParameterSet], count: int,
     draw: Draw,
 ) -> Iterator[_Row]:  # fmt: skip
     """Yield vectors next to borders of comparisons, that Python computes."""
@@ -163,12 +163,29 @@ def _at_borders(
     begins = [
         (tuple(type(each)(*map(float, each)) for each in row[:3]), plain[row[4]]) for row in rows
     ]
-    for inputs, at in Borders(task.tick, used, draw.rng).near(begins, count if begins else 0):
+    for inputs, at in Borders(step.task.tick, used, draw.rng).near(begins, count if begins else 0):
         x, u, m = (type(each)(*map(draw.number, each)) for each in inputs)
-        after = _ticked(task, x, m, u, sets[rows[at][4]], draw.number)
+        after = _ticked(step, x, m, u, sets[rows[at][4]], draw.number)
         if after is not None and given < count:
             given += 1
             yield x, u, m, after, rows[at][4]
+
+
+def _inside(values: Any, number: Callable[[float], Any]) -> Any:
+    """Return signals within their admissible ranges, which a step asks for."""
+    cls: Any = type(values)
+    return values._replace(**{
+        name: number(min(max(getattr(values, name), low), high))
+        for name, (low, high) in ranges_of(cls).items()
+    })  # fmt: skip
+
+
+def _is_accepted(values: Any) -> bool:
+    cls: Any = type(values)
+    ranges = ranges_of(cls).items()
+    return all(abs(each) < LARGEST for each in values) and all(
+        low <= getattr(values, name) <= high for name, (low, high) in ranges
+    )
 
 
 def _nominal(cls: Any, number: Callable[[float], Any]) -> Any:
@@ -176,16 +193,20 @@ def _nominal(cls: Any, number: Callable[[float], Any]) -> Any:
 
 
 def _ticked(
-    task: Task, x: Any, m: Any, u: Any, par: ParameterSet, number: Callable[[float], Any]
+    step: Step, x: Any, m: Any, u: Any, par: ParameterSet, number: Callable[[float], Any]
 ) -> Any:
-    """Return the memory behind a tick; None where Python refuses to compute it."""
+    """Return the memory behind a tick; None where Python, or a step, refuses to compute it."""
+    if not (_is_accepted(x) and _is_accepted(u)):
+        return None
     try:
         with np.errstate(all="ignore"):
-            after = task.tick(x, m, u, par)
+            after = step.task.tick(x, m, u, par)
         values = [float(each) for each in after]
     except (ArithmeticError, ValueError):
         return None
-    if not all(map(math.isfinite, values)) or any(abs(v) > 1e30 for v in values):
+    if not all(abs(each) <= 1e30 for each in values):  # nor is what is no number
+        return None
+    if any(abs(float(getattr(after, name))) >= LARGEST for name in step.kept):
         return None
     return type(after)(*map(number, values))
 

@@ -6,7 +6,6 @@ both are compiled apart.
 
 from __future__ import annotations
 
-import importlib.util
 import platform
 import subprocess
 import sys
@@ -14,8 +13,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from bywire.core.child_process import run_program
 from bywire.core.errors import CompilerError, unknown_name
-from bywire.simulation.compiler import KERNEL_MATH, PLAIN, TIMEOUT, Compiler, find_compiler
+from bywire.simulation.compiler import (
+    KERNEL_MATH,
+    PLAIN,
+    TIMEOUT,
+    Compiler,
+    bundled_compiler,
+    find_compiler,
+)
 
 _LANGUAGE = ("-std=c11", "-fvisibility=hidden")
 
@@ -88,6 +95,7 @@ def compiled(sources: Path, kernel: str, functions: str, target: str, library: P
     if target not in PLATFORMS:
         raise unknown_name("target", target, PLATFORMS)
     compiler, cross = _compiler_for(target)
+    sources, library = sources.absolute(), library.absolute()
     position = () if target == "win64" else ("-fPIC",)
     objects = []
     for name, flags in ((kernel, (*KERNEL_MATH, *compiler.flags(PLAIN))), (functions, ("-O2",))):
@@ -116,19 +124,19 @@ def _compiler_for(target: str) -> tuple[Compiler, tuple[str, ...]]:
                 "extra bywire[compiler]"
             )
         return compiler, ()
-    if importlib.util.find_spec("ziglang") is None:
+    command = bundled_compiler()
+    if command is None:
         raise CompilerError(
             f"target {target}: this system's compiler makes {this_platform()} only; install the "
             "extra bywire[compiler], which compiles for all"
         )
-    command = (sys.executable, "-m", "ziglang", "cc")
     return Compiler(command, "clang of the extra compiler"), ("-target", PLATFORMS[target].triple)
 
 
 def _call(compiler: Compiler, cross: tuple[str, ...], arguments: list[str]) -> None:
     command = [*compiler.command, *cross, *arguments]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+        done = run_program(command, TIMEOUT)
     except subprocess.TimeoutExpired:
         raise CompilerError(f"{compiler.label} took longer than {TIMEOUT:g} s for an FMU") from None
     except OSError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement
 
@@ -108,4 +109,7 @@ def real_attributes(each: Variable) -> dict[str, str]:
         low, high = finite_range(each.leaf)
         made |= {} if low is None else {"min": repr(low)}
         made |= {} if high is None else {"max": repr(high)}
+    else:
+        made |= {name: repr(end) for name, end in zip(("min", "max"), each.ends, strict=True)
+                 if math.isfinite(end)}  # fmt: skip
     return made if each.start is None else made | {"start": repr(each.start)}

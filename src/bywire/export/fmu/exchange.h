@@ -29,6 +29,7 @@ static const double nominals[] = NOMINALS;
 typedef struct {
   double p[PARAMETERS + 1], u[STIMULI + 1], state[STATE], row[ROWS + 1];
   double time, events; /* events: how often a mode has changed */
+  double origin, stop; /* times of the client at which the run begins, and may end at most [s] */
   double mode[MODAL + 1], closed[CONTACTS + 1], reaction[MODAL + 1];
   double rate[STATES], indicator[INDICATORS + 1];
   int32_t is_set;   /* a value was set since the derivatives were computed */
@@ -107,7 +108,7 @@ static void started(run *r) {
   }
   settle(r);
   r->events = 0.0;
-  r->time = 0.0;
+  r->time = r->origin;
 }
 
 static double *place_of(run *r, unsigned k) {

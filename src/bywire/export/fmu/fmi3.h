@@ -87,11 +87,11 @@ API void fmi3FreeInstance(fmi3Instance c) { free(c); }
 
 API fmi3Status fmi3EnterInitializationMode(fmi3Instance c, bool has_tolerance, double tolerance,
     double start, bool has_stop, double stop) {
-  (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
-  if (start != 0.0)
-    return refuse(c, fmi3Error, "the run starts at time 0 s: the settling of the bench first");
-  ((instance *)c)->now = INITIALIZING;
-  return fmi3OK;
+  instance *one = c;
+  const char *wrong = timed(&one->r, start, has_stop, stop);
+  (void)has_tolerance, (void)tolerance; /* the step is fixed */
+  if (!wrong) one->now = INITIALIZING;
+  return answer(one, wrong);
 }
 
 API fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {

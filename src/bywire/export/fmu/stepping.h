@@ -13,9 +13,10 @@ void bw_run(const double *p, double h, const double *u, double *state, const int
 
 typedef struct {
   double p[PARAMETERS + 1], u[STIMULI + 1], state[STATE], row[ROWS + 1], sampled[ROWS + 1];
-  int64_t frame;     /* frames since the start */
-  int32_t is_set;    /* a value was set since the rows were computed */
-  int32_t is_begun;  /* the initial values are there */
+  int64_t frame;       /* frames since the start */
+  double origin, stop; /* times of the client at which the run begins, and may end at most [s] */
+  int32_t is_set;      /* a value was set since the rows were computed */
+  int32_t is_begun;    /* the initial values are there */
   int32_t is_done[TASKS + 1], is_active[TASKS + 1]; /* 3.0: tasks that have ticked now, or shall */
 } run;
 
@@ -82,10 +83,13 @@ static inline void tick(run *r, const int *is_active) {
   r->is_set = 0;
 }
 
-/* Time since the beginning of the run [s]. */
-static inline double seconds(const run *r) { return STEP * SUBSTEPS * (double)r->frame; }
+/* The client's time [s]. It follows from whole frames, so that no rounding adds up, and no result
+ * depends on when the run begins. */
+static inline double seconds(const run *r) {
+  return r->origin + STEP * SUBSTEPS * (double)r->frame;
+}
 
-static double unsettled(const run *r) { return r->state[STATE - 2]; }
+static double unsettled(const run *r) { return r->state[STATE - COUNTERS]; }
 
 static double *place_of(run *r, unsigned k) {
   const int at = variables[k].index;
@@ -102,14 +106,22 @@ static double *place_of(run *r, unsigned k) {
 static int64_t frames_of(const run *r, double time, double step, char *said) {
   const double frame = STEP * SUBSTEPS, here = seconds(r);
   const double frames = step / frame;
+  /* Rounding of a client's times: of one time, and of all the steps that it may have added up. */
+  const double once = 4.5e-16 * fmax(fabs(here), fabs(r->origin));
+  const double often = fmin(1e-6 * frame + once * (double)(r->frame + 1), 0.1 * frame);
   said[0] = 0;
-  if (!(isfinite(time) && fabs(time - here) <= 1e-6 * frame)) {
+  if (!(isfinite(time) && fabs(time - here) <= often)) {
     snprintf(said, MESSAGE, "the step begins at %.9g s, but the run is at %.9g s", time, here);
     return 0;
   }
-  if (!(frames > 0.5 && frames < 1e15 && fabs(frames - round(frames)) <= 1e-6)) {
+  if (!(frames > 0.5 && frames < 1e15 && fabs(frames - round(frames)) <= 1e-6 + 2.0 * once / frame)) {
     snprintf(said, MESSAGE, "a communication step of %.9g s is not admissible: it must be a whole "
         "multiple of %.9g s, which divides the sample times of the ECU", step, frame);
+    return 0;
+  }
+  if (here + step > r->stop + often) {
+    snprintf(said, MESSAGE, "the step ends at %.9g s, but the stop time is %.9g s", here + step,
+        r->stop);
     return 0;
   }
   return (int64_t)round(frames);

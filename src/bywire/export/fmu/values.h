@@ -35,7 +35,17 @@ static void reset(run *r) {
   memcpy(r->p, p_start, sizeof p_start);
   memcpy(r->state, state_start, sizeof state_start);
   for (int k = 0; k < STIMULI; ++k) r->u[k] = u_start[k];
+  r->stop = HUGE_VAL;
   r->is_set = 1;
+}
+
+/* Take the client's time of the beginning, which is the run's time 0, and of the end. */
+static const char *timed(run *r, double start, int has_stop, double stop) {
+  if (!isfinite(start)) return "the start time must be a finite number";
+  if (has_stop && !(stop >= start)) return "the stop time must not be before the start time";
+  r->origin = start;
+  r->stop = has_stop ? stop : HUGE_VAL;
+  return NULL;
 }
 
 /* What is to be said of a run that has left the numbers; NULL where it has not. */

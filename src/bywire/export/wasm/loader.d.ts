@@ -7,10 +7,10 @@ export interface Parameter {
 }
 export interface Signal { name: string; unit: string; label: string }
 /** What drives the run: values that hold from their times on. */
-export interface Stimulus extends Signal { steps: [number, number][] }
+export interface Stimulus extends Signal { steps: [number, number][]; low?: number; high?: number }
 export interface Description {
   name: string; model: string; duration: number; settle: number; step: number; frame: number;
-  recordFrames: number; stimulusFrames: number; stateLength: number; beginsAtRest: boolean;
+  recordFrames: number; stimulusFrames: number; stateLength: number; unsettledAt: number; beginsAtRest: boolean;
   choices: Record<string, string | number>;
   parameters: Parameter[]; stimulus: Stimulus[]; signals: Signal[];
 }

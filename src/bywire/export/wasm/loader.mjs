@@ -45,6 +45,11 @@ function rowsOf(description, given, count, interval) {
     }
   });
   if (!areFinite(rows)) throw new RangeError("the stimulus must be finite");
+  description.stimulus.forEach(({ name, low, high }, k) => {
+    for (let at = k; at < rows.length; at += names.length)
+      if (rows[at] < (low ?? -Infinity) || rows[at] > (high ?? Infinity))
+        throw new RangeError(`${name} = ${rows[at]} is outside its range, ${low ?? "-∞"} to ${high ?? "∞"}`);
+  });
   return rows;
 }
 
@@ -66,7 +71,7 @@ export async function load(bytes, description) {
   const made = await functionsOf(table, { ...math, ...instance.exports }, working());
   formulas.grow(made.length);
   made.forEach((each, k) => formulas.set(k + 1, each));
-  const { frame, recordFrames, stimulusFrames, stateLength } = description;
+  const { frame, recordFrames, stimulusFrames, stateLength, unsettledAt } = description;
   const width = description.signals.length;
   return {
     description,
@@ -93,7 +98,7 @@ export async function load(bytes, description) {
       const table = new Float64Array(memory.buffer, rec, count * width).slice(); // the next run's place
       const time = new Float64Array(count);
       for (let row = 0; row < count; ++row) time[row] = row * recordFrames * frame;
-      const unsettled = new Float64Array(memory.buffer, working(), stateLength)[stateLength - 2];
+      const unsettled = new Float64Array(memory.buffer, working(), stateLength)[unsettledAt];
       let signals;
       return {
         time, table, settled: unsettled === 0 && areFinite(table),

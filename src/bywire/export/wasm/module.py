@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import subprocess
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -13,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from bywire.core.child_process import run_program
 from bywire.core.errors import CompilerError
 from bywire.core.scratch import process_folder, scratch_folder
-from bywire.core.signals import Signal, signals_of
+from bywire.core.signals import Signal, ranges_of, signals_of
 from bywire.export.exported import Exported
 from bywire.export.initial_values import start_nodes
 from bywire.export.interface import Interface, interface
@@ -23,7 +22,7 @@ from bywire.export.variables import finite_range, parameter_variables
 from bywire.export.wasm.formulas import with_section
 from bywire.export.wasm.run_formulas import run_formulas
 from bywire.simulation.c_runtime import SCALAR
-from bywire.simulation.compiler import KERNEL_MATH, TIMEOUT
+from bywire.simulation.compiler import KERNEL_MATH, TIMEOUT, bundled_compiler
 from bywire.simulation.rare_text import CUT
 from bywire.simulation.run import sampled_stimulus
 
@@ -68,7 +67,8 @@ def _module(made: Exported, further: Mapping[str, str]) -> bytes:
 
 def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
     """Return what is compiled of a module."""
-    if importlib.util.find_spec("ziglang") is None:
+    compiler = bundled_compiler()
+    if compiler is None:
         raise CompilerError(
             "WebAssembly is compiled by the extra bywire[compiler], which is not installed: "
             "pip install 'bywire[compiler]'"
@@ -84,12 +84,9 @@ def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
             sources[-1].write_text(text, encoding="utf-8")
         made = folder / "module.wasm"
         exported = [f"-Wl,--export={entry}" for entry in further]
-        command = [sys.executable, "-m", "ziglang", "cc", *_FLAGS, *exported, f"-I{folder}",
-                   *map(str, sources), "-o", str(made)]  # fmt: skip
+        command = [*compiler, *_FLAGS, *exported, f"-I{folder}", *map(str, sources)]
         try:
-            done = subprocess.run(
-                command, capture_output=True, text=True, timeout=TIMEOUT, check=False
-            )
+            done = run_program([*command, "-o", str(made)], TIMEOUT)
         except subprocess.TimeoutExpired:
             raise CompilerError(f"the compiler took longer than {TIMEOUT:g} s") from None
         if done.returncode != 0:
@@ -117,7 +114,8 @@ def _description(
         "name": name, "model": made.run.model.name, "duration": made.run.duration,
         "settle": made.case.settle, "step": schedule.step, "frame": schedule.frame,
         "recordFrames": schedule.record_frames, "stimulusFrames": schedule.stimulus_frames,
-        "stateLength": made.layout.total, "beginsAtRest": begins_anywhere,
+        "stateLength": made.layout.total, "unsettledAt": made.layout.start["counters"],
+        "beginsAtRest": begins_anywhere,
         "choices": {k: v for k, v in par.choices().items() if isinstance(v, (str, int))},
         "parameters": parameters,
         "stimulus": _stimuli(made),
@@ -129,12 +127,15 @@ def _stimuli(made: Exported) -> list[dict[str, Any]]:
     """Return what drives the bench, as steps: values that hold from their times on, no noise."""
     rows = sampled_stimulus(made.run, made.schedule)
     times = made.schedule.stimulus_times
-    told = []
+    ranges = ranges_of(made.run.model.Stimulus)
+    told: list[dict[str, Any]] = []
     for k, (name, signal) in enumerate(signals_of(made.run.model.Stimulus).items()):
         values = np.zeros(len(rows)) if name.startswith("noise_") else rows[:, k]
         changes = np.flatnonzero(np.diff(values, prepend=0.0))
         steps = [[float(times[at]), float(values[at])] for at in changes]
-        told.append({**_signal(name, signal), "steps": steps})
+        ends = zip(("low", "high"), ranges.get(name, ()), strict=False)
+        known = {end: value for end, value in ends if np.isfinite(value)}
+        told.append({**_signal(name, signal), **known, "steps": steps})
     return told
 
 

@@ -56,6 +56,7 @@ static void repeat(void) {
   memcpy(d, area + D_AT, sizeof(d));
   area[COUNTERS_AT] += located(0, STEP, 0, x, d, 0, o, &made);
   area[COUNTERS_AT + 1] += 1.0;
+  area[COUNTERS_AT + 2] += made.tries;
   memcpy(area + X_AT, o, FLOW * sizeof(double)); /* x, d and reactions stand in a row */
   for (int k = 0; k < FLOWS; ++k) area[Q_AT + k] += o[FLOW + k];
   keep(STEP);

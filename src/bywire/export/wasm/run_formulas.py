@@ -13,6 +13,7 @@ from bywire.simulation.emission import leaf_count, unread
 from bywire.simulation.emit_rare import rare_header, rare_results
 from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph
+from bywire.simulation.layout import COUNTERS
 from bywire.simulation.operation import Node, Operation
 from bywire.simulation.rare_text import PROJECTION
 from bywire.simulation.stages import STATE, Stages
@@ -35,8 +36,9 @@ def run_formulas(made: Exported) -> RunFormulas:
     results, exact = rare_results(stages.fast), rare_results(stages.exact)
     products = stages.quadrature.products
     blocks = {
-        **lengths, "m": len(stages.ticks[0]), "counters": 2, "p": made.program.sizes.parameters,
-        "h": 1, "u": leaf_count(stages, "u"), "w": stages.rows, "force": stages.rows, "failed": 1,
+        **lengths, "m": len(stages.ticks[0]), "counters": COUNTERS,
+        "p": made.program.sizes.parameters, "h": 1, "u": leaf_count(stages, "u"),
+        "w": stages.rows, "force": stages.rows, "failed": 1,
         "posed": len(stages.posed), "o": len(results), "out": len(stages.output),
         "s": len(products),
     }  # fmt: skip

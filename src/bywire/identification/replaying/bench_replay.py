@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.recording import energy_signals, open_books_of
-from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, unestimated
+from bywire.bench.recording import energy_doubts_of, energy_signals
+from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, abandoned, steps_of, unestimated
 from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
@@ -61,7 +61,7 @@ def replay(
     bench, data, inputs, outputs, case
         See ``bywire.identification.replaying.measured_run``.
     estimate_error
-        Whether the model runs in half and double steps too; see `bywire.bench.running.run`.
+        Whether the model runs in other steps too; see `bywire.bench.running.run`.
 
     Raises
     ------
@@ -77,17 +77,19 @@ def replay(
     modeled = simulate(measured.run, tuple(wanted))
     others: dict[float, Mapping[str, xr.Dataset]] = {}
     failures: dict[float, Exception] = {}
-    for factor in OTHER_STEPS if estimate_error else ():
+    for factor in steps_of([measured.run]) if estimate_error else ():
         try:
-            other = dataclasses.replace(measured.run, step=factor * measured.run.step)
+            step, most = factor * measured.run.step, MOST_WORK * modeled.work
+            other = dataclasses.replace(measured.run, step=step, most_work=most)
             others[factor] = _beside_all(measured, simulate(other, tuple(measured.compared)))
         except NO_ESTIMATE as error:
             failures[factor] = error
     return Replayed(
         _driving(measured), _beside_all(measured, modeled), measured.run,
         (*measured.notes, *missed_samples(measured.data, measured.compared),
-         *open_books_of(measured.run, modeled),
-         *([unestimated(failures)] if failures and not others else [])),
+         *energy_doubts_of(measured.run, modeled),
+         *filter(None, [unestimated(failures) if failures and not others else
+                        abandoned(failures)])),
         others,
     )  # fmt: skip
 

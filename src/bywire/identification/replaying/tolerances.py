@@ -113,10 +113,10 @@ def _verdicts(key: str, text: str, kpi: Kpi) -> list[Verdict]:
                 f"lower limit as well, such as '{key} >= ...', and both are taken with their sign"
             )
         met = {"<=": value <= bound, ">=": value >= bound, "<": value < bound, ">": value > bound}
-        is_decided = not (abs(value - bound) <= kpi.error or math.isinf(kpi.error))
+        is_decided = not (abs(value - bound) <= kpi.bound or math.isinf(kpi.bound))
         holds = is_decided and met[sign] and not math.isnan(value)
         verdicts.append(
-            Verdict(key, written, kpi.value, kpi.unit, holds, kpi.note, kpi.error, is_decided)
+            Verdict(key, written, kpi.value, kpi.unit, holds, kpi.note, kpi.bound, is_decided)
         )
     return verdicts
 

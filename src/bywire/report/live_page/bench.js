@@ -8,11 +8,33 @@ const parameters = description.parameters.filter(({ used }) => used);
 const values = Object.fromEntries(parameters.map(({ name, start }) => [name, start]));
 const kept = [];
 const place = (id) => document.getElementById(id);
+const faults = new Map(); // what is wrong now, by where: a field, the link, the run
 let run = null, busy = false, wanted = null, resting = 0, slow = 0, moved = 0;
 
-function complain(text) {
-  place("message").textContent = text;
-  place("message").hidden = !text;
+/** Say what is wrong, or that nothing is any more, somewhere; the latest fault is shown. */
+function complain(text, where = "") {
+  faults.delete(where);
+  if (text) faults.set(where, text);
+  const latest = [...faults.values()].at(-1) ?? "";
+  place("message").textContent = latest;
+  place("message").hidden = !latest;
+  outdate();
+}
+
+/** Mark results that are not those of what stands in the fields. */
+function outdate(isLate = false) {
+  const isInvalid = [...faults.keys()].some((where) => where.startsWith("field "));
+  place("shown").classList.toggle("stale", isInvalid || isLate);
+  place("stale").hidden = !(isInvalid && run);
+}
+
+/** Take away the results where there are none of these values. */
+function fail(error) {
+  run = null;
+  place("shown").hidden = true;
+  place("keep").disabled = place("csv").disabled = true;
+  place("work").textContent = "no results with these values";
+  complain(error, "run");
 }
 
 const changes = () =>
@@ -48,14 +70,16 @@ function judge() {
   place("stated").hidden = !isStated;
   place("figures").tBodies[0].replaceChildren(...judged.figures.map((figure) => {
     const computed = followed.length && following.includes(figure.name)
-      ? { value: NaN, reason: `an option follows ${followed}: save the bench file and run it` }
+      ? { value: NaN, reason: `an option follows ${followed}: save the bench file and run it`, open: true }
       : run.figures[figure.name];
     const unit = figure.unit && ` ${figure.unit}`;
     const value = computed.reason ? element("td", { class: "number", title: computed.reason }, "–")
       : element("td", { class: "number" }, digits(shownOf(computed.value, figure)) + unit);
     const met = figure.limit && isMet(computed, figure.limit);
+    const outcome = computed.open ? "undecided" : met ? "met" : "missed";
+    const mark = { undecided: "?", met: "✓", missed: "✗" }[outcome];
     const verdict = figure.limit
-      ? element("td", { class: met ? "met" : "missed" }, `${met ? "✓" : "✗"} ${figure.text}`)
+      ? element("td", { class: outcome, title: computed.reason }, `${mark} ${figure.text}`)
       : element("td", {}, computed.reason);
     const { text, where } = figure.stated ?? { text: "", where: "" };
     const stated = isStated ? [element("td", {}, text, element("span", { class: "meaning" }, ` ${where}`))] : [];
@@ -69,19 +93,27 @@ function ask() {
   clearTimeout(resting);
   if (busy) return;
   busy = true;
-  slow = setTimeout(() => (place("work").textContent = "running …"), REST);
+  slow = setTimeout(() => {
+    place("work").textContent = "running …";
+    outdate(true);
+  }, REST);
+  place("loops").classList.add("stale"); // they follow when the sliders rest
   worker.postMessage({ values: wanted });
   wanted = null;
 }
 
 function answered({ data: { error, time, table, figures, settled, loops: computed } }) {
-  if (computed) return views.forEach((view, k) => view.draw(computed[k]));
+  if (computed) {
+    if (!busy) place("loops").classList.remove("stale");
+    return views.forEach((view, k) => view.draw(computed[k]));
+  }
   busy = false;
   clearTimeout(slow);
   if (error) {
-    complain(error);
-    place("work").textContent = "not run";
+    fail(error);
   } else {
+    complain("", "run");
+    place("shown").hidden = false;
     run = { time, signals: columnsOf(table, time, description.signals.map(({ name }) => name)), figures };
     place("work").textContent = settled ? "" : "contacts or frictions did not settle in some step";
     place("keep").disabled = place("csv").disabled = false;
@@ -94,6 +126,8 @@ function answered({ data: { error, time, table, figures, settled, loops: compute
 
 function changed(name, value) {
   values[name] = value;
+  complain("", "link");
+  complain("");
   ask(); // before its description: the worker computes meanwhile
   describe();
 }
@@ -124,6 +158,7 @@ place("keep").addEventListener("click", () => {
 });
 place("reset").addEventListener("click", () => {
   for (const { name, start } of parameters) if (values[name] !== start) rows.get(name).show((values[name] = start));
+  faults.clear();
   complain("");
   describe();
   ask();
@@ -142,9 +177,9 @@ function take(link) {
   try {
     const asked = changesOf(link, digest, parameters);
     for (const { name, start } of parameters) rows.get(name).show((values[name] = asked[name] ?? start));
-    complain("");
+    complain("", "link");
   } catch (error) {
-    complain(error.message);
+    complain(error.message, "link");
   }
   describe();
 }
@@ -156,7 +191,7 @@ addEventListener("drop", (event) => {
   complain("the page takes no files: its values are set above, or by its link; bywire run takes bench files");
 });
 
-const rows = parameterPanel(place("parameters"), parameters, chosen, changed, complain);
+const rows = parameterPanel(place("parameters"), parameters, bench.units, chosen, changed, complain);
 const plots = curves(place("curves"), panels);
 const views = loops.map((loop) => bodeView(place("loops"), loop));
 const again = () => {
@@ -175,7 +210,7 @@ if (typeof WebAssembly === "undefined" || typeof Worker === "undefined") {
   const text = `${read("loader")}\n${read("worker")}`;
   worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
   worker.addEventListener("message", answered);
-  worker.addEventListener("error", (event) => complain(`the bench does not run: ${event.message}`));
+  worker.addEventListener("error", (event) => fail(`the bench does not run: ${event.message}`));
   worker.postMessage({ kernel: read("kernel"), given: { description, judged, loops, keep: bench.keep } });
   take(location.hash.slice(1));
   ask();

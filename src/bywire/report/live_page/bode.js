@@ -2,7 +2,7 @@
 
 const LEAST = { decibel: -80, phase: -450 }; // below, nothing is decided
 const MARGINS = [ // name, title, unit, factor
-  ["gain", "gain margin", "", 1], ["phase", "phase margin", "deg", 1], ["crossover", "crossover", "Hz", 1],
+  ["gain", "gain margin", "", 1], ["lower_gain", "lower gain margin", "", 1], ["phase", "phase margin", "deg", 1], ["crossover", "crossover", "Hz", 1],
   ["delay", "delay margin", "ms", 1e3], ["disk", "disk margin", "", 1],
   ["sensitivity", "max |S|", "", 1], ["complementary", "max |T|", "", 1],
 ];
@@ -10,6 +10,7 @@ const MARGINS = [ // name, title, unit, factor
 /** Return the margins in words, or why there are none. */
 function marginText({ reason, margins }) {
   if (reason) return reason;
+  if (margins.hasLoop === false) return "no loop with these values: the loop gain is 0 at all frequencies";
   if (!margins.isStable) return "the loop is unstable with these values";
   return MARGINS.filter(([name]) => !Number.isNaN(margins[name])).map(([name, title, unit, factor]) =>
     `${title} ${margins[name] === Infinity ? "∞" : digits(margins[name] * factor)} ${unit}`.trim()).join(", ");
@@ -17,7 +18,7 @@ function marginText({ reason, margins }) {
 
 /** Draw a margin as a bar from one level to another at a frequency. */
 const markOf = (result, at, from, to) => clipped((ctx, _, plot) => {
-  const { margins } = result(), f = margins?.isStable ? at(margins) : NaN;
+  const { margins } = result(), f = margins?.hasLoop ? at(margins) : NaN;
   if (!Number.isFinite(f) || !Number.isFinite(to(margins))) return;
   const x = plot.valToPos(f, "x", true);
   ctx.strokeStyle = palette().limit;

@@ -9,8 +9,10 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import math
 import zlib
 from collections.abc import Mapping, Sequence
+from functools import cache
 from html import escape
 from importlib.resources import files
 from string import Template
@@ -18,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bywire.bench.bench import Bench
 from bywire.bench.bench_text import bench_text
 from bywire.bench.kpis.cases import FamilyJudge
 from bywire.bench.kpis.in_c import entry_of, source_of
@@ -26,11 +29,13 @@ from bywire.bench.requirements import limit_of
 from bywire.bench.result import Result
 from bywire.bench.stated import StatedLevel, StatedRange, stated_figures, stated_for
 from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.errors import InputError
 from bywire.core.quantities import display_unit
-from bywire.core.units import convert
+from bywire.core.units import convert, parse
 from bywire.core.version import __version__
 from bywire.export.exported import Exported
 from bywire.export.wasm.module import module_files
+from bywire.report.changes import bench_changes
 from bywire.report.inline_script import bare
 from bywire.report.live_page.dependence import dependence
 from bywire.report.live_page.loops import loops_of, told
@@ -39,6 +44,7 @@ from bywire.report.panels import Panel, Trace
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.policy import admitted
 from bywire.report.stated_levels import stated_figure
+from bywire.report.terminal import change_texts
 from bywire.report.wording import unit_text
 from bywire.simulation.c_runtime import SCALAR
 
@@ -48,6 +54,38 @@ if TYPE_CHECKING:
 _SCRIPTS = ("values.js", "controls.js", "curves.js", "bode.js", "bench.js")
 _WORKER = ("unpack.js", "figures.js", "loops.js", "margins.js", "worker.js")
 _NAME = "run"  # of the module, inside the page
+# SI unit, exponents of kg, m, s, A, K, rad, and what people write for it.
+_UNITS = (
+    ("1", (0, 0, 0, 0, 0, 0), "%"),
+    ("m", (0, 1, 0, 0, 0, 0), "m km dm cm mm um µm nm inch"),
+    ("s", (0, 0, 1, 0, 0, 0), "s ms us µs min h"),
+    ("A", (0, 0, 0, 1, 0, 0), "A kA mA uA µA"),
+    ("V", (1, 2, -3, -1, 0, 0), "V kV mV uV µV"),
+    ("ohm", (1, 2, -3, -2, 0, 0), "ohm Ohm Ω mohm mΩ uohm µΩ kohm kΩ Mohm MΩ"),
+    ("W", (1, 2, -3, 0, 0, 0), "W kW mW MW"),
+    ("J", (1, 2, -2, 0, 0, 0), "J kJ mJ MJ"),
+    ("N", (1, 1, -2, 0, 0, 0), "N kN mN MN"),
+    ("N*m", (1, 2, -2, 0, 0, 0), "Nm kNm mNm"),
+    ("Pa", (1, -1, -2, 0, 0, 0), "Pa hPa kPa MPa GPa bar mbar psi"),
+    ("kg", (1, 0, 0, 0, 0, 0), "kg g mg"),
+    ("delta_degC", (0, 0, 0, 0, 1, 0), "K mK"),
+    ("Hz", (0, 0, -1, 0, 0, 0), "Hz kHz MHz mHz"),
+    ("rad", (0, 0, 0, 0, 0, 1), "rad mrad deg ° rev"),
+    ("rad/s", (0, 0, -1, 0, 0, 1), "rpm"),
+    ("m**3", (0, 3, 0, 0, 0, 0), "l L ml mL"),
+    ("H", (1, 2, -2, -2, 0, 0), "H mH uH µH"),
+    ("V*s", (1, 2, -2, -1, 0, 0), "Wb"),
+    ("A*s", (0, 0, 1, 1, 0, 0), "C"),
+)
+"""units of which a field takes products; `bywire.core.units` says which of them it reads"""
+_SIZES = {"deg": math.pi / 180, "°": math.pi / 180, "rev": 2 * math.pi, "rpm": math.pi / 30,
+          "psi": 6894.757293168361}  # fmt: skip
+"""sizes to the last digit, of which a quantity that is read has 15"""
+_SHIFTED = {
+    **dict.fromkeys(("degC", "°C"), (1.0, 273.15)),
+    **dict.fromkeys(("degF", "°F"), (5 / 9, 459.67 * 5 / 9)),
+}
+"""temperatures in K: size and zero"""
 
 
 def page_text(
@@ -97,6 +135,7 @@ def page_text(
     return Template(_text("page.html")).substitute(
         kernel=_block("kernel", _packed(module[f"{_NAME}.wasm"])),
         policy=policy, title=escape(name), summary=escape(_summary(made)),
+        changes=_changes(made.bench),
         style=style, library=library, script=script, footer=escape(_footer(made)),
         data="\n".join(_block(key, value) for key, value in blocks.items()),
     )  # fmt: skip
@@ -119,6 +158,7 @@ def _data(
         used.add(each["name"])
         each |= {**_shown(each["unit"]), "kind": "", "where": ""}
         each["shownUnit"] = unit_text(display_unit(each["unit"]))
+        each |= _read_as(each["unit"])
         if row := origins.get(each["name"]):
             each |= {"kind": row.kind, "where": row.where}
     chosen = chosen or first_sliders(bench, [name for name in read if name in used])
@@ -130,6 +170,7 @@ def _data(
         "text": bench_text(bench),
         "judged": _judged(made, result, sorted(follow.judging & used)),
         "held": sorted(follow.driving),
+        "units": _known_units(),
     }
 
 
@@ -155,7 +196,7 @@ def _family(name: str, setting: Any) -> dict[str, Any]:
         "name": name, "entry": entry_of(name), "figures": list(family.measures),
         "signals": [getattr(setting, field) for field in how.signals],
         "setting": np.nan_to_num(how.packed(setting, 1)).tolist(), "room": how.room,
-        "reasons": ["", *how.reasons], "failures": ["", *how.failures],
+        "reasons": ["", *how.reasons], "open": list(how.open), "failures": ["", *how.failures],
     }  # fmt: skip
 
 
@@ -226,9 +267,51 @@ def _shown(symbol: str) -> Mapping[str, float]:
     return {"factor": float(convert(1.0, symbol, unit)) - offset, "offset": offset}
 
 
+@cache
+def _known_units() -> list[tuple[str, float, tuple[int, ...]]]:
+    """Return the units that a field takes, of which it takes products: name, size, exponents."""
+    return [
+        (name, _SIZES.get(name, size), powers)
+        for symbol, powers, names in _UNITS
+        for name in names.split()
+        for size in [_value(f"1 {name}", symbol)]
+        if size is not None
+    ]
+
+
+@cache
+def _read_as(symbol: str) -> dict[str, Any]:
+    """Return how a field of an SI unit reads others: temperatures, and whether radians matter."""
+    shifted = {
+        unit: scale for unit, scale in _SHIFTED.items()
+        if symbol == "K" and _value(f"0 {unit}", symbol) is not None
+    }  # fmt: skip
+    known = "" if symbol == "1" else f"{symbol.replace('delta_degC', 'K')}*"
+    is_turning = _value(f"1 {known}rad", symbol) is None
+    return ({"shifted": shifted} if shifted else {}) | ({"turns": True} if is_turning else {})
+
+
+def _value(text: str, symbol: str) -> float | None:
+    """Return a quantity in SI; None where it is none of this unit."""
+    try:
+        return parse(text, symbol, "a unit")
+    except InputError:
+        return None
+
+
 def _summary(made: Exported) -> str:
     label = f", run {made.case.label}" if len(made.bench.cases()) > 1 else ""
     return f"{made.bench.summary()}{label}; parameters {made.bench.parameters}"
+
+
+def _changes(bench: Bench) -> str:
+    """Return the paragraphs on what the bench itself changes."""
+    texts = change_texts(bench_changes(bench))
+    return "".join(f'<p class="summary">{escape(_capital(text))}.</p>\n' for text in texts)
+
+
+def _capital(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 def _footer(made: Exported) -> str:

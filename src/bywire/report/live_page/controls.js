@@ -8,12 +8,12 @@ function element(tag, attributes = {}, ...inside) {
   return made;
 }
 
-/** Make the row of a parameter; `changed(name, value)` is told of every move. */
-function parameterRow(parameter, changed, complain) {
+/** Make the row of a parameter; `changed(name, value)` is told of every move, `complain` of every fault of the field. */
+function parameterRow(parameter, known, changed, complain) {
   const { name, shownUnit: unit, meaning, range, kind, where } = parameter;
   const slider = sliderOf(parameter), id = `p-${name}`;
-  const field = element("input", { type: "text", inputmode: "decimal", id, autocomplete: "off",
-    "aria-label": `${name}${unit && ` in ${unit}`}`, title: `admissible: ${range}` });
+  const field = element("input", { type: "text", id, autocomplete: "off",
+    "aria-label": `${name}${unit && ` in ${unit}`}`, title: `admissible: ${range}; a number, or one with its unit` });
   const back = element("button", { type: "button", title: "as in the bench",
     "aria-label": `${name} as in the bench` }, "↺");
   const way = slider && element("input", { type: "range", min: 0, max: 1000, step: 1,
@@ -32,18 +32,19 @@ function parameterRow(parameter, changed, complain) {
     row.classList.toggle("changed", value !== start);
     back.disabled = value === start;
     field.removeAttribute("aria-invalid");
+    complain("", `field ${name}`);
   };
-  const take = (value) => {
-    const wrong = objection(parameter, value);
-    complain(wrong);
-    if (wrong) return field.setAttribute("aria-invalid", "true");
+  const take = (value, text = "") => {
+    const wrong = objection(parameter, value, text);
+    if (wrong) {
+      field.setAttribute("aria-invalid", "true");
+      back.disabled = false;
+      return complain(wrong, `field ${name}`);
+    }
     show(value);
     changed(name, value);
   };
-  field.addEventListener("change", () => {
-    const text = field.value.trim().replace(",", ".");
-    take(text === "" ? NaN : siOf(Number(text), parameter));
-  });
+  field.addEventListener("change", () => take(quantityOf(field.value, parameter, known), field.value.trim()));
   way?.addEventListener("input", () => take(valueAt(slider, way.value / 1000)));
   back.addEventListener("click", () => take(parameter.start));
   show(parameter.start);
@@ -51,11 +52,11 @@ function parameterRow(parameter, changed, complain) {
 }
 
 /** Fill the panel of parameters: those chosen open above, the others by element below. */
-function parameterPanel(place, parameters, chosen, changed, complain) {
+function parameterPanel(place, parameters, known, chosen, changed, complain) {
   const rows = new Map(), groups = new Map();
   const above = element("div", { class: "chosen" });
   for (const parameter of parameters) {
-    const made = parameterRow(parameter, changed, complain);
+    const made = parameterRow(parameter, known, changed, complain);
     rows.set(parameter.name, made);
     if (chosen.includes(parameter.name)) continue;
     const group = parameter.name.includes(".") ? parameter.name.split(".")[0] : "more";

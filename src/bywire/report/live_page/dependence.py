@@ -26,8 +26,8 @@ class Dependence:
     ----------
     driving
         Parameters that change what drives the run, how long it takes, when rows are recorded, or
-        in a way that the page does not know the state in which it begins; and those that the
-        experiment sets itself.
+        in a way that the page does not know the state in which it begins; those that the
+        experiment sets itself; and nodes of tables, which only together make a table.
     judging
         Parameters that change options by which key figures look at it.
     """
@@ -44,6 +44,9 @@ def dependence(bench: Bench, number: int, names: Collection[str]) -> Dependence:
     case, values = _case(bench, number), bench.par.leaves()
     driving, judging = set(), set()
     for name in names:
+        if name not in values:  # a node, as exports call it: p_table[1]
+            driving.add(name)
+            continue
         moved, other = _moved(bench, number, name, values[name])
         is_taken = other is not None and other.par.value(name) == moved.par.value(name)
         if other is None or not (is_taken and _is_driven_alike(bench, case, other)):

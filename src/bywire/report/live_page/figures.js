@@ -30,7 +30,8 @@ function familyOf({ memory, room, ...functions }, { time, table }, names, family
   const why = new Int32Array(memory.buffer, reasons, figures);
   return family.figures.map((name, k) => {
     const reason = failed ? family.failures[failed] : family.reasons[why[k]];
-    return [name, { value: reason ? NaN : given[k], reason: reason ?? "" }];
+    const open = !failed && family.open.includes(why[k]);
+    return [name, { value: reason ? NaN : given[k], reason: reason ?? "", open }];
   });
 }
 

@@ -11,7 +11,7 @@ const plus = (X, Y) => X.map((row, i) => row.map((value, j) => value + Y[i][j]))
 const beside = (X, Y) => X.map((row, i) => Float64Array.of(...row, ...Y[i]));
 
 function times(X, Y) {
-  const product = zeros(X.length, Y[0].length);
+  const product = zeros(X.length, Y.length ? Y[0].length : 0);
   X.forEach((row, i) => row.forEach((value, k) => {
     if (value !== 0) for (let j = 0; j < Y[k].length; ++j) product[i][j] += value * Y[k][j];
   }));
@@ -43,7 +43,7 @@ const scaled = (X, scale) => X.map((row, i) => row.map((value, j) => value * sca
 /** Return the exponential: halved until it is small, by its series, and squared again. */
 function exponential(X) {
   const scale = scales(X), balanced = scaled(X, scale);
-  const size = Math.max(...balanced.map((row) => row.reduce((sum, value) => sum + Math.abs(value), 0)));
+  const size = Math.max(0, ...balanced.map((row) => row.reduce((sum, value) => sum + Math.abs(value), 0)));
   const halvings = Math.max(0, Math.ceil(Math.log2(size)) + 2);
   const small = balanced.map((row) => row.map((value) => value * 2 ** -halvings));
   let sum = eye(X.length);
@@ -53,18 +53,45 @@ function exponential(X) {
   return scaled(sum, scale.map((value) => 1 / value));
 }
 
-/** Return the Jacobians of a loop at parameters that lie in the module; null where it has no point. */
-function jacobiansOf({ memory, room, parameters, ...functions }, { entry, size, contacts, states, held, every }) {
+/** Return the Jacobians of a loop at parameters that lie in the module, or beside its point (side 1, -1); null where it has no point. */
+function jacobiansOf({ memory, room, parameters, ...functions }, { entry, size, contacts, states, held, every }, side = 0) {
   const begin = (room() + 15) & ~15, missing = begin + 8 * size - memory.buffer.byteLength;
   if (missing > 0) memory.grow(Math.ceil(missing / 65536));
   const numbers = new Float64Array(memory.buffer, begin, size).fill(0);
-  functions[entry](parameters(), begin);
+  functions[entry](parameters(), side, begin);
   if (!numbers.every(Number.isFinite) || numbers.subarray(0, contacts).some((slack) => slack < TOUCH)) return null;
   let at = contacts;
   const next = (rows, columns) =>
     Array.from({ length: rows }, () => numbers.slice(at, (at += columns)));
   const A = next(states, states), B = next(states, held);
-  return { A, B, ticks: every.map(() => ({ X: next(held, states), M: next(held, held) })) };
+  return { A, B, numbers: numbers.slice(contacts), ticks: every.map(() => ({ X: next(held, states), M: next(held, held) })) };
+}
+
+const EQUAL = 1e-5, SAME = 1e-6, FREQUENCIES = 40; // models, numbers that count as one; where models are compared
+
+/** Return a loop's gain where sides of corners agree; null without a point, "corner" where they do not. */
+function modelOf(exported, loop) {
+  const found = [0, 1, -1].map((side) => jacobiansOf(exported, loop, side));
+  if (found.includes(null)) return null;
+  const [here, above, below] = found;
+  const differ = (one, other) => one.numbers.some((value, k) =>
+    Math.abs(value - other.numbers[k]) > SAME * Math.max(Math.abs(value), Math.abs(other.numbers[k])));
+  const model = gainOf(here, loop);
+  if (!model || !(differ(here, above) || differ(above, below))) return model;
+  const [one, other] = [gainOf(above, loop), gainOf(below, loop)];
+  if (unlike(one, other)) return "corner";
+  return unlike(one, model) ? one : model;
+}
+
+/** Return whether two loop gains differ at any frequency. */
+function unlike(one, other) {
+  const highest = NYQUIST * 0.5 / one.period;
+  for (let k = 0; k < FREQUENCIES; ++k) {
+    const f = LOWEST * (highest / LOWEST) ** (k / (FREQUENCIES - 1));
+    const [a, b] = responseAt(one, f), [c, d] = responseAt(other, f);
+    if (!(Math.hypot(a - c, b - d) <= EQUAL * Math.max(Math.hypot(a, b), Math.hypot(c, d)) + 1e-12)) return true;
+  }
+  return false;
 }
 
 /** Return what tasks at the same instant make of memory X x + M m + U u, in a row. */
@@ -82,6 +109,7 @@ function cutOpen({ A, ticks }, { cut, held, every }) {
   const writes = ({ X, M }) => X[column].some((value) => value !== 0)
     || M[column].some((value, k) => value !== (k === column ? 1 : 0));
   const owners = ticks.flatMap((tick, k) => ((cut.isState ? reads : writes)(tick) ? [k] : []));
+  if (!owners.length) return { isNothing: true };
   if (owners.length !== 1 || every[owners[0]] !== every.reduce(leastCommon)) return null;
   ticks.forEach((tick, k) => {
     if (k !== owners[0]) return (now = after(now, tick));
@@ -116,6 +144,7 @@ function gainOf(found, loop) {
   if (loop.isAnalog) return analogGain(found, loop);
   const opened = cutOpen(found, loop);
   if (!opened) return null;
+  if (opened.isNothing) return effective([], [], [], loop.every.reduce(leastCommon) * loop.frame);
   const { states: n, held: m, every, frame } = loop, common = every.reduce(leastCommon);
   const W = zeros(n + m, n + m);
   found.A.forEach((row, i) => { W[i].set(row.map((value) => value * frame)); });
@@ -196,11 +225,12 @@ function responseAt({ A, B, C, period, isAnalog }, frequency) {
 
 /** Return the closed loop's growth in a sample, or as long: the root of a high power's size. */
 function growthOf({ A, B, C, period, isAnalog }) {
+  if (!A.length) return 0; // nothing is fed back
   const closed = A.map((row, i) => Float64Array.from(row, (value, j) => value - B[i] * C[j]));
   let X = isAnalog ? exponential(closed.map((row) => row.map((value) => value * period))) : closed;
   let total = 0, power = 1;
   for (let k = 0; k < 40; ++k) {
-    const size = Math.max(...X.map((row) => row.reduce((sum, value) => sum + Math.abs(value), 0)));
+    const size = Math.max(0, ...X.map((row) => row.reduce((sum, value) => sum + Math.abs(value), 0)));
     if (size === 0) return 0;
     total += Math.log(size) / power;
     X = X.map((row) => row.map((value) => value / size));

@@ -1,5 +1,7 @@
 /* Margins of a loop gain L, negative feedback not counted; definitions as in bywire.margins. */
 
+const NO_LOOP = 1e-9, LEAST_FACTOR = 1e-9; // loop gains that are none; factors at a pole on the border
+const SLOWEST = 1e-6, SLOW_POINTS = 40; // below the diagram, where the loop gain is real, Hz
 const DEGREE = 180 / Math.PI;
 const wrapped = (angle) => angle - 360 * Math.floor((angle + 180) / 360);
 
@@ -38,32 +40,47 @@ function crossingsOf(model, { frequency, size, margin }) {
   return found;
 }
 
-/** Return the factor by which the gain may grow, and where that is read [Hz]. */
-function gainMargin({ frequency, L }, model) {
-  const real = [];
-  for (let k = 0; k + 1 < L.length; ++k) {
-    const [[a, b], [c, d]] = [L[k], L[k + 1]];
-    if (b < 0 === d < 0 || a >= 0) continue;
-    const share = b / (b - d);
-    real.push({ size: Math.abs(a + share * (c - a)), at: frequency[k] * (frequency[k + 1] / frequency[k]) ** share });
+/** Return the factors by which the gain may grow, and to which it may fall, and where they are read [Hz]. */
+function gainMargins({ frequency, L }, model) {
+  const slow = Array.from({ length: SLOW_POINTS }, (_, k) => SLOWEST * (LOWEST / SLOWEST) ** (k / SLOW_POINTS));
+  const f = [...slow, ...frequency], values = [...slow.map((at) => responseAt(model, at)), ...L], found = [];
+  const take = (real, at) => { if (Number.isFinite(real) && real < 0) found.push({ factor: -1 / real, at }); };
+  const solved = (low, high) => {
+    const isBelow = responseAt(model, low)[1] < 0;
+    for (let round = 0; round < 60 && low < high; ++round) {
+      const middle = 0.5 * (low + high);
+      if (responseAt(model, middle)[1] < 0 === isBelow) low = middle;
+      else high = middle;
+    }
+    return 0.5 * (low + high);
+  };
+  take(responseAt(model, 0)[0], 0);
+  for (let k = 0; k + 1 < f.length; ++k) {
+    const [[a, b], [c, d]] = [values[k], values[k + 1]];
+    if (b < 0 === d < 0 || a + b / (b - d) * (c - a) >= 0) continue;
+    const at = solved(f[k], f[k + 1]);
+    take(responseAt(model, at)[0], at);
   }
   const last = 0.5 / model.period; // where a sampled one is real
-  if (!model.isAnalog) real.push({ size: Math.max(-responseAt(model, last)[0], 0), at: last });
-  const able = real.filter(({ size }) => size > 0 && size < 1);
-  return able.reduce((least, { size, at }) => (1 / size < least.gain ? { gain: 1 / size, gainAt: at } : least),
-    { gain: Infinity, gainAt: NaN });
+  if (!model.isAnalog) take(responseAt(model, last)[0], last);
+  const upper = found.filter(({ factor }) => factor > 1).sort((a, b) => a.factor - b.factor)[0];
+  const lower = found.filter(({ factor }) => factor > LEAST_FACTOR && factor < 1).sort((a, b) => b.factor - a.factor)[0];
+  return { gain: upper?.factor ?? Infinity, gainAt: upper?.at ?? NaN,
+    lower_gain: lower?.factor ?? 0, lowerGainAt: lower?.at ?? NaN };
 }
 
 /** Return all margins; only `isStable` where the loop is not. */
 function marginsOf(model, bode) {
-  if (growthOf(model) >= 1 + ON_BORDER) return { isStable: false };
+  const isStable = growthOf(model) < 1 + ON_BORDER;
+  if (!bode.size.some((size) => size > NO_LOOP)) return { isStable, hasLoop: false };
+  if (!isStable) return { isStable };
   const crossings = crossingsOf(model, bode), falls = crossings.filter((each) => each.falls);
   const nearest = falls.length
     ? crossings.reduce((best, each) => (each.distance < best.distance ? each : best)) : { margin: NaN, at: NaN };
   const delays = crossings.map(({ margin, at }) => (margin - 360 * Math.floor(margin / 360)) / 360 / at);
   const most = (value) => bode.L.reduce((largest, [re, im]) => Math.max(largest, value(re, im)), 0);
   return {
-    isStable: true, ...gainMargin(bode, model), phase: nearest.margin, phaseAt: nearest.at,
+    isStable: true, hasLoop: true, ...gainMargins(bode, model), phase: nearest.margin, phaseAt: nearest.at,
     crossover: falls.at(-1)?.at ?? NaN, delay: delays.length ? Math.min(...delays) : NaN,
     disk: 2 / most((re, im) => Math.hypot(1 - re, im) / Math.hypot(1 + re, im)),
     sensitivity: most((re, im) => 1 / Math.hypot(1 + re, im)),
@@ -73,7 +90,9 @@ function marginsOf(model, bode) {
 
 /** Return Bode diagram and margins of a loop at the module's parameters, or why there are none. */
 function loopAt(exported, loop) {
-  const jacobians = jacobiansOf(exported, loop), model = jacobians && gainOf(jacobians, loop);
+  const model = modelOf(exported, loop);
+  if (model === "corner") return { reason: "the operating point lies on a corner of the model, whose sides have different loop gains: " +
+    `bywire margins ${loop.name} names the operation` };
   if (!model) return { reason: "no operating point with these values: a contact opens or closes there" };
   const bode = bodeOf(model);
   return { frequency: bode.frequency, decibel: bode.size.map((size) => 20 * Math.log10(size)),

@@ -24,12 +24,80 @@ const valueAt = ({ from, to, byFactors }, share) =>
 const shareOf = ({ from, to, byFactors }, value) => Math.min(1, Math.max(0,
   byFactors ? Math.log(value / from) / Math.log(to / from) : (value - from) / (to - from)));
 
-/** Return why a value is not admissible, or nothing. */
-function objection({ name, unit, low, high, range }, value) {
+/** Return why a value cannot be taken, or nothing; `text`: what was typed where it is no number of the unit. */
+function objection({ name, unit, shownUnit, low, high, range }, value, text = "") {
   const isWithin = typeof value === "number" && Number.isFinite(value)
     && value >= (low ?? -Infinity) && value <= (high ?? Infinity);
   if (isWithin) return "";
-  return `${name} = ${value}${unit === "1" ? "" : ` ${unit}`} is not admissible: it must be ${range}`;
+  if (Number.isFinite(value)) return `${name} must be ${range}, not ${value}${unit === "1" ? "" : ` ${unit}`}`;
+  const typed = text.length > 40 ? `"${text.slice(0, 40)} …"` : text ? `"${text}"` : "empty";
+  return `${name} must be ${range}, not ${typed}: type a number${shownUnit ? ` in ${shownUnit}, or one with its unit` : ""}`;
+}
+
+const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+const TOKEN = /\s*(?:([A-Za-zµμΩ%°]+(?:_[A-Za-z]+)?)(?:(?:\*\*|\^)?(-?\d)(?![\d.])|(⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]))?|([*·/()])|1(?=\s*\/))/y;
+
+/** Return factor and exponents of base units of a unit, a product or quotient of those known; null of any other text. */
+function unitOf(text, known) {
+  let at = 0;
+  const one = known[0][2].map(() => 0);
+  if (text === "1") return { factor: 1, powers: one };
+  const next = () => {
+    TOKEN.lastIndex = at;
+    const found = TOKEN.exec(text);
+    if (!found) return null;
+    at = TOKEN.lastIndex;
+    return found;
+  };
+  const raised = ({ factor, powers }, n) => ({ factor: factor ** n, powers: powers.map((p) => n * p) });
+  const product = () => {
+    let whole = { factor: 1, powers: one }, by = 1, isOpen = true;
+    for (let start = at, found = next(); found; start = at, found = next()) {
+      const [, name, plain, high, sign] = found;
+      if (sign === ")") return isOpen ? null : ((at = start), whole);
+      if (sign === "/" || sign === "*" || sign === "·") {
+        if (isOpen && !(sign === "/" && at === found[0].length)) return null;
+        by = sign === "/" ? -1 : 1;
+        isOpen = true;
+        continue;
+      }
+      if (!name && !sign) { isOpen = false; continue; } // the 1 of 1/s
+      let part = null;
+      if (sign === "(") {
+        part = product();
+        if (!part || next()?.[4] !== ")") return null;
+      } else {
+        const row = known.find(([each]) => each === name);
+        const n = plain ? Number(plain) : high ? Number([...high].map((c) => (c === "⁻" ? "-" : RAISED.indexOf(c))).join("")) : 1;
+        if (row) part = raised({ factor: row[1], powers: row[2] }, n);
+      }
+      if (!part) return null;
+      const { factor, powers } = raised(part, by);
+      whole = { factor: whole.factor * factor, powers: whole.powers.map((p, k) => p + powers[k]) };
+      by = 1;
+      isOpen = false;
+    }
+    return isOpen ? null : whole;
+  };
+  const whole = product();
+  return whole && text.slice(at).trim() === "" ? whole : null;
+}
+
+const NUMBER = /^\s*([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*$/s;
+
+/** Return a text as a value [SI]: a number in the unit shown, or one with a unit; NaN of any other text. */
+function quantityOf(text, parameter, known) {
+  const found = text.length <= 100 ? NUMBER.exec(text) : null;
+  if (!found) return NaN;
+  const number = Number(found[1].replace(",", ".")), rounded = (value) => Number(value.toPrecision(15));
+  if (!found[2]) return rounded(siOf(number, parameter));
+  const shift = parameter.shifted?.[found[2]]; // a temperature with a zero of its own
+  if (shift) return rounded(number * shift[0] + shift[1]);
+  const [unit, wanted] = [unitOf(found[2], known), unitOf(parameter.unit.replaceAll("delta_degC", "K"), known)];
+  const last = parameter.turns ? 0 : 1; // whether a radian is more than a pure number here
+  const isAlike = unit && wanted && unit.powers.slice(0, unit.powers.length - last)
+    .every((power, k) => power === wanted.powers[k]);
+  return isAlike ? rounded(number * (unit.factor / wanted.factor)) : NaN;
 }
 
 /** Return the state of the page as the part of its address behind the #. */
@@ -49,7 +117,7 @@ function changesOf(link, digest, parameters) {
     const parameter = parameters.find((each) => each.name === name);
     if (!parameter) throw new RangeError(`the link sets '${name.slice(0, 60)}', which is no parameter here`);
     const value = text.trim() === "" ? NaN : Number(text);
-    const wrong = objection(parameter, value);
+    const wrong = objection(parameter, value, text.trim());
     if (wrong) throw new RangeError(`the link is refused: ${wrong}`);
     changes[name] = value;
   }

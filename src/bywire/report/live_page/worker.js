@@ -1,4 +1,13 @@
 /* Runs and judges the bench beside the page, which stays alive meanwhile; the scripts that it calls stand above. */
+const LOST = "the bench cannot be computed with these values: the run does not stay among finite numbers";
+/** Return a loop's response and margins, or why there are none. */
+function loopOf(exported, loop) {
+  try {
+    return loopAt(exported, loop);
+  } catch {
+    return { reason: "this loop cannot be computed with these values" };
+  }
+}
 let loaded; // promised with the first message: the next ones may come before it is there
 let bench;
 self.onmessage = async ({ data: { kernel, given, values, isAboutLoops } }) => {
@@ -7,15 +16,16 @@ self.onmessage = async ({ data: { kernel, given, values, isAboutLoops } }) => {
     loaded ??= unpacked(kernel).then((bytes) => load(bytes, bench.description));
     const brake = await loaded;
     if (isAboutLoops) // with the parameters of the last run, which still stand in the module
-      self.postMessage({ loops: bench.loops.map((loop) => loopAt(brake.exports, loop)) });
+      self.postMessage({ loops: bench.loops.map((loop) => loopOf(brake.exports, loop)) });
     if (!values) return;
     const made = brake.run(values), { description, keep, judged } = bench;
     const recording = recordingOf(made, description.settle, keep), { time, table } = recording;
+    if (!table.every(Number.isFinite)) throw new RangeError(LOST);
     const names = description.signals.map(({ name }) => name);
     const figures = judged && keyFigures(brake.exports, recording, names, judged.families);
     // given away: no copy
     self.postMessage({ time, table, figures, settled: made.settled }, [time.buffer, table.buffer]);
   } catch (error) {
-    self.postMessage({ error: error.message });
+    self.postMessage({ error: error instanceof RangeError ? error.message : LOST });
   }
 };

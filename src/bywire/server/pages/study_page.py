@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from urllib.parse import quote
+
 from bywire.server.contents import Contents
 from bywire.server.pages.entries import text
 from bywire.server.pages.frame import form, frame, link, section
@@ -27,11 +29,12 @@ def study_page(
         Bytes that a file may have that is dropped.
     """
     is_there = report in there.reports
-    source = f' src="/file/{text(report)}"' if is_there else " hidden"
+    address = text(quote(f"/file/{report}"))
+    source = f' src="{address}"' if is_there else " hidden"
     seen = (
         f'<p id="study-progress">{text(progress)}</p>\n<ul id="study-so-far"></ul>\n'
         f'<iframe id="study-report" '
-        f'title="Report of {text(study)}" data-address="/file/{text(report)}"{source}></iframe>'
+        f'title="Report of {text(study)}" data-address="{address}"{source}></iframe>'
     )
     body = [
         section("Run the study", "study", form(tasks()["study"], there, {"study": study})),

@@ -9,7 +9,7 @@ from typing import Any
 from bywire.core import option_texts as texts
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.server.common_fields import case_of, frequencies, of_loops
+from bywire.server.common_fields import case_of, frequencies, of_loops, side
 from bywire.server.field import Field
 from bywire.server.place import Place
 from bywire.server.task import Task
@@ -27,6 +27,7 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     return agreement(
         asked["loop"], asked["parameters"], asked["at"], asked["set"],
         frequencies=asked["frequencies"], amplitudes=asked["amplitudes"], progress=progress,
+        side=asked["side"],
     )  # fmt: skip
 
 
@@ -36,6 +37,7 @@ TASK = Task(
         *of_loops(),
         frequencies(),
         Field("amplitudes", "Amplitudes", hint=texts.AGREEMENT_AMPLITUDES, fits=_fit),
+        side(),
     ),
     _compute, subject="loop",
     summary="What makes a loop nonlinear, cause by cause",

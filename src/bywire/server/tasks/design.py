@@ -9,7 +9,7 @@ from typing import Any
 from bywire.core import option_texts as texts
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.server.common_fields import case_of, changes, loop, parameters
+from bywire.server.common_fields import case_of, changes, loop, parameters, side
 from bywire.server.field import Field
 from bywire.server.task import Task
 
@@ -20,7 +20,7 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     return design(
         asked["loop"], asked["parameters"], asked["at"], asked["set"], require=asked["require"],
         over=asked["over"], amplitudes=asked["amplitudes"], schedule=asked["schedule"],
-        linear_only=asked["linear_only"], progress=progress,
+        linear_only=asked["linear_only"], progress=progress, side=asked["side"],
     )  # fmt: skip
 
 
@@ -36,6 +36,7 @@ TASK = Task(
         Field("amplitudes", "Amplitudes", hint=texts.DESIGN_AMPLITUDES),
         parameters(lambda asked, _: case_of({**asked, "at": "", "set": {}})),
         changes(lambda asked, _: case_of({**asked, "at": ""})),
+        side(),
     ),
     _compute, subject="loop",
     summary="Gains of a control loop from requirements",

@@ -9,7 +9,14 @@ from typing import Any
 from bywire.core import option_texts as texts
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.server.common_fields import case_of, error_estimate, frequencies, of_loops, over
+from bywire.server.common_fields import (
+    case_of,
+    error_estimate,
+    frequencies,
+    of_loops,
+    over,
+    side,
+)
 from bywire.server.field import Field
 from bywire.server.place import Place
 from bywire.server.task import Task
@@ -28,7 +35,7 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
         asked["loop"], asked["parameters"], asked["at"], asked["set"],
         frequencies=asked["frequencies"], amplitudes=asked["amplitudes"],
         excitation=asked["excitation"] or "sine", over=asked["over"], progress=progress,
-        estimate_error=asked["error_estimate"],
+        estimate_error=asked["error_estimate"], side=asked["side"],
     )  # fmt: skip
 
 
@@ -42,6 +49,7 @@ TASK = Task(
               lambda: ("sine", "multisine", "chirp")),
         over(texts.BANDWIDTH_OVER),
         error_estimate(),
+        side(),
     ),
     _compute, subject="loop",
     summary="A closed loop's response by amplitude: friction, limits and sampling included",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from bywire.core import option_texts as texts
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.server.common_fields import changes, loop, parameters
+from bywire.server.common_fields import changes, loop, parameters, side
 from bywire.server.field import Field, Fits
 from bywire.server.place import Place
 from bywire.server.task import Task
@@ -57,7 +57,7 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     return linearize(
         asked["loop"], asked["parameters"], asked["at"], asked["set"], locus=asked["locus"],
         reduce=asked["reduce"], friction=asked["friction"], speed=asked["speed"],
-        dither=asked["dither"],
+        dither=asked["dither"], side=asked["side"],
     )  # fmt: skip
 
 
@@ -74,6 +74,7 @@ TASK = Task(
         Field("speed", "Speed", hint=texts.SPEED, fits=_with("friction", "speed")),
         Field("locus", "Root locus", hint=texts.LOCUS, fits=_range),
         Field("dither", "Under dither", "flag", texts.DITHER),
+        side(),
     ),
     _compute, subject="loop",
     summary="The exact linear model of a closed loop, with its sampling, or of a plant",

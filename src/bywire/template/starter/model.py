@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
-from bywire.authoring import Assembly, Bounds, Integral, Part, Role, Signal, Task, Wire
+from bywire.authoring import Assembly, Bounds, Integral, Limited, Part, Role, Signal, Task, Wire
 from bywire.plant import dc_motor
 from bywire.template.starter.elements import caliper_spring, spindle
 from bywire.template.starter.laws import force_control
@@ -23,7 +23,7 @@ class Stimulus(NamedTuple):
 class Memory(NamedTuple):
     """What the controller holds between its ticks."""
 
-    v: Annotated[float, Signal("V", "motor voltage", 6.0)]
+    v: Annotated[float, Signal("V", "motor voltage", 6.0), Limited("control.v_max")]
     v_i: Annotated[float, Signal("V", "integral part", 1.0)]
 
 

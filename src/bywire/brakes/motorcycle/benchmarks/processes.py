@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from statistics import median
 from bywire.benchmark.commands import environment
 from bywire.benchmark.result import Result, at_most
 from bywire.benchmark.suite import Part
+from bywire.core.child_process import python_command
 
 _BENCH = 'experiment = "hard-braking"\nparameters = "dardanelli2010"\n'
 _ROUNDS = 5
@@ -48,15 +48,15 @@ def processes() -> Iterator[Result]:
 
 
 def _seconds(bench: Path, changes: dict[str, str]) -> float:
-    command = [sys.executable, "-m", "bywire.cli", "run", str(bench), "--json"]
+    command = python_command("-m", "bywire.cli", "run", str(bench), "--json")
     begin = time.perf_counter()
     subprocess.run(command, env=environment() | changes, stdout=subprocess.DEVNULL, check=True)
     return time.perf_counter() - begin
 
 
 def _memory(bench: Path, changes: dict[str, str]) -> Result:
-    command = [sys.executable, "-c", _MEMORY, "run", str(bench), "--json",
-               "--set", "options.duration=60 s"]  # fmt: skip
+    command = python_command("-c", _MEMORY, "run", str(bench), "--json",
+                             "--set", "options.duration=60 s")  # fmt: skip
     done = subprocess.run(
         command,
         env=environment() | changes,

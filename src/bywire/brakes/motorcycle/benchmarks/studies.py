@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -16,6 +15,7 @@ from bywire.benchmark.commands import environment
 from bywire.benchmark.judging import simulated_and_judged
 from bywire.benchmark.result import Result, at_least, at_most
 from bywire.benchmark.suite import Part
+from bywire.core.child_process import python_command
 from bywire.core.unneeded import allow_dask
 from bywire.data.file_format import library
 from bywire.studies.chunk import computed_chunk
@@ -129,8 +129,9 @@ def _command(folder: Path) -> Result:
     study.write_text(_MANY, encoding="utf-8")
     for k in range(_COMMANDS + 1):
         before, begin = _of_children(), time.perf_counter()
-        line = [sys.executable, "-m", "bywire", "study", "run", str(study),
-                "--out", str(folder / f"many-{k}"), *(() if k else ("--cases", "512"))]  # fmt: skip
+        fewer = () if k else ("--cases", "512")
+        line = python_command("-m", "bywire", "study", "run", str(study),
+                              "--out", str(folder / f"many-{k}"), *fewer)  # fmt: skip
         subprocess.run(line, env=environment(), capture_output=True, check=True)
         seconds.append(time.perf_counter() - begin)
         spent.append(_of_children() - before)
@@ -149,8 +150,8 @@ def _of_children() -> float:
 
 
 def _memory(study: Path, out: Path) -> Result:
-    line = [sys.executable, "-c", _MEMORY, "study", "run", str(study), "--out", str(out),
-            "--cases", str(_CASES), "--workers", "1", "--json"]  # fmt: skip
+    line = python_command("-c", _MEMORY, "study", "run", str(study), "--out", str(out),
+                          "--cases", str(_CASES), "--workers", "1", "--json")  # fmt: skip
     done = subprocess.run(
         line, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
         check=True,

@@ -98,7 +98,7 @@ def _release(runs: Runs, name: str, law: str) -> xr.Dataset:
         "t_hold": 0.0, "after": "stay",
     }  # fmt: skip
     options = {"source": "current", "p_start": P_FROM, "duration": T_RELEASE, "record": 0.1}
-    return runs.bench("open-loop", name, overrides, options, stimulus).recordings["run"]
+    return runs.bench("motor-open-loop", name, overrides, options, stimulus).recordings["run"]
 
 
 def _energies(release: xr.Dataset) -> tuple[float, float]:

@@ -33,7 +33,7 @@ def part(runs: Runs) -> Part:
         compared(f"table3.{name}", fact, used[name], None, "used as published", tuned="an input")
         for name, fact in facts.TABLE3.items()
     ]
-    curve = runs.bench("stribeck", MAIN).recordings["curve"]
+    curve = runs.bench("seal-stribeck", MAIN).recordings["curve"]
     torque = curve["T_fr"].values
     bare = par.seal.k_brk_p * par.seal.f_cfr_p * float(curve["p_mc"].values[-1])
     items += [

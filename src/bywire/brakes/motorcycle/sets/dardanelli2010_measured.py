@@ -11,8 +11,9 @@ from __future__ import annotations
 
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.sets.dardanelli2010 import ENTRIES as _OTHERS
+from bywire.brakes.motorcycle.sets.dardanelli2010 import SEVEN
 from bywire.core.catalog import CitedSet
-from bywire.core.provenance import Cited, calibrated, chosen, derived
+from bywire.core.provenance import Cited, Formula, calibrated, chosen, derived
 
 _PRIOR = next(entry for entry in _OTHERS if entry.name == "dardanelli2010-table1")
 
@@ -48,7 +49,9 @@ ESTIMATED = {
 NOT_TOLD = ("master_cylinder.s_mc", "fluid.V_air", "seal.T_pr", "seal.mu_T", "pipeline.d_pl")
 _UNTOLD = "as in dardanelli2010-table1: estimated with the others, but no statement tells it"
 _KNOWN = "the ECU knows the friction, as it was estimated"
-_SEAL = {name: ESTIMATED[f"seal.{name}"].value for name in ("f_cfr_p", "k_brk_p")}
+_SEAL: dict[str, Formula] = {
+    "f_cfr_p": lambda par: par.seal.f_cfr_p, "k_brk_p": lambda par: par.seal.k_brk_p,
+}  # fmt: skip
 
 ENTRIES = (
     CitedSet(
@@ -62,8 +65,8 @@ ENTRIES = (
             **ESTIMATED,
             **{name: chosen(_PRIOR.values[name].value, _UNTOLD) for name in NOT_TOLD},
             "fluid.air": chosen("entrained", "its volume was searched for, and may be nothing"),
-            "master_cylinder.x_rest": derived(0.00464067, "x_mc = 7 mm at 20 bar"),
-            **{f"ecu.est_par.{name}": derived(value, _KNOWN) for name, value in _SEAL.items()},
+            "master_cylinder.x_rest": calibrated(0.00464067, SEVEN),
+            **{f"ecu.est_par.{name}": derived(formula, _KNOWN) for name, formula in _SEAL.items()},
         },
     ),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
+from annotated_types import Ge
 from pydantic import Field
 
 from bywire.brakes.two_wheeler.parameters import BrakeParameters
@@ -13,7 +14,7 @@ from bywire.core.model import Task
 from bywire.core.parameters import ParameterSet
 from bywire.core.parts import Integral, Part, Shown, Wire
 from bywire.core.quantities import Duration, Unit
-from bywire.core.signals import Role, Signal, zeros
+from bywire.core.signals import Limited, Role, Signal, zeros
 from bywire.plant import adhesion, brake_disc, pressure_loop, road_wheel, tyre
 
 DrumSpeed = Annotated[float, Unit("m/s", 20.0), Field(gt=0, allow_inf_nan=False)]
@@ -49,13 +50,15 @@ class Stimulus(NamedTuple):
     """What slip control is to hold, and what it may use."""
 
     slip_set: Annotated[float, Signal("1", "slip demand", 0.1)]
-    p_set: Annotated[float, Signal("Pa", "pressure that may be lowered", 4e6)]
+    p_set: Annotated[float, Signal("Pa", "pressure that may be lowered", 4e6), Ge(0)]
 
 
 class Memory(NamedTuple):
     """What slip control holds between its ticks."""
 
-    p_ref: Annotated[float, Signal("Pa", "pressure set point", 2e6, set_point_of="p")]
+    p_ref: Annotated[
+        float, Signal("Pa", "pressure set point", 2e6, set_point_of="p"), Limited("p_set")
+    ]
     slip_hat: Annotated[float, Signal("1", "measured slip", 0.1)]
     slip_ref: Annotated[float, Signal("1", "slip set point", 0.1, set_point_of="slip")]
     integral: Annotated[float, Signal("Pa", "integral part", 2e6)]

@@ -14,6 +14,8 @@ _FROM = {
     "slip": "ecu.front_slip",
 }  # fmt: skip
 
+_PLACES = {there: here for here, there in _FROM.items()}
+
 FRONT600 = CitedSet(
     name="front600",
     assembly="wheel-on-drum",
@@ -22,7 +24,7 @@ FRONT600 = CitedSet(
     parameter_class=WheelOnDrumParameters,
     values={
         **{
-            name.replace(there, here, 1): value
+            name.replace(there, here, 1): value.moved_to(_PLACES)
             for here, there in _FROM.items()
             for name, value in sport600.SPORT600.values.items()
             if name.startswith(f"{there}.")

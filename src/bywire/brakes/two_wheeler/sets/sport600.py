@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.catalog import CitedSet
 from bywire.core.provenance import chosen, derived, paper
@@ -65,6 +67,19 @@ _DRY = {
     name: derived(value, "dry asphalt for car tyres, as circulated")
     for name, value in SURFACES["dry-asphalt"]._asdict().items()
 }
+
+
+def _gain(disc: Any) -> float:
+    """Return the torque over the pressure of a brake."""
+    gain: float = disc.faces * disc.mu_pad * disc.A_cal * disc.r_eff
+    return gain
+
+
+def _lift(body: Any) -> float:
+    """Return the deceleration at which lift control acts, just below that of lifting."""
+    limit: float = 0.95 * body.g * body.l_f / body.h
+    return limit
+
 
 SPORT600 = CitedSet(
     name="sport600",
@@ -162,14 +177,14 @@ SPORT600 = CitedSet(
         **{f"ecu.front_slip.{name}": value for name, value in _SLIP.items()},
         "ecu.front_slip.J_hat": chosen(0.50, "that of the wheel"),
         "ecu.front_slip.r_hat": chosen(0.30, "that of the wheel"),
-        "ecu.front_slip.k_hat": derived(4 * 0.45 * 14.1e-4 * 0.13, "that of the discs"),
+        "ecu.front_slip.k_hat": derived(lambda par: _gain(par.front.disc), "that of the discs"),
         **{f"ecu.rear_slip.{name}": value for name, value in _SLIP.items()},
         "ecu.rear_slip.J_hat": chosen(0.65, "that of the wheel"),
         "ecu.rear_slip.r_hat": chosen(0.31, "that of the wheel"),
-        "ecu.rear_slip.k_hat": derived(2 * 0.40 * 3e-4 * 0.095, "that of the disc"),
+        "ecu.rear_slip.k_hat": derived(lambda par: _gain(par.rear.disc), "that of the disc"),
         **{f"ecu.rules.{name}": chosen(value, _SOUGHT) for name, value in _RULES.items()},
         "ecu.rules.v_off": chosen(2.0, "as that of slip control"),
-        "ecu.front_lift.a_lim": derived(0.95 * 9.81 * 0.69 / 0.62, "0.95 of g l_f/h"),
+        "ecu.front_lift.a_lim": derived(lambda par: _lift(par.vehicle.body), "0.95 of g l_f/h"),
         "ecu.front_lift.k_p": chosen(1e5, "1 bar for 1 m/s^2: an eighth of the static gain"),
         "ecu.front_lift.T_i": chosen(0.05, "crosses over at 1.3 Hz, below the load's transfer"),
         "ecu.front_lift.T_t": chosen(0.05, "as that of slip control"),

@@ -21,6 +21,9 @@ WHOLE_REAR = CitedSet(
             for name, value in sport600.SPORT600.values.items()
             if not name.startswith("rear.circuit.")
         },
-        **{f"rear.actuator.{name}": value for name, value in _BRAKE.values.items()},
+        **{
+            f"rear.actuator.{name}": value.moved_to({"": "rear.actuator"})
+            for name, value in _BRAKE.values.items()
+        },
     },
 )

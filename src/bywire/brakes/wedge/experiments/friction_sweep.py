@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.bench.kpis.kpi import Figures, Kpi, Undefined
 from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.kpis.step_response import Setting
 from bywire.brakes.wedge.case import case_from_parked, mean, steps
@@ -116,13 +116,16 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     stable, overshoot, settling, power = (
         [kpi.value for kpi in column] for column in zip(*each.values(), strict=True)
     )
+    unknown = [f"{m:g}" for m, y in zip(options.mu_B, overshoot, strict=True) if math.isnan(y)]
     slow = [f"{m:g}" for m, t in zip(options.mu_B, settling, strict=True) if math.isnan(t)]
     unjudged = sum(math.isnan(value) for value in stable)
     overall = ALL(
         unstable=(math.nan, f"{unjudged} of them cannot be judged")
         if unjudged
         else float(sum(value == 0 for value in stable)),
-        overshoot_max=(max(overshoot), ""),
+        overshoot_max=Undefined(f"open at mu_B = {', '.join(unknown)}", is_open=True)
+        if unknown
+        else max(overshoot),
         settling_time_max=(math.nan, f"not settled at mu_B = {', '.join(slow)}")
         if slow
         else max(settling),

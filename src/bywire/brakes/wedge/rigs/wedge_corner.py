@@ -48,7 +48,9 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
     Memory: ClassVar = Memory
     Stimulus: ClassVar = control.Stimulus
 
-    E_wheel = Shown("J", "energy of the wheel", role=Role("sink", "wheel", book=BOOK))
+    E_wheel = Shown(
+        "J", "energy of the wheel", role=Role("sink", "wheel", book=BOOK, returns="any")
+    )
 
     records: ClassVar[tuple[str, ...]] = (
         "s", "v_x", "v_tread", "a", "slip", "sliding", "u", "F_x", "N_x", "t_locked", "E_body",

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Any
 
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.sets import adjuster
@@ -27,14 +28,28 @@ _LOOP = "current loop of 1.2 kHz by pole cancellation"
 _DEGREE, _MICRO = math.pi / 180.0, 1e-6
 _ALPHA, _MU_B, _K_CAL, _R_B, _LEAD = 20.0 * _DEGREE, 0.35, 30e6, 0.125, 2e-3
 _R, _L, _V, _LOOP_RATE = 0.45, 0.2e-3, 48.0, 2.0 * math.pi * 1200.0
-_SLOPE = _LEAD / (2.0 * math.pi)
 _MU_B_HIGH, _ALPHA_STEEP = 0.45, 24.5 * _DEGREE
 
 
-def _moment_slope(mu_B: float, alpha: float) -> Cited:
+def _moment_slope(par: Any) -> float:
     """Return moment per angle in contact, which the moment controller knows."""
-    slope = 2.0 * mu_B * _R_B * _K_CAL * math.tan(alpha) * _SLOPE
-    return derived(slope, "2 mu_B r_B K_CAL tan(alpha) L/2pi")
+    wedge, caliper = par.wedge, par.caliper
+    force = caliper.K_cal * math.tan(wedge.alpha) * _travel(par)
+    slope: float = 2.0 * wedge.mu_B * caliper.r_B * force
+    return slope
+
+
+def _travel(par: Any) -> float:
+    """Return travel per angle of a screw."""
+    travel: float = par.screw.lead / (2.0 * math.pi)
+    return travel
+
+
+
+def _grease(bearing: Any) -> float:
+    """Return the viscous friction of a bearing at the speed and the viscosity it is stated at."""
+    torque: float = 1.2e-4 * (bearing.omega_ref * (bearing.nu_ref / _MICRO)) ** bearing.k_nu
+    return torque
 
 
 _MOTOR = {
@@ -84,8 +99,8 @@ _ELECTRICAL = {
     "drive.f_sense": chosen(8e3, "fast against the loop"),
     "drive.G_sense": chosen(1.0, "calibrated measurement"),
     "drive.i_max": chosen(20.0, "peak current of drives of this class"),
-    "drive.k_p": derived(_L * _LOOP_RATE / _V, _LOOP),
-    "drive.k_i": derived(_R * _LOOP_RATE / _V, _LOOP),
+    "drive.k_p": derived(lambda par: par.motor_1.L_M * _LOOP_RATE / par.drive.V_dc, _LOOP),
+    "drive.k_i": derived(lambda par: par.motor_1.R_ref * _LOOP_RATE / par.drive.V_dc, _LOOP),
     "drive.T_t": chosen(_L / _R, "the winding's time constant"),
     "drive.V_dc": chosen(_V, "supply of drives of this class"),
     "drive.R_off": chosen(_R, "empties the winding twice as fast as its own resistance"),
@@ -94,12 +109,14 @@ _ELECTRICAL = {
 _MECHANICAL = {
     "screw.lead": chosen(_LEAD, "roller screws of this size; gives 4.85 rad at 950 N m"),
     "screw.eta_f": paper(0.65, "section 'Roller-screw efficiency': of the order of 65 %"),
-    "screw.eta_b": derived(2.0 - 1.0 / 0.65, "a friction that does not depend on the direction"),
+    "screw.eta_b": derived(
+        lambda par: 2.0 - 1.0 / par.screw.eta_f, "a friction that does not depend on the direction"
+    ),
     "screw.law": chosen("load", "reading A: friction by the axial force"),
     "bearing.C_0": calibrated(0.08, "tuned so that the friction of Figs. 5 and 6 at 1 Hz shows"),
     "bearing.C_1": chosen(0.0, "the square alone, as in bearing catalogs"),
     "bearing.C_2": chosen(2.5e-9, "angular ball bearings of this size"),
-    "bearing.T_nu": derived(1.2e-4 * (100.0 * 100.0) ** (2.0 / 3.0), "G_nu 1.2e-4, nu in mm^2/s"),
+    "bearing.T_nu": derived(lambda par: _grease(par.bearing), "G_nu 1.2e-4, nu in mm^2/s"),
     "bearing.omega_ref": chosen(100.0, "working speed"),
     "bearing.nu": chosen(100 * _MICRO, "grease at 40 degC"),
     "bearing.nu_ref": chosen(100 * _MICRO, "grease at 40 degC"),
@@ -161,9 +178,9 @@ _CONTROL = {
     "control.offset.T_change": chosen(0.05, "slow against the position loop"),
     "control.offset.F_low": chosen(500.0, "about the preload"),
     "control.offset.F_high": chosen(1000.0, "twice F_low"),
-    "control.offset.k_hat": derived(_SLOPE, "lead over 2 pi"),
+    "control.offset.k_hat": derived(_travel, "lead over 2 pi"),
     "control.moment.f_c": chosen(8.0, "slow against the position loop"),
-    "control.moment.slope_hat": _moment_slope(_MU_B, _ALPHA),
+    "control.moment.slope_hat": derived(_moment_slope, "2 mu_B r_B K_CAL tan(alpha) L/2pi"),
     "control.moment.rate_max": calibrated(60.0, "tuned so that Fig. 9 needs about 60 W"),
     "control.moment.omega_gap": chosen(120.0, "the gap in some 35 ms"),
     "control.moment.a_gap": chosen(6e3, "a third of the peak torque"),
@@ -171,7 +188,9 @@ _CONTROL = {
     "control.moment.M_on": chosen(5.0, "below the contact threshold"),
     "control.moment.M_contact": chosen(12.0, "above the sensor's offset"),
     "control.moment.Omega_still": chosen(0.5, "a twelfth of a revolution per second"),
-    "control.adjuster.gap_slope_hat": derived(_SLOPE * math.tan(_ALPHA), "L/2pi tan(alpha)"),
+    "control.adjuster.gap_slope_hat": derived(
+        lambda par: _travel(par) * math.tan(par.wedge.alpha), "L/2pi tan(alpha)"
+    ),
     "command.mode": chosen("moment", "the experiment decides"),
 }
 
@@ -202,14 +221,11 @@ _VALUES = {
 # Both keep what was calibrated with the first set: it belongs to motors and electronics.
 _UNSTABLE = {
     "wedge.mu_B": chosen(_MU_B_HIGH, "above tan(alpha) = 0.364; friction holds it without power"),
-    "control.moment.slope_hat": _moment_slope(_MU_B_HIGH, _ALPHA),
 }
 _STEEP = {
     "wedge.alpha": chosen(_ALPHA_STEEP, _LITERATURE + ", the steep end: stable up to mu_B = 0.456"),
     "wedge.x_stop": chosen(2.5e-3, "twice the travel of 1.23 mm at 950 N m"),
     "control.offset.law": chosen("scheduled", "far from the neutral point both motors push"),
-    "control.moment.slope_hat": _moment_slope(_MU_B, _ALPHA_STEEP),
-    "control.adjuster.gap_slope_hat": derived(_SLOPE * math.tan(_ALPHA_STEEP), "L/2pi tan(alpha)"),
 }
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import xarray as xr
@@ -12,6 +10,7 @@ import xarray as xr
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.sizing.answer import Answer, Demand
 from bywire.brakes.wedge.sizing.design import Efficiency, answer, redesigned
+from bywire.core.interrupts import thread_pool
 from bywire.core.typing import Array
 from bywire.synthesis.study import variable, variables
 
@@ -61,8 +60,7 @@ def mapped(
     """
     designs = [(float(a), float(b)) for a in slopes for b in leads]
     answers: list[Answer] = []
-    pool = ThreadPoolExecutor(os.cpu_count() or 1)
-    try:
+    with thread_pool() as pool:
         every = pool.map(
             lambda design: answer(redesigned(par, design[0], design[1], efficiency), demand),
             designs,
@@ -70,8 +68,6 @@ def mapped(
         for k, judged in enumerate(every):
             answers.append(judged)
             progress((k + 1) / len(designs))
-    finally:  # an interrupt waits for what runs, and starts nothing more
-        pool.shutdown(cancel_futures=True)
     shape = (len(slopes), len(leads), len(demand.mu_B))
     return _dataset(answers, demand, shape).assign_coords(
         tan_alpha=variable(slopes, ("tan_alpha",), "1", "slope of the wedge"),

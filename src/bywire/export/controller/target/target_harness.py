@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bywire.export.controller.c_text import c_name
-from bywire.export.controller.harness import comparison, prepared, stepped
+from bywire.export.controller.harness import comparison
 from bywire.export.controller.program import Program
+from bywire.export.controller.trespassing import prepared, stepped
 from bywire.export.controller.vectors import Vectors
 
 SAMPLES = 100
@@ -20,13 +21,15 @@ def target_harness(program: Program, every: Sequence[Vectors]) -> str:
     what = f"Tries the compiled ECU of {program.model.name} on a Cortex-M."
     tasks = [c_name(each.step.task.name) for each in every]
     calls = " + ".join(f"differing_{task}()" for task in tasks)
+    breaches = " + ".join(f"breaches_{task}()" for task in tasks)
     measured = "".join(f"    measure_{task}();\n" for task in tasks)
     parts = [
         *comparison(program, every, what, '#include "target.h"'),
         *(_measured(program, each) for each in every),
         f"int main(void)\n{{\n    {name}_Memory memory;\n\n    {name}_ecu_init(&memory);\n"
         f'    say("differ ");\n    say_number((uint32_t)({calls}));\n'
-        f'    say("\\nbits ");\n    say_number(bits);\n    say("\\n");\n'
+        f'    say("\\nbits ");\n    say_number(bits);\n'
+        f'    say("\\nbreaches ");\n    say_number((uint32_t)({breaches}));\n    say("\\n");\n'
         f"{measured}    return 0;\n}}",
     ]
     return "\n\n".join(parts) + "\n"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
+
+from bywire.core.child_process import find_program
 
 CROSS = "arm-none-eabi-gcc"
 EMULATOR = "qemu-system-arm"
@@ -50,7 +51,7 @@ TARGETS = (
 
 def missing_tools() -> str:
     """Return what is missing for targets, and how it is installed; empty where nothing is."""
-    absent = [name for name in (CROSS, EMULATOR) if shutil.which(name) is None]
+    absent = [name for name in (CROSS, EMULATOR) if find_program(name) is None]
     if not absent:
         return ""
     return f"{' and '.join(absent)} not installed ({INSTALL})"

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from bywire.core.child_process import find_program, run_program
 from bywire.core.errors import CompilerError
 from bywire.export.controller.harness import FLAGS, SMALL_FLAGS
 from bywire.export.controller.program import Program
@@ -41,6 +42,8 @@ class Trial:
         Values that are not those of Python.
     bits
         A number made of all results, equal where they are equal in every bit.
+    breaches
+        Trials of the contract of a step that failed: refused inputs, and memory of any bits.
     rom, ram
         Bytes: code, constants and parameters with what the compiler's library brings; memory of
         the ECU. None on the host.
@@ -50,6 +53,7 @@ class Trial:
     precision: str
     differing: int
     bits: int
+    breaches: int = 0
     rom: int | None = None
     ram: int | None = None
     tasks: Mapping[str, TaskFigures] | None = None
@@ -69,10 +73,10 @@ def host_trial(program: Program, folder: Path, compiler: Compiler, scratch: Path
          str(folder / f"{program.name}_harness.c"), "-o", str(made), "-lm"],
     )  # fmt: skip
     said = _call([str(made)], may_fail=True)
-    match = re.search(r"(\d+) values differ, bits ([0-9a-f]+)", said)
+    match = re.search(r"(\d+) values differ, bits ([0-9a-f]+)\n(\d+) breaches", said)
     if match is None:
         raise CompilerError(f"the compiled ECU of {program.name} said {said[:200]!r}")
-    return Trial("host", program.precision.name, int(match[1]), int(match[2], 16))
+    return Trial("host", program.precision.name, int(match[1]), int(match[2], 16), int(match[3]))
 
 
 def target_trial(
@@ -96,15 +100,15 @@ def target_trial(
         "-semihosting-config", "enable=on,target=native", "-icount", "shift=0",
         "-kernel", str(image),
     ])  # fmt: skip
-    match = re.search(r"differ (\d+)\nbits (\d+)\n", said)
+    match = re.search(r"differ (\d+)\nbits (\d+)\nbreaches (\d+)\n", said)
     if match is None:
         raise CompilerError(f"the ECU of {program.name} on {target.name} said {said[:200]!r}")
     tasks = {
         name: TaskFigures(int(most), int(mean), int(depth))
         for name, most, mean, depth in re.findall(r"task (\w+) (\d+) (\d+) (\d+)", said)
     }
-    differing, bits = map(int, match.groups())
-    return Trial(target.name, program.precision.name, differing, bits, rom, ram, tasks)
+    differing, bits, breaches = map(int, match.groups())
+    return Trial(target.name, program.precision.name, differing, bits, breaches, rom, ram, tasks)
 
 
 def _sizes(
@@ -119,9 +123,7 @@ def _sizes(
     ])  # fmt: skip
     said = _call(["arm-none-eabi-size", str(parts)])
     text, data, bss = map(int, said.splitlines()[1].split()[:3])
-    width = 4 if program.precision.name == "single" else 8
-    memory = width * len(program.members(program.model.Memory))
-    return text + data, data + bss + memory
+    return text + data, data + bss + program.memory_size
 
 
 def _image(
@@ -142,17 +144,14 @@ def _image(
 
 
 def _sources(program: Program, folder: Path) -> list[Path]:
-    every = sorted(folder.glob(f"{program.name}_*.c"))
-    return [each for each in every if not each.name.endswith("_harness.c")]
+    every = [folder / f"{program.name}_{part}.c" for part in ("ecu", "io", "parameters")]
+    return [each for each in every if each.exists()]
 
 
 def _call(command: list[str], may_fail: bool = False) -> str:
     name = Path(command[0]).name
     try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=_TIMEOUT, check=False,
-            stdin=subprocess.DEVNULL,
-        )  # fmt: skip
+        done = run_program([find_program(command[0]) or command[0], *command[1:]], _TIMEOUT)
     except subprocess.TimeoutExpired:
         raise CompilerError(f"{name} took longer than {_TIMEOUT:g} s for an exported ECU") from None
     except OSError as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
@@ -19,6 +18,7 @@ from bywire.brakes.motorcycle.operating_point import settled_start
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current, travel_at
 from bywire.control.dither import breakaway_current
+from bywire.core.interrupts import thread_pool
 from bywire.core.typing import Array
 from bywire.simulation.run import Run, simulate
 
@@ -88,7 +88,7 @@ def of_brake(
         keep = read.time >= case.settle - case.keep - 1e-9
         return label, _dataset(read["i_meas"][keep], read["p_meas"][keep])
 
-    with ThreadPoolExecutor() as pool:
+    with thread_pool() as pool:
         return dict(pool.map(computed, jobs))
 
 

@@ -67,7 +67,8 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 
 
 EXPERIMENT = Experiment(
-    name="stribeck",
+    name="seal-stribeck",
+    formerly="stribeck",
     assembly="motorcycle-brake",
     summary="friction torque over speed at {pressures} (Fig. 4)",
     options=Options,

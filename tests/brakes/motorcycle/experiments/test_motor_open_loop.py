@@ -21,7 +21,7 @@ def held(source: str, **changes) -> bywire.Bench:
     """Return a bench that holds 20 bar without a stimulus of its own."""
     options = {"source": source, "add_holding": True, "p_start": "20 bar", "duration": "0.2 s"}
     stimulus = {"kind": "step", "start": 0, "end": f"0 {UNITS[source]}", "t_step": 0}
-    return bywire.Bench("open-loop", SET, options=options, stimulus=stimulus, **changes)
+    return bywire.Bench("motor-open-loop", SET, options=options, stimulus=stimulus, **changes)
 
 
 @pytest.mark.parametrize("source", [*IDEAL, *ECU])
@@ -57,7 +57,7 @@ def test_requirement_that_the_source_leaves_out_is_refused():
 def test_unit_is_that_of_the_source(source):
     stimulus = {"kind": "step", "start": 0, "end": "1 mm", "t_step": 0}
     with pytest.raises(UnitError, match="mm cannot be"):
-        bywire.Bench("open-loop", SET, options={"source": source}, stimulus=stimulus)
+        bywire.Bench("motor-open-loop", SET, options={"source": source}, stimulus=stimulus)
 
 
 def test_demand_to_the_current_loop_is_dithered_or_direct():

@@ -88,7 +88,8 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 
 
 EXPERIMENT = Experiment(
-    name="release",
+    name="pressure-release",
+    formerly="release",
     assembly="motorcycle-brake",
     summary="release from {p_from}: time to empty, residual pressure, energy returned",
     options=Options,

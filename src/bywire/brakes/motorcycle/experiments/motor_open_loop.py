@@ -56,8 +56,8 @@ def cases(
     """Return the one run."""
     if stimulus is None:
         raise ParameterError(
-            "open-loop needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine or "
-            "table, with its parameters"
+            "motor-open-loop needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine "
+            "or table, with its parameters"
         )
     mode, name, unit = _SOURCES[options.source]
     i = holding_current(options.p_start, par)
@@ -91,7 +91,8 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 
 
 EXPERIMENT = Experiment(
-    name="open-loop",
+    name="motor-open-loop",
+    formerly="open-loop",
     assembly="motorcycle-brake",
     summary="any stimulus, as ideal current or voltage, or as a demand to the ECU",
     options=Options,

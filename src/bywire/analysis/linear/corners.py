@@ -1,0 +1,714 @@
+"""Operating points on corners of a model: which operation, on which line, and which side counts.
+
+A minimum, a limit, a dead band or a magnitude has two derivatives where its sides meet. There,
+algorithmic differentiation returns a mean of both, which is the slope of neither side. A linear
+model is therefore compared with those right beside its operating point. Where they differ, the
+operations on their corners are named, and a stated side is taken.
+"""
+
+from __future__ import annotations
+
+import linecache
+import operator
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+import bywire
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.smooth_functions import SmoothPoint, equations
+from bywire.core import elementary, ops
+from bywire.core.errors import ParameterError, quoted
+from bywire.core.signals import signals_of
+from bywire.core.typing import Array
+
+ABOVE, BELOW = "above", "below"
+"""the tested quantity is above its corner, or below: the first argument of a minimum, a maximum or
+a comparison minus the second, the argument of a magnitude"""
+REACH = 1e-9
+"""how near a corner counts as at the operating point, of the signals' usual magnitudes: operating
+points are solved to 1e-10 of these, so that nobody can say on which side of a nearer corner they
+are; and what is smooth changes by as little over such a distance"""
+_FINER = 1.0 / 4.0  # what is smooth differs by a quarter at a quarter of the distance
+_SAME = 1e-6  # of an entry of a Jacobian: what differs by no more is compared no further
+_SMALL = 1e-8  # of the largest entry in its row, each by a usual magnitude: the same
+_EQUAL = 1e-5  # of a response: models that differ by no more are one
+_ACROSS = 0.02  # of the reach: on either side of a corner
+_TURNS = 8
+_FREQUENCIES = 40
+_OPS_FILE = ops.__file__
+
+
+class CornerError(ParameterError):
+    """The operating point lies on a corner whose sides have different linear models."""
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Sides of corners that a user states.
+
+    Parameters
+    ----------
+    usual
+        ``"above"``, ``"below"``, or empty: refuse.
+    at
+        Sides of single places, ``"FILE:LINE"`` with the end of the file's path at least.
+    """
+
+    usual: str = ""
+    at: Mapping[str, str] = field(default_factory=dict)
+
+    def of(self, place: str) -> str:
+        """Return the side of a place; empty where none is stated."""
+        for known, side in self.at.items():
+            if place == known or place.endswith(f"/{known}"):
+                return side
+        return self.usual
+
+
+def read_sides(text: str) -> Sides:
+    """Return sides as a user writes them: ``"above"``, or ``"valve.py:42=below, above"``.
+
+    Raises
+    ------
+    ParameterError
+        When a part is neither a side nor a place with its side.
+    """
+    usual, places = "", {}
+    for part in filter(None, (each.strip() for each in text.split(","))):
+        place, equals, side = (each.strip() for each in part.rpartition("="))
+        name, _, line = place.rpartition(":")
+        if side not in (ABOVE, BELOW) or (equals and not (name and line.isdecimal())):
+            raise ParameterError(
+                f"side = {quoted(part)}: write 'above' or 'below', or name operations by file and "
+                "line, for instance 'valve.py:42=below, above'"
+            )
+        if equals:
+            places[place.replace("\\", "/")] = side
+        else:
+            usual = side
+    return Sides(usual, MappingProxyType(places))
+
+
+_STATED: ContextVar[Sides] = ContextVar("sides", default=Sides())  # noqa: B039  # frozen
+
+
+@contextmanager
+def taking(side: str) -> Iterator[None]:
+    """Take a side of every corner in linear models that are made within; see `read_sides`.
+
+    An empty text keeps what is stated around.
+    """
+    if not side:
+        yield
+        return
+    token = _STATED.set(read_sides(side))
+    try:
+        yield
+    finally:
+        _STATED.reset(token)
+
+
+@dataclass(frozen=True, eq=False)
+class Jacobians:
+    """What is linearized, as numbers at one point.
+
+    Parameters
+    ----------
+    slopes
+        By the free signals, times their usual magnitudes, shape (rows, free).
+    values
+        Rates, outputs and renewed memory, shape (rows,).
+    names
+        Of the rows: a state, ``NAME[k]`` of the memory; empty for an output.
+    """
+
+    slopes: Array
+    values: Array
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Linearization:
+    """A linear model that is made at an operating point, or anywhere near it.
+
+    Parameters
+    ----------
+    point
+        Operating point.
+    free
+        Which of state, memory and stimulus, in a row, the model lets move.
+    jacobians
+        Its numbers at a point.
+    models
+        The linear models at a point.
+    outputs, ticks
+        Whether outputs, and controllers, are part of it.
+    """
+
+    point: SmoothPoint
+    free: NDArray[np.bool_]
+    jacobians: Callable[[SmoothPoint], Jacobians]
+    models: Callable[[SmoothPoint], tuple[LinearModel, ...]]
+    outputs: bool
+    ticks: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Kink:
+    """An operation near its corner.
+
+    Parameters
+    ----------
+    place, source
+        ``"FILE:LINE"``, and what is written there.
+    excess
+        What is tested: above the corner where it is positive.
+    slope
+        Of the excess by the free signals, in their usual magnitudes.
+    corner
+        Value of both arguments at the corner.
+    order
+        Number in the order in which operations with a corner are computed.
+    """
+
+    place: str
+    source: str
+    excess: float
+    slope: Array
+    corner: float
+    order: int
+
+    @property
+    def side(self) -> str:
+        """On which side of its corner the operation is."""
+        return ABOVE if self.excess > 0.0 else BELOW
+
+
+def magnitudes(point: SmoothPoint) -> Array:
+    """Return what state, memory and stimulus, in a row, are displaced by, over `REACH`.
+
+    Usual magnitudes, or the values where they are larger; of a sliding velocity so little that its
+    direction, which says on which side it is, stays.
+    """
+    model = point.model
+    known = [*map(signals_of, (model.State, model.Memory, model.Stimulus))]
+    nominal = [abs(each.nominal) for signals in known for each in signals.values()]
+    values = np.abs(np.concatenate([point.state, point.memory, point.stimulus]))
+    usual = np.maximum(nominal, values)
+    for name, direction in zip(model.frictions, point.directions, strict=True):
+        if direction:
+            k = model.State._fields.index(name)
+            usual[k] = min(usual[k], 0.5 * values[k] / REACH)
+    return usual
+
+
+def beside_point(point: SmoothPoint, free: NDArray[np.bool_]) -> Array:
+    """Return how far state, memory and stimulus are displaced to be beside corners, in a row."""
+    by = np.zeros(free.size)
+    by[free] = REACH * _generic(int(free.sum()))[0] * magnitudes(point)[free]
+    return by
+
+
+def _generic(count: int) -> Array:
+    """Return two directions in which no corner lies by chance, shape (2, count)."""
+    rng = np.random.default_rng(20)
+    return np.asarray(rng.uniform(0.5, 1.0, (2, count)) * rng.choice([-1.0, 1.0], (2, count)))
+
+
+def kinks_at(
+    point: SmoothPoint, free: NDArray[np.bool_], usual: Array, *, outputs: bool, ticks: bool
+) -> list[Kink]:
+    """Return the operations with a corner that a point's free signals can move to it.
+
+    Parameters
+    ----------
+    point, free, outputs, ticks
+        As of `Linearization`.
+    usual
+        See `magnitudes`.
+
+    Returns
+    -------
+    list
+        In the order in which they are computed; none of equations that take no other numbers.
+    """
+    values = np.concatenate([point.state, point.memory, point.stimulus])
+    watch = _Watch()
+    pairs = zip(values, np.diag(usual)[:, free], strict=True)
+    numbers = [_Number(value, row, watch) for value, row in pairs]
+    try:
+        _evaluate(point, numbers, outputs, ticks)
+    except (TypeError, ValueError, ArithmeticError, AttributeError):
+        return []
+    return watch.kinks
+
+
+def _evaluate(point: SmoothPoint, numbers: list[Any], outputs: bool, ticks: bool) -> None:
+    """Evaluate everything that is linearized."""
+    model, par = point.model, point.par
+    n, m = point.state.size, point.memory.size
+    x = cast(Any, model.State)(*numbers[:n])
+    held = cast(Any, model.Memory)(*numbers[n : n + m])
+    stimulus = cast(Any, model.Stimulus)(*numbers[n + m :])
+    gaps = [d for group in model.gap(x, x, par) for d in group]
+    contact = tuple(sum(k * d for k, d in zip(row, gaps, strict=True)) for row in point.K)
+    equations(
+        model, par, (x, held), contact, point.directions, point.moving, outputs=outputs
+    )
+    for task in model.tasks(par) if ticks else ():
+        task.tick(x, held, stimulus, par)
+
+
+def _size(slope: Array) -> float:
+    return float(np.abs(slope).sum())
+
+
+def linear_models(of: Linearization) -> tuple[LinearModel, ...]:
+    """Return the linear models at an operating point, on the stated side of its corners.
+
+    Raises
+    ------
+    CornerError
+        When the point lies on a corner whose sides have different models, and no side is stated.
+    """
+    corner = _Corner(of)
+    return corner.models() if corner.is_near() else of.models(of.point)
+
+
+class _Corner:
+    """Search for the corners at an operating point; directions are those of the free signals."""
+
+    def __init__(self, of: Linearization) -> None:
+        self.of = of
+        self.usual = magnitudes(of.point)[of.free]
+        generic = _generic(int(of.free.sum()))
+        self.generic = [*generic, *-generic]
+        self.known: dict[tuple[bytes, float], Jacobians] = {}
+
+    def moved(self, direction: Array, share: float = 1.0) -> SmoothPoint:
+        """Return the point beside the operating point."""
+        by = np.zeros(self.of.free.size)
+        by[self.of.free] = share * REACH * direction * self.usual
+        return self.of.point.moved(by)
+
+    def jacobians(self, direction: Array, share: float = 1.0) -> Jacobians:
+        key = (direction.tobytes(), share)
+        if key not in self.known:
+            self.known[key] = self.of.jacobians(self.moved(direction, share))
+        return self.known[key]
+
+    def is_near(self) -> bool:
+        """Return whether anything breaks between the point and its surroundings."""
+        here = np.zeros(self.usual.size)
+        if not here.size:
+            return False
+        first, _, opposite, _ = self.generic
+        return self.breaks(first, opposite) or self.breaks(first, here)
+
+    def breaks(self, one: Array, other: Array) -> bool:
+        """Return whether slopes differ between two directions however near, or values jump."""
+        a, b = self.jacobians(one), self.jacobians(other)
+        if not (np.isfinite(a.slopes).all() and np.isfinite(b.slopes).all()):
+            return True
+        if self.jumps(a, b):
+            return True
+        apart = np.abs(a.slopes - b.slopes)
+        size = np.maximum(np.abs(a.slopes), np.abs(b.slopes))
+        seen = apart > np.maximum(_SAME * size, _SMALL * size.max(axis=1, keepdims=True))
+        if not seen.any():
+            return False
+        near, far = self.jacobians(one, _FINER), self.jacobians(other, _FINER)
+        return bool((np.abs(near.slopes - far.slopes) > 0.5 * apart)[seen].any())
+
+    def jumps(self, a: Jacobians, b: Jacobians) -> tuple[str, ...]:
+        """Return the names of the rows whose values jump between two points."""
+        slopes = np.maximum(np.abs(a.slopes), np.abs(b.slopes)).sum(axis=1)
+        rounding = 1e-12 * np.maximum(np.abs(a.values), np.abs(b.values))
+        jump = np.abs(a.values - b.values) > 4.0 * REACH * slopes + rounding
+        return tuple(a.names[k] or "an output" for k in np.flatnonzero(jump))
+
+    def models(self) -> tuple[LinearModel, ...]:
+        """Return the models of the stated side, or those of all sides where they agree."""
+        sides, found = _STATED.get(), {}
+        for direction in self.generic:
+            found |= {each.place: each for each in self.kinks(direction)}
+        if not found:
+            return self.agreed()
+        unsaid = [each for each in found.values() if not sides.of(each.place)]
+        if unsaid:
+            raise CornerError(self.refusal(unsaid))
+        return self.taken(sides)
+
+    def agreed(self) -> tuple[LinearModel, ...]:
+        """Return the model that all sides have in common."""
+        first, *others = (self.of.models(self.moved(each)) for each in self.generic)
+        finite = all(np.isfinite(model.A).all() and np.isfinite(model.D).all() for model in first)
+        if not finite or any(_differ(first, each) for each in others):
+            raise CornerError(self.refusal(()))
+        here = self.of.jacobians(self.of.point)
+        at = self.of.models(self.of.point) if np.isfinite(here.slopes).all() else None
+        return first if at is None or _differ(first, at) else at
+
+    def taken(self, sides: Sides) -> tuple[LinearModel, ...]:
+        """Return the models on the stated sides; of corners that exclude each other, the first."""
+        rows: dict[tuple[str, int], tuple[Array, float, float]] = {}
+        direction = self.generic[0]
+        for _ in range(_TURNS):
+            kinks = self.kinks(direction)
+            wrong = [each for each in kinks if each.side != sides.of(each.place)]
+            if not wrong:
+                break
+            for each in kinks:
+                sign = 1.0 if sides.of(each.place) == ABOVE else -1.0
+                rows[(each.place, each.order)] = (each.slope, sign, self.offset(each, direction))
+            moved = _direction([*rows.values()], self.generic[0])
+            if np.array_equal(moved, direction):
+                break
+            direction = moved
+        kinks = self.kinks(direction)
+        texts = tuple(dict.fromkeys(f"{each.side} the corner of {each.place}" for each in kinks))
+        return tuple(
+            replace(model, corners=texts) for model in self.of.models(self.moved(direction))
+        )
+
+    def kinks(self, direction: Array) -> list[Kink]:
+        """Return the operations whose corner, crossed near a direction, changes the models."""
+        known: dict[bytes, bool] = {}
+        return [each for each in self.near(direction) if self._matters(each, direction, known)]
+
+    def _matters(self, kink: Kink, direction: Array, known: dict[bytes, bool]) -> bool:
+        """Return `matters`, which is one for all operations that test the same quantity."""
+        c = kink.slope / kink.slope[np.abs(kink.slope).argmax()]
+        key = c.round(9).tobytes()
+        if key not in known:
+            known[key] = self.matters(kink, direction)
+        return known[key]
+
+    def matters(self, kink: Kink, direction: Array) -> bool:
+        """Return whether the two sides of an operation's corner have different models."""
+        largest = np.abs(kink.slope).max()
+        c = kink.slope / largest
+        missing = c @ direction + self.offset(kink, direction) / largest
+        along = direction - c * missing / (c @ c)  # right on the corner
+        one, other = along + _ACROSS * c, along - _ACROSS * c
+        if not self.breaks(one, other):
+            return False
+        above, below = (self.of.models(self.moved(each)) for each in (one, other))
+        if _differ(above, below):
+            return True
+        jumping = self.jumps(self.jacobians(one), self.jacobians(other))
+        felt = {name for model in above for name in _felt(model)}
+        return any(name in felt or name == "an output" for name in jumping)
+
+    def near(self, direction: Array) -> list[Kink]:
+        """Return the operations with a corner near the point, as a displaced point shows them."""
+        usual = magnitudes(self.of.point)
+        kinks = kinks_at(
+            self.moved(direction), self.of.free, usual,
+            outputs=self.of.outputs, ticks=self.of.ticks,
+        )
+        return [
+            each for each in kinks if abs(self.offset(each, direction)) <= _size(each.slope)
+        ]
+
+    def offset(self, kink: Kink, direction: Array) -> float:
+        """Return the excess at the operating point itself, over the reach."""
+        return kink.excess / REACH - float(kink.slope @ direction)
+
+    def refusal(self, kinks: Sequence[Kink]) -> str:
+        name = self.of.point.model.name
+        if not kinks:
+            return (
+                f"{name}: the equations have no single finite slope at the operating point, and "
+                "no operation could be named: choose another point"
+            )
+        places = "; ".join(
+            f"{each.place}, {quoted(each.source)} (corner at {each.corner:.6g}, SI)"
+            for each in kinks
+        )
+        return (
+            f"{name}: the operating point lies on a corner, and the linear models of its sides "
+            f"differ: {places}. Choose another operating point, or take a side: "
+            f"--side above, --side below, or --side {kinks[0].place}=above"
+        )
+
+
+def _direction(rows: Sequence[tuple[Array, float, float]], generic: Array) -> Array:
+    """Return a direction in which excesses have their signs; the first ones, where not all can."""
+    from scipy.optimize import linprog
+
+    n, kept = generic.size, np.zeros((0, generic.size))
+    offsets, best = np.zeros(0), generic
+    for slope, sign, offset in rows:
+        tried = np.vstack([kept, sign * slope / _size(slope)])
+        beyond = np.append(offsets, sign * offset / _size(slope))
+        limits = np.hstack([-tried, np.ones((len(tried), 1))])
+        cost = np.zeros(n + 1)
+        cost[-1] = -1.0
+        answer = linprog(cost, limits, beyond, bounds=[(-1.0, 1.0)] * (n + 1))
+        least = -answer.fun if answer.success else 0.0
+        if least > 1e-6:
+            # A little of the generic one, so that no other corner is met by chance.
+            best = answer.x[:n] + 0.3 * min(least, 1.0) * generic
+            kept, offsets = tried, beyond
+    return np.asarray(best)
+
+
+def _differ(ones: Sequence[LinearModel], others: Sequence[LinearModel]) -> bool:
+    return any(_unlike(*pair) for pair in zip(ones, others, strict=True))
+
+
+def _unlike(one: LinearModel, other: LinearModel) -> bool:
+    """Return whether two models answer differently, or have other poles where nothing answers."""
+    if not one.inputs or not one.outputs:
+        entries = ((one.A, other.A), (one.B, other.B))
+        return not all(np.allclose(a, b, _EQUAL, 0.0) for a, b in entries)
+    rates = np.abs(np.concatenate([one.poles(), other.poles()]))
+    if one.period:
+        highest = one.nyquist
+        lowest = 1e-5 * highest
+    else:
+        moving = rates[(rates > 0.0) & np.isfinite(rates)] / (2.0 * np.pi)
+        highest, lowest = (moving.max() * 10.0, moving.min() / 10.0) if moving.size else (1.0, 1e-3)
+    f = np.geomspace(lowest, highest, _FREQUENCIES) * 0.997
+    a, b = one.response(f), other.response(f)
+    size = np.maximum(np.abs(a), np.abs(b))
+    rounding = 1e-10 * size.max(axis=0, keepdims=True)
+    return not bool(np.all(np.abs(a - b) <= _EQUAL * size + rounding))
+
+
+def _felt(model: LinearModel) -> tuple[str, ...]:
+    """Return the states that an output feels, sooner or later; all where there is no output."""
+    if not model.outputs:
+        return model.states
+    reached = model.C.any(axis=0)
+    for _ in model.states:
+        reached = reached | (model.A[reached] != 0.0).any(axis=0)
+    return tuple(name for name, kept in zip(model.states, reached, strict=True) if kept)
+
+
+class _Watch:
+    """Operations with a corner, in the order in which they are computed."""
+
+    def __init__(self) -> None:
+        self.kinks: list[Kink] = []
+        self.count = 0
+
+    def see(self, excess: float, slope: Array, corner: float) -> None:
+        """Note an operation whose corner can be reached."""
+        self.count += 1
+        if np.isfinite(slope).all() and slope.any():
+            self.kinks.append(Kink(*_place(), excess, slope, corner, self.count))
+
+
+def _place() -> tuple[str, str]:
+    """Return the line outside elementary functions that computes, and what is written there."""
+    frame = sys._getframe(2)
+    while frame.f_back and frame.f_code.co_filename in (__file__, _OPS_FILE):
+        frame = frame.f_back
+    name, line = frame.f_code.co_filename, frame.f_lineno
+    return f"{_shown_file(name)}:{line}", linecache.getline(name, line).strip()
+
+
+@lru_cache(maxsize=1024)
+def _shown_file(name: str) -> str:
+    path = Path(name)
+    package = Path(bywire.__file__).parent.parent
+    for folder in (Path.cwd(), package):
+        if path.is_relative_to(folder) and "site-packages" not in path.relative_to(folder).parts:
+            path = path.relative_to(folder)
+            break
+    return path.as_posix()
+
+
+class _Number:
+    """A number with its slopes by the free signals."""
+
+    __slots__ = ("slope", "value", "watch")
+    __array_ufunc__ = None  # NumPy's scalars hand operations over to this class
+
+    def __init__(self, value: float, slope: Array, watch: _Watch) -> None:
+        self.value, self.slope, self.watch = float(value), slope, watch
+
+    def _chain(self, value: float, factor: float) -> _Number:
+        return _Number(value, factor * self.slope, self.watch)
+
+    def __add__(self, other: Any) -> _Number:
+        return _Number(self.value + _value(other), self.slope + _slope(other), self.watch)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> _Number:
+        return _Number(self.value - _value(other), self.slope - _slope(other), self.watch)
+
+    def __rsub__(self, other: Any) -> _Number:
+        return -(self - other)
+
+    def __mul__(self, other: Any) -> _Number:
+        b = _value(other)
+        return _Number(self.value * b, b * self.slope + self.value * _slope(other), self.watch)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> _Number:
+        b = _value(other)
+        ratio = _divided(self.value, b)
+        slope = (self.slope - ratio * _slope(other)) * _divided(1.0, b)
+        return _Number(ratio, slope, self.watch)
+
+    def __rtruediv__(self, other: Any) -> _Number:
+        ratio = _divided(_value(other), self.value)
+        return _Number(ratio, -ratio * _divided(1.0, self.value) * self.slope, self.watch)
+
+    def __pow__(self, exponent: Any) -> _Number:
+        if isinstance(exponent, _Number):
+            return cast(_Number, ops.exp(exponent * ops.log(self)))  # type: ignore[operator, arg-type]
+        if exponent != int(exponent):
+            self.watch.see(self.value, self.slope, 0.0)
+        with np.errstate(all="ignore"):
+            value = float(np.float64(self.value) ** exponent)
+            factor = float(exponent * np.float64(self.value) ** (exponent - 1)) if exponent else 0.0
+        return self._chain(value, factor)
+
+    def __rpow__(self, base: Any) -> _Number:
+        return cast(_Number, ops.exp(self * ops.log(base)))  # type: ignore[operator, arg-type]
+
+    def __neg__(self) -> _Number:
+        return self._chain(-self.value, -1.0)
+
+    def __pos__(self) -> _Number:
+        return self
+
+    def __abs__(self) -> _Number:
+        self.watch.see(self.value, self.slope, 0.0)
+        return self._chain(abs(self.value), 1.0 if self.value > 0.0 else -1.0)
+
+    def __floordiv__(self, other: Any) -> _Number:
+        return cast(_Number, self / other)._floor()
+
+    def __mod__(self, other: Any) -> _Number:
+        return self - other * (self // other)
+
+    def __lt__(self, other: Any) -> _Choice:
+        return self._compared(operator.lt, other)
+
+    def __le__(self, other: Any) -> _Choice:
+        return self._compared(operator.le, other)
+
+    def __gt__(self, other: Any) -> _Choice:
+        return self._compared(operator.gt, other)
+
+    def __ge__(self, other: Any) -> _Choice:
+        return self._compared(operator.ge, other)
+
+    def __eq__(self, other: object) -> _Choice:  # type: ignore[override]
+        return self._compared(operator.eq, other)
+
+    def __ne__(self, other: object) -> _Choice:  # type: ignore[override]
+        return self._compared(operator.ne, other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def _compared(self, compare: Callable[[float, float], bool], other: Any) -> _Choice:
+        self._seen_beside(other)
+        return _Choice(compare(self.value, _value(other)))
+
+    def _seen_beside(self, other: Any) -> None:
+        excess, slope = self.value - _value(other), self.slope - _slope(other)
+        self.watch.see(excess, slope, _value(other))
+
+    def _floor(self) -> _Number:
+        nearest = float(round(self.value))
+        self.watch.see(self.value - nearest, self.slope, nearest)
+        return self._chain(float(np.floor(self.value)), 0.0)
+
+    def _bywire_op(self, name: str, *args: Any) -> Any:
+        if name in ("fmin", "fmax"):
+            x, y = args
+            if not isinstance(x, _Number):
+                x = _Number(x, np.zeros_like(self.slope), self.watch)
+            x._seen_beside(y)
+            return x if (x.value < _value(y)) == (name == "fmin") else _as_number(y, x)
+        if name == "where":
+            return args[1] if args[0] else args[2]  # a condition that is a plain number
+        if name == "fabs":
+            return abs(self)
+        if name == "floor":
+            return self._floor()
+        if name == "power":
+            return args[0] ** args[1]
+        a = self.value
+        with np.errstate(all="ignore"):
+            if name == "sqrt":
+                self.watch.see(a, self.slope, 0.0)
+                root = float(np.sqrt(a))
+                return self._chain(root, _divided(0.5, root))
+            if name == "log":
+                return self._chain(float(np.log(a)), _divided(1.0, a))
+        if name == "exp":
+            value = elementary.exp(a)
+            return self._chain(value, value)
+        if name == "sin":
+            return self._chain(elementary.sin(a), elementary.cos(a))
+        if name == "cos":
+            return self._chain(elementary.cos(a), -elementary.sin(a))
+        if name == "arctan":
+            return self._chain(float(np.arctan(a)), 1.0 / (1.0 + a * a))
+        raise TypeError(f"ops.{name} has no slope: give it one in _Number._bywire_op")
+
+
+class _Choice:
+    """Outcome of a comparison: chooses in ``ops.where``, refuses to steer an ``if``."""
+
+    def __init__(self, holds: bool) -> None:
+        self.holds = bool(holds)
+
+    def __bool__(self) -> bool:
+        raise TypeError("the flow of an equation must not hang on a value: use ops.where")
+
+    def __and__(self, other: Any) -> _Choice:
+        return _Choice(self.holds and _holds(other))
+
+    def __or__(self, other: Any) -> _Choice:
+        return _Choice(self.holds or _holds(other))
+
+    __rand__, __ror__ = __and__, __or__
+
+    def __invert__(self) -> _Choice:
+        return _Choice(not self.holds)
+
+    def _bywire_op(self, name: str, *args: Any) -> Any:
+        return args[1] if self.holds else args[2]
+
+
+def _holds(value: Any) -> bool:
+    return value.holds if isinstance(value, _Choice) else bool(value)
+
+
+def _value(number: Any) -> float:
+    return number.value if isinstance(number, _Number) else float(number)
+
+
+def _slope(number: Any) -> Any:
+    return number.slope if isinstance(number, _Number) else 0.0
+
+
+def _as_number(value: Any, like: _Number) -> _Number:
+    if isinstance(value, _Number):
+        return value
+    return _Number(value, np.zeros_like(like.slope), like.watch)
+
+
+def _divided(a: float, b: float) -> float:
+    with np.errstate(all="ignore"):
+        return float(np.float64(a) / np.float64(b))

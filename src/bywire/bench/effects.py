@@ -1,0 +1,214 @@
+"""Parameters that a choice switches off: changing them would change nothing."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bywire.bench.experiment import Case, FaultyCase
+from bywire.core.errors import BywireError, ParameterError
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
+from bywire.core.traced import Traced
+from bywire.core.units import shown
+from bywire.simulation.engine import structure_of
+
+_TIMES = 101  # at which stimuli are compared
+_KNOWN: dict[tuple[object, ...], frozenset[str] | None] = {}
+
+
+@dataclass(frozen=True)
+class Switch:
+    """A choice that switches a parameter off.
+
+    Parameters
+    ----------
+    name, value
+        The choice, and what it is.
+    others
+        Values with which the parameter would have an effect.
+    """
+
+    name: str
+    value: Any
+    others: tuple[Any, ...]
+
+    @property
+    def hint(self) -> str:
+        """What switches the parameter on."""
+        return f"set {self.name} = {' or '.join(map(repr, self.others))}"
+
+
+def switches_of(name: str, cases: Sequence[Case]) -> list[Switch]:
+    """Return the choices that switch a parameter off in all runs of an experiment.
+
+    Only equations are looked at: whether the equations of some run read the parameter, and whether
+    they would with another value of a choice that stands beside the parameter or above it. Where
+    equations cannot be traced, nothing is said.
+
+    Parameters
+    ----------
+    name
+        Number or table of the parameters.
+    cases
+        Runs of the experiment.
+    """
+    pairs = [(case.model, par) for case in cases for par in _parameters(case)]
+    if not pairs or any(_is_read(name, model, par) for model, par in pairs):
+        return []
+    switches = []
+    model, par = pairs[0]
+    groups = name.split(".")[:-1]
+    above = {".".join((*groups[:k], "")) for k in range(1, len(groups) + 1)}
+    for choice in choice_fields(type(par)):
+        if choice[: choice.rfind(".") + 1] not in above:
+            continue
+        value = par.value(choice)
+        others = [other for other in choices_of(type(par), choice) if other != value]
+        read = tuple(each for each in others if _is_read_with(name, model, par, choice, each))
+        if read:
+            switches.append(Switch(choice, value, read))
+    return switches
+
+
+def refuse_without_effect(
+    name: str, value: Any, switches: Sequence[Switch], par: ParameterSet
+) -> None:
+    """Raise ParameterError for a parameter that choices switch off, if any do."""
+    if not switches:
+        return
+    leaf = leaf_fields(type(par)).get(name)
+    text = shown(value, leaf.unit.symbol) if leaf and isinstance(value, float) else repr(value)
+    off = " and ".join(f"{each.name} = {each.value!r}" for each in switches)
+    on = ", or ".join(each.hint for each in switches)
+    raise ParameterError(
+        f"{name} = {text} would have no effect, as {off}: {on} too, or leave {name} out"
+    )
+
+
+def are_alike(cases: Sequence[Case], others: Sequence[Case]) -> bool:
+    """Return whether runs begin, are driven and last alike."""
+    return len(cases) == len(others) and all(map(_is_alike, cases, others))
+
+
+def _is_alike(case: Case, other: Case) -> bool:
+    plans = [(c.duration, c.settle, c.keep, c.record) for c in (case, other)]
+    if plans[0] != plans[1] or type(case.model) is not type(other.model):
+        return False
+    begun = [np.array([*c.state, *c.memory], dtype=float) for c in (case, other)]
+    times = np.linspace(-case.settle, case.duration, _TIMES)
+    driven, also = case.stimulus(times), other.stimulus(times)
+    return (
+        np.array_equal(*begun, equal_nan=True)
+        and driven.keys() == also.keys()
+        and all(np.array_equal(driven[n], also[n], equal_nan=True) for n in driven)
+    )
+
+
+def _parameters(case: Case) -> Iterator[ParameterSet]:
+    """Yield the parameters of a run, and those that its faults leave."""
+    yield case.par
+    if isinstance(case, FaultyCase):
+        yield from (par for _, par in case.changes)
+
+
+def _is_read_with(name: str, model: Model, par: ParameterSet, choice: str, value: Any) -> bool:
+    try:
+        return _is_read(name, model, par.replace({choice: value}), False)
+    except BywireError:  # the others do not fit this value
+        return False
+
+
+def _is_read(name: str, model: Model, par: ParameterSet, unless_known: bool = True) -> bool:
+    """Return whether equations read a parameter; ``unless_known``: what holds where none can be."""
+    read = parameters_read(model, par)
+    if read is None:
+        return unless_known
+    return name in read or any(each.startswith(f"{name}.") for each in read)
+
+
+def parameters_read(model: Model, par: ParameterSet) -> frozenset[str] | None:
+    """Return the numbers that the equations and controllers of a model read with some choices.
+
+    Tables are spread, ``name.0``. None where the equations cannot be traced.
+    """
+    key = structure_of(model, par)
+    if key not in _KNOWN:
+        try:
+            _KNOWN[key] = _traced(model, par)
+        except (TypeError, ValueError, AttributeError, ArithmeticError, RecursionError):
+            _KNOWN[key] = None  # they ask what a number is, or hand it to what cannot be traced
+    return _KNOWN[key]
+
+
+def _traced(model: Any, par: ParameterSet) -> frozenset[str]:
+    leaves = {name: Traced(None, name) for name in par.leaves()}
+    here: Any = par.with_leaves(leaves)
+
+    def numbers(names: Iterable[Any]) -> tuple[Traced, ...]:
+        return tuple(Traced(None, None) for _ in names)
+
+    x, xe, rate = (model.State._make(numbers(model.State._fields)) for _ in range(3))
+    m, u, flow = (
+        kind._make(numbers(kind._fields)) for kind in (model.Memory, model.Stimulus, model.Flow)
+    )
+    groups = model.compliance(here)
+    contact = numbers(range(sum(map(len, groups))))
+    reaction = numbers((*model.frictions, *model.limits))
+    zeros = _Zeros()
+    mass, balance = model.mass(xe, here), model.balance(x, xe, m, here, contact)
+    results: tuple[Any, ...] = (
+        # What nothing drives stands still, whatever its mass.
+        tuple(each for each, force, name in zip(mass, balance, model.State._fields, strict=True)
+              if not zeros.has(force) or name in model.frictions),
+        balance,
+        model.bounds(x, xe, m, here, contact), groups, model.gap(x, xe, here),
+        model.powers(x, xe, rate, m, here, contact, reaction),
+        model.output(x, m, here, contact, reaction, flow),
+        tuple(task.tick(x, m, u, here) for task in model.tasks(par)),
+        tuple(task.period for task in model.tasks(here)),
+    )  # fmt: skip
+    return frozenset(_names_that_count(results, zeros)) & leaves.keys()
+
+
+class _Zeros:
+    """Which numbers are zero whatever they are computed from; kernels leave these out, too."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[bool, Any]] = {}  # with the number, whose identity it keeps
+
+    def has(self, value: Any) -> bool:
+        """Return whether a number is zero."""
+        if not isinstance(value, Traced):
+            return isinstance(value, (int, float)) and value == 0
+        if id(value) not in self._known:
+            self._known[id(value)] = self._judged(value), value
+        return self._known[id(value)][0]
+
+    def _judged(self, value: Traced) -> bool:
+        if value.operation is operator.mul:
+            return any(map(self.has, value.inputs))
+        if value.operation is operator.truediv:
+            return self.has(value.inputs[0])
+        sums = (operator.add, operator.sub, operator.neg)
+        return value.operation in sums and all(map(self.has, value.inputs))
+
+
+def _names_that_count(values: Any, zeros: _Zeros) -> Iterator[Any]:
+    """Yield the names that values are computed from, but for those of zeros."""
+    waiting, seen = [values], set()
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, Traced):
+            if id(each) in seen or zeros.has(each):
+                continue
+            seen.add(id(each))
+            if each.operation is None:
+                yield each.inputs[0]
+            waiting += each.inputs
+        elif isinstance(each, (tuple, list)):
+            waiting += each

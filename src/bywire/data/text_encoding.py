@@ -1,0 +1,130 @@
+"""How a text file writes its characters, and its bytes as UTF-8 whatever they are."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Iterator
+from pathlib import Path
+
+from bywire.core.errors import FileError
+
+ENCODINGS = (
+    "utf-8", "utf-16", "utf-16-le", "utf-16-be", "cp1252", "latin-1", "iso-8859-15", "cp1250",
+    "cp1251", "cp437", "cp850", "mac-roman", "shift_jis", "gbk", "euc-kr", "big5",
+)  # fmt: skip
+"""encodings of text files that a mapping may name"""
+
+_BLOCK = 1 << 22  # bytes that are read at a time
+_MARKS = {codecs.BOM_UTF8: "utf-8", codecs.BOM_UTF16_LE: "utf-16-le",
+          codecs.BOM_UTF16_BE: "utf-16-be"}  # fmt: skip
+_SHARE = 0.4  # of null bytes among every other one: text in two bytes for each character
+
+
+def encoding_of(head: bytes, named: str = "") -> str:
+    """Return how a file writes characters, by its first bytes.
+
+    Parameters
+    ----------
+    head
+        Its first bytes.
+    named
+        The encoding that the user names; a byte-order mark goes before it.
+
+    Examples
+    --------
+    >>> encoding_of("t;p".encode("utf-16")), encoding_of(b"t;p"), encoding_of(b"t;p", "cp1252")
+    ('utf-16-le', 'utf-8', 'cp1252')
+    """
+    for mark, encoding in _MARKS.items():
+        if head.startswith(mark):
+            return encoding
+    if named:
+        return "utf-16-le" if named == "utf-16" else named
+    for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        every_other, others = head[first::2], head[1 - first :: 2]
+        if every_other and every_other.count(0) > _SHARE * len(every_other) and 0 not in others:
+            return encoding
+    return "utf-8"
+
+
+def is_text(head: bytes) -> bool:
+    """Return whether the first bytes of a file are those of a text."""
+    return b"\0" not in head or encoding_of(head).startswith("utf-16")
+
+
+def blocks_of(path: Path, encoding: str, size: int = _BLOCK) -> Iterator[bytes]:
+    """Yield a text file as UTF-8, without a byte-order mark, block by block.
+
+    Raises
+    ------
+    FileError
+        When it is not text of this encoding, with the line; of UTF-8 only where it is decoded.
+    """
+    with path.open("rb") as stream:
+        head = stream.read(3)
+        mark = next((mark for mark in _MARKS if head.startswith(mark)), b"")
+        stream.seek(len(mark))
+        if encoding == "utf-8":
+            while block := stream.read(size):
+                yield block
+            return
+        decoder = codecs.getincrementaldecoder(encoding)()
+        lines = 0
+        while True:
+            block = stream.read(size)
+            try:
+                text = decoder.decode(block, final=not block)
+            except UnicodeDecodeError as error:
+                line = lines + 1 + block[: error.start].count(b"\n")
+                raise FileError(
+                    f"{path}, line {line}: it is not text in {encoding}: name the right encoding "
+                    "in the mapping, as encoding = 'cp1252'"
+                ) from None
+            lines += text.count("\n")
+            if text:
+                yield text.encode()
+            if not block:
+                return
+
+
+def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
+    """Return the first lines of a text file with their ends, its encoding, and whether it goes on.
+
+    Raises
+    ------
+    FileError
+        When they are not text in this encoding.
+    """
+    with path.open("rb") as stream:
+        encoding = encoding_of(stream.read(1024), named)
+    content = next(blocks_of(path, encoding, size), b"")
+    goes_on = path.stat().st_size > size
+    if goes_on:
+        content = content[: content.rfind(b"\n") + 1]
+        if not content:
+            raise FileError(f"{path}, line 1: it is longer than {size} bytes: is this a table?")
+    if b"\r" in content and b"\n" not in content:
+        raise FileError(f"{path}: its lines end with a bare carriage return: save it with LF ends")
+    raw = content.splitlines(keepends=True)
+    try:
+        return [line.decode() for line in raw], encoding, goes_on
+    except UnicodeDecodeError:
+        number = next(k for k, line in enumerate(raw, 1) if not _is_utf8(line))
+        raise not_utf8(path, number) from None
+
+
+def not_utf8(path: Path, line: int) -> FileError:
+    """Return the error for a line that is not UTF-8."""
+    return FileError(
+        f"{path}, line {line}: it is not UTF-8: name its encoding in a mapping, as "
+        "encoding = 'cp1252' (Windows) or 'latin-1', or save it as UTF-8 (in spreadsheets: "
+        "'CSV UTF-8')"
+    )
+
+
+def _is_utf8(line: bytes) -> bool:
+    try:
+        line.decode()
+    except UnicodeDecodeError:
+        return False
+    return True

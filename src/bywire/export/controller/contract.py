@@ -1,0 +1,157 @@
+"""What a step of an exported ECU takes and gives: inputs it accepts, and commands within limits.
+
+The step checks its inputs before the tick, its memory and its commands behind it. The laws
+themselves stay as their Python is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from bywire.core.errors import ModelError, place_of
+from bywire.core.model import Model, Task
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import limits_of, ranges_of
+from bywire.export.controller.c_text import c_name
+from bywire.export.controller.structs import Structs
+from bywire.export.controller.values import Expr, Group, Shape, Use
+from bywire.simulation.symbols import SX, scalars, symbol_tuple
+
+LARGEST = 1e15
+"""magnitude below which inputs, states and commands must lie, in their SI units: squares and
+products of such numbers stay numbers, in single precision too"""
+INPUT, RESULT = 1, 2
+"""what the status of a step says: an input was refused; the memory began anew"""
+
+
+@dataclass(frozen=True)
+class CheckedInput:
+    """A field of the plant (``x``) or of the stimulus (``u``) that a step checks.
+
+    Parameters
+    ----------
+    low, high
+        Admissible ends; infinite where the field declares none. `LARGEST` holds too.
+    """
+
+    kind: str
+    field: str
+    low: float
+    high: float
+
+    def accepts(self, value: float) -> bool:
+        """Return whether a step takes a value."""
+        return abs(value) < LARGEST and self.low <= value <= self.high
+
+
+@dataclass(frozen=True)
+class Command:
+    """A field of the memory that a step keeps within a limit.
+
+    Parameters
+    ----------
+    by
+        Name of the limit.
+    limit
+        The limit in C.
+    is_input
+        Whether the limit is a stimulus, which the command never exceeds; else it is a parameter,
+        which its magnitude never exceeds.
+    """
+
+    field: str
+    by: str
+    limit: Expr
+    is_input: bool
+
+
+def checked_inputs(model: Model, structs: Structs, uses: Iterable[Use]) -> list[CheckedInput]:
+    """Return the inputs that a step reads, in the order of the model."""
+    read = frozenset(uses)
+    found = []
+    for kind, cls in (("x", model.State), ("u", model.Stimulus)):
+        struct, ranges = structs.of_tuple(cls), ranges_of(cls)
+        for name in cls._fields:
+            if ("field", struct.name, name) in read:
+                found.append(CheckedInput(kind, name, *ranges.get(name, (-math.inf, math.inf))))
+    return found
+
+
+def commands(model: Model, renewed: Iterable[str], structs: Structs,
+             shape: Shape) -> list[Command]:  # fmt: skip
+    """Return the commands among the fields that a task renews, with their limits.
+
+    Raises
+    ------
+    ModelError
+        When a limit is neither a parameter nor a stimulus.
+    """
+    limits, found = limits_of(model.Memory), []
+    for name in renewed:
+        if name not in limits:
+            continue
+        by = limits[name].by
+        if by in model.Stimulus._fields:
+            held = structs.of_tuple(model.Stimulus).name
+            uses = frozenset({("field", held, by), ("local", "u"), ("own", "smaller")})
+            found.append(Command(name, by, Expr(f"u->{c_name(by)}", uses=uses), True))
+            continue
+        limit = _parameter(structs, shape, by)
+        if limit is None:
+            raise ModelError(
+                f"{place_of(model.Memory)}: {model.Memory.__qualname__}.{name} is limited by "
+                f"{by!r}, which is neither a parameter nor a stimulus: name one of them"
+            )
+        found.append(Command(name, by, limit, False))
+    return found
+
+
+def _parameter(structs: Structs, shape: Shape, dotted: str) -> Expr | None:
+    """Return a parameter in C, behind the pointer to all of them."""
+    group = Group(shape, Expr("par", uses=frozenset({("local", "par")})), pointer=True)
+    text, uses = "par", set(group.expr.uses)
+    *groups, last = dotted.split(".")
+    for depth, name in enumerate((*groups, last)):
+        kind: Any = shape.by_name.get(name)
+        if kind is None or isinstance(kind, Shape) != (depth < len(groups)):
+            return None
+        uses.add(("field", structs.of_group(shape).name, name))
+        text += f"{'.' if depth else '->'}{c_name(name)}"
+        shape = kind
+    return Expr(text, uses=frozenset(uses))
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a task does with the memory.
+
+    Parameters
+    ----------
+    renewed
+        Fields that it does not leave as they are, in the order of the memory.
+    read
+        Fields whose value before the tick something depends on.
+    """
+
+    renewed: tuple[str, ...]
+    read: frozenset[str]
+
+
+def held_by(model: Model, par: ParameterSet, task: Task) -> Held:
+    """Return what a task does with the memory, by a tick on symbols."""
+    leaves, fields = tuple(par.leaves()), model.Memory._fields
+    symbols = dict(zip(leaves, scalars(SX.sym("p", len(leaves))), strict=True))
+    x, m, u = (
+        symbol_tuple(cls, SX.sym("s", len(cls._fields)))
+        for cls in (model.State, model.Memory, model.Stimulus)
+    )
+    after = task.tick(x, m, u, par.with_leaves(symbols) if leaves else par)
+    renewed = tuple(n for n in fields if getattr(after, n) is not getattr(m, n))
+    depends = {hash(each) for name in renewed for each in ca.symvar(SX(getattr(after, name)))}
+    by_symbol = {hash(ca.symvar(SX(getattr(m, name)))[0]): name for name in fields}
+    return Held(renewed, frozenset(by_symbol[each] for each in depends if each in by_symbol))

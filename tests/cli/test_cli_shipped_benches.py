@@ -1,0 +1,44 @@
+"""Every command that takes a bench, on every bench file of the repository."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+BENCHES = Path(__file__).parents[2] / "benches"
+FILES = sorted(BENCHES.glob("*.toml"))
+COMMANDS = {
+    "run": ("run", "{bench}", "--no-error-estimate"),
+    "page": ("page", "{bench}", "--out", "{out}/page.html"),
+    "compare": ("compare", "{bench}", "{bench}", "--set", "parameters={parameters}"),
+    "wasm": ("export", "wasm", "{bench}", "--out", "{out}/wasm"),
+    "fmu": ("export", "fmu", "{bench}", "--out", "{out}/unit"),
+    "controller": ("export", "controller", "{bench}", "--out", "{out}/ecu", "--vectors", "8"),
+}
+QUICK = {("page", "pedal_tracking"), ("wasm", "hot_motor"), ("controller", "corner_wet_stop")}
+"""what is tried each time: tables among the parameters, faults from the start, an ECU of two"""
+
+
+@pytest.mark.parametrize(
+    ("command", "file"),
+    [
+        pytest.param(
+            c, f, marks=() if (c, f.stem) in QUICK else pytest.mark.trust, id=f"{c}-{f.stem}"
+        )
+        for c in COMMANDS
+        for f in FILES
+    ],
+)
+def test_a_command_takes_a_shipped_bench(bywire, tmp_path: Path, command: str, file: Path) -> None:
+    """It gives its result, or says in a line what this bench has that it cannot take."""
+    text = file.read_text(encoding="utf-8")
+    chosen = next(line for line in text.splitlines() if line.startswith("parameters"))
+    given = {"bench": file, "out": tmp_path, "parameters": chosen.split('"')[1]}
+    outcome = bywire(*(word.format(**given) for word in COMMANDS[command]))
+    assert "defect of bywire" not in outcome.err
+    if outcome.status == 2:
+        assert [line[:15] for line in outcome.lines if "error" in line] == ["bywire: error: "]
+        assert not [path for path in tmp_path.iterdir() if path.suffix == ".html"]
+    else:
+        assert outcome.status == 0, outcome.err
