@@ -38,6 +38,7 @@ _LISTS = (
 """environment variables that list folders with programs, libraries, headers and modules"""
 SAFE_PATH = "PYTHONSAFEPATH"
 """environment variable with which no interpreter looks for modules where it was started"""
+_WARNINGS, _SILENT_TRACKER = "PYTHONWARNINGS", "ignore:resource_tracker:UserWarning"
 _ROOT = str(Path(__file__).resolve().parents[2])
 _ELSEWHERE = sys.prefix
 """where children start: what runs this process stands there, and no folder of somebody else"""
@@ -82,17 +83,15 @@ def safe_start() -> Iterator[None]:
     """Have interpreters that are started within the block not look in the working folder.
 
     For `multiprocessing`, which starts workers, a server that forks, and a tracker of resources by
-    ``python -c``. Workers then take the path of this process. The tracker would complain on
-    standard error of what a killed command could not tidy up itself.
+    ``python -c``. Workers then take the path of this process.
     """
-    quiet = "ignore:resource_tracker:UserWarning"
-    further = {
-        SAFE_PATH: "1",
-        "PYTHONPATH": os.pathsep.join(import_path()),
-        "PYTHONWARNINGS": ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), quiet))),
-    }
-    before = {name: os.environ.get(name) for name in further}
-    os.environ.update(further)
+    changes = {
+        SAFE_PATH: "1", "PYTHONPATH": os.pathsep.join(import_path()),
+        # The tracker complains on standard error of what a killed command could not tidy up.
+        _WARNINGS: ",".join(filter(None, (os.environ.get(_WARNINGS), _SILENT_TRACKER))),
+    }  # fmt: skip
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update(changes)
     try:
         yield
     finally:
@@ -112,7 +111,8 @@ def find_program(name: str) -> str | None:
         found = shutil.which(name)
         return None if found is None else os.path.abspath(found)
     folders = trusted_folders(os.environ.get("PATH", os.defpath).split(os.pathsep))
-    return next(filter(None, (shutil.which(os.path.join(each, name)) for each in folders)), None)
+    found = (shutil.which(os.path.join(each, name)) for each in folders)
+    return next(filter(None, found), None)
 
 
 def environment(untrusted: Sequence[str | Path] = ()) -> dict[str, str]:
