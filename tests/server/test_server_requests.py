@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import random
+import signal
 import socket
+import subprocess
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
@@ -15,6 +17,7 @@ from urllib.parse import quote
 import pytest
 
 from bywire.core import scratch
+from bywire.core.child_process import environment, python_command
 from bywire.server import handler
 from bywire.server.address import HERE, NAMES
 from bywire.server.guard import require_place
@@ -220,3 +223,17 @@ def test_each_study_has_a_folder_of_its_own(tmp_path):
         folder.mkdir()
     assert folder_name("tol.toml") == "tol"
     assert safe_name("tol.toml") == "tol.toml"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("sign", [signal.SIGTERM, signal.SIGHUP])
+def test_a_terminated_server_leaves_no_temporary_names(tmp_path, sign):
+    (tmp_path / "curve.toml").write_text('experiment = "stribeck"\n')
+    command = python_command("-m", "bywire", "serve", str(tmp_path), "--port", "0")
+    with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE) as serving:
+        assert serving.stdout is not None
+        assert b"token=" in serving.stdout.readline()
+        assert [path for path in tmp_path.iterdir() if path.name[0] == "."]
+        serving.send_signal(sign)
+        assert serving.wait(30) == 130
+    assert [path.name for path in tmp_path.iterdir()] == ["curve.toml"]

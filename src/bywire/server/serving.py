@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -128,9 +130,25 @@ def serve(
     KeyboardInterrupt
         At the end; jobs have ended then, and temporary files are gone.
     """
-    with opened(subject, port=port, folder=folder) as it:
+    with _ended_as_by_ctrl_c(), opened(subject, port=port, folder=folder) as it:
         say(it.link)
         it.server.serve_forever()
+
+
+@contextmanager
+def _ended_as_by_ctrl_c() -> Iterator[None]:
+    """Have a termination, or a terminal that is closed, end a server as Ctrl-C does: tidied up."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    names = ("SIGTERM", "SIGHUP")
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    before = [(number, signal.signal(number, signal.default_int_handler)) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in before:
+            signal.signal(number, handler)
 
 
 def _asked(subject: str, folder: str) -> tuple[Place, str]:
