@@ -31,6 +31,7 @@ from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperime
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI, StimulusKind
 from bywire.campaigns.declared import CAMPAIGNS, DeclaredCampaign
+from bywire.core.arguments import checked
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.catalog import CitedSet as Set
 from bywire.core.errors import UnknownNameError, unknown_name
@@ -116,6 +117,7 @@ class Description(Answer):
         )
 
 
+@checked
 def describe(name: str) -> Description | Mentioned:
     """Return all about something of the list, a parameter, a group of them, or a signal.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
+from bywire.core.arguments import checked
 from bywire.core.brake import brakes, loaded_files
 from bywire.core.errors import ModelError, ParameterError
 from bywire.core.parameters import ParameterSet, require_units
@@ -14,6 +15,7 @@ from bywire.core.provenance import Cited, chosen
 from bywire.core.registry import Kind, instances
 
 
+@checked
 @dataclass(frozen=True)
 class CitedSet:
     """A named parameter set.
@@ -96,6 +98,7 @@ def sets_of_loaded() -> tuple[str, ...]:
     return tuple(name for module in loaded for name in PARAMETER_SETS.of(module))
 
 
+@checked
 def parameters(name: str) -> ParameterSet:
     """Return the parameters of a set, validated.
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from bywire.core.arguments import checked
+
 Kind = Literal["paper", "derived", "chosen", "calibrated"]
 
 
@@ -29,21 +31,25 @@ class Cited:
     where: str
 
 
+@checked
 def paper(value: Any, where: str) -> Cited:
     """Mark a value printed in the source."""
     return Cited(value, "paper", where)
 
 
+@checked
 def derived(value: Any, where: str) -> Cited:
     """Mark a value that follows from printed ones."""
     return Cited(value, "derived", where)
 
 
+@checked
 def chosen(value: Any, where: str) -> Cited:
     """Mark a value that is our choice, with its reason."""
     return Cited(value, "chosen", where)
 
 
+@checked
 def calibrated(value: Any, where: str) -> Cited:
     """Mark a value tuned to a statement of the source, with that statement."""
     return Cited(value, "calibrated", where)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 
+from bywire.core.arguments import checked
 from bywire.core.errors import ModelError, place_of
 
 T = TypeVar("T", bound=tuple[Any, ...])
@@ -171,6 +172,7 @@ def joined(module: str, name: str, *tuples: type[Any]) -> Any:
     return merged
 
 
+@checked
 def zeros(tuple_type: type[T]) -> T:
     """Return a signal tuple whose every field is 0.0."""
     return tuple_type(*(0.0 for _ in tuple_type._fields))  # type: ignore[attr-defined,arg-type]

@@ -18,6 +18,7 @@ import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.core.arguments import checked
 from bywire.core.errors import FileError, InputError, ParameterError, quoted
 from bywire.data.column_choice import Chosen, choose
 from bywire.data.file_format import Progress, ReadOptions, Source, no_progress
@@ -29,6 +30,7 @@ from bywire.data.room import require_room, room
 from bywire.data.time_axis import AxisKey, instants
 
 
+@checked
 def read_measurement(
     path: str | Path,
     mapping: MeasurementMapping | Mapping[str, Any] | str | Path | None = None,

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.arguments import checked
 from bywire.core.errors import CompilerError, ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
@@ -87,6 +88,7 @@ class TangentKernel:
         self._run(pointer(p), ctypes.c_double(step), *(pointer(a) for a in rest))
 
 
+@checked
 def simulate_with_sensitivities(
     run: Run,
     parameters: Sequence[str],

@@ -14,6 +14,7 @@ from scipy.linalg import block_diag
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.smooth_functions import SmoothFunctions, smooth_functions, vector
+from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
@@ -24,6 +25,7 @@ Friction = Literal["removed", "sliding", "stuck"]
 _TOUCH = 1e-12  # overlap or gap [m] below which a contact counts as neither closed nor open
 
 
+@checked
 def linearize(
     model: Model,
     par: ParameterSet,

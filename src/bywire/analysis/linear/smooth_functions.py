@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, cast
 
-from bywire.core.model import Model
+from bywire.core.model import Model, require_states
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 from bywire.simulation.engine import structure_of
@@ -79,6 +79,7 @@ def _plant(
     """Return the function of rates and outputs and their Jacobians."""
     import casadi as ca
 
+    require_states(model)
     K = ca.SX.sym("K", gap.shape[0], gap.shape[0])
     s = ca.SX.sym("s", len(model.frictions))
     g = ca.SX.sym("g", len(model.frictions))
