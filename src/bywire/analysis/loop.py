@@ -15,6 +15,7 @@ from bywire.analysis.linear.open_loop import analog_gain, cut_open, open_loop
 from bywire.analysis.linear.sampled_system import sampled_models
 from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.analysis.response.saturation import Saturation
+from bywire.core.arguments import checked
 from bywire.core.errors import unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
@@ -53,6 +54,7 @@ class Point:
         )  # fmt: skip
 
 
+@checked
 @dataclass(frozen=True)
 class Quantity:
     """What an operating point is given by.
@@ -70,6 +72,7 @@ class Quantity:
     default: float
 
 
+@checked
 @dataclass(frozen=True)
 class Loop:
     """A control loop.

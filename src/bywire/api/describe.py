@@ -32,6 +32,7 @@ from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI, StimulusKind
 from bywire.campaigns.declared import CAMPAIGNS, DeclaredCampaign
 from bywire.contracts.elements import Element, elements_by_name, parameter_classes
+from bywire.core.arguments import checked
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.catalog import CitedSet as Set
 from bywire.core.errors import UnknownNameError, quoted, unknown_name
@@ -119,6 +120,7 @@ class Description(Answer):
         )
 
 
+@checked
 def describe(name: str) -> Description | Mentioned:
     """Return all about something of the list, a parameter, a group of them, or a signal.
 

@@ -93,6 +93,7 @@ class Identification(Answer):
         """The checks that failed, with their meaning."""
         return [
             f"check failed: {check.name}: {check.note}"
+            + (f"; next, {check.next_step}" if check.next_step else "")
             for check in self.identified.checks if not check.holds
         ]  # fmt: skip
 
@@ -242,7 +243,8 @@ class Identification(Answer):
             },
             "checks": [
                 {"name": c.name, "value": c.value, "unit": c.unit, "limit": c.limit,
-                 "at_least": c.at_least, "holds": c.holds, "note": c.note}
+                 "at_least": c.at_least, "holds": c.holds, "note": c.note,
+                 "next_step": c.next_step}
                 for c in identified.checks
             ],
             "notes": [*self.data_notes, *identified.notes],

@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from bywire.core.arguments import checked
 from bywire.core.brake import brakes
 from bywire.core.errors import FileError, ParameterError, quoted
 from bywire.core.scratch import scratch_folder
@@ -69,6 +70,7 @@ class NewBrake(Answer):
         }  # fmt: skip
 
 
+@checked
 def new(name: str, folder: str | Path = ".") -> NewBrake:
     """Write the package of a new brake, with tests, that passes ``bywire check``.
 

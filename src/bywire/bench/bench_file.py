@@ -17,6 +17,7 @@ from bywire.bench.relative_changes import is_relative, settled
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.bench.stimulus_sections import stimulus_sections
 from bywire.bench.values import parsed, require_unit, require_units
+from bywire.core.arguments import checked
 from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.data.file_kinds import BENCH, require_kind
@@ -30,6 +31,7 @@ _SIMULATION = ("step", "record", "seed", "engine")
 _TOO_LARGE = "; measured traces go into a file of their own (options.trace)"
 
 
+@checked
 def load(path: str | Path) -> Bench:
     """Read a bench file.
 

@@ -19,6 +19,7 @@ from bywire.bench.running import Progress, judged, recording_of, static_recordin
 from bywire.bench.side_by_side import rounds
 from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, abandoned, steps_of, unestimated
 from bywire.bench.varied_choices import choices_that_vary
+from bywire.core.arguments import checked
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.parameters import ParameterSet, leaf_fields
@@ -84,6 +85,7 @@ def simulate_ensemble(
 ) -> BenchEnsemble: ...  # fmt: skip
 
 
+@checked
 def simulate_ensemble(
     run: Run | Bench,
     variations: Variations,

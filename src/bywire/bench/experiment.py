@@ -16,6 +16,7 @@ from bywire.bench.experiment_summary import Summary, summary_of
 from bywire.bench.kpis import hysteresis, sine_sweep, step_response, tracking
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.noise import put_noise
+from bywire.core.arguments import checked
 from bywire.core.errors import StepError
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
@@ -260,6 +261,7 @@ class _Driven:
                 rows[:, k] = given[name]
 
 
+@checked
 def as_run(
     case: Case, step: float, interval: float | None = None, seed: tuple[int, ...] = (0,)
 ) -> Run:

@@ -8,9 +8,11 @@ from types import ModuleType
 from typing import Protocol, TypeVar
 
 from bywire.bench.bench import Bench
+from bywire.core.arguments import checked
 from bywire.core.registry import Kind, instances
 
 
+@checked
 @dataclass(frozen=True)
 class StatedLevel:
     """A level of a signal that a source states in its text or by the end of a figure's axis.
@@ -61,6 +63,7 @@ class StatedLevel:
         return (self.value,)
 
 
+@checked
 @dataclass(frozen=True)
 class StatedRange:
     """A range within which a source states a signal to be, for instance between a figure's axes.
@@ -88,6 +91,7 @@ class StatedRange:
         return self.low, self.high
 
 
+@checked
 @dataclass(frozen=True)
 class StatedFigure:
     """A key figure that a source states, shown beside ours.

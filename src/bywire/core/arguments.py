@@ -7,16 +7,45 @@ import operator
 import os
 import reprlib
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache
+from functools import cache, wraps
 from numbers import Real
-from typing import Any
+from types import UnionType
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 
 from bywire.core.errors import ParameterError, quoted
 
+F = TypeVar("F", bound=Callable[..., Any])
+_ONE = (str, bytes, Mapping)  # of what can be iterated over, what is no list
 _LINES = reprlib.Repr()
 _LINES.maxstring = _LINES.maxother = 60  # characters of a value in a message
+
+
+def checked(function: F) -> F:
+    """Have a function, or a data class, refuse arguments of another kind than its signature says.
+
+    Examples
+    --------
+    >>> @checked
+    ... def doubled(value: float) -> float:
+    ...     return 2.0 * value
+    >>> doubled("64")
+    Traceback (most recent call last):
+        ...
+    bywire.core.errors.ParameterError: value = '64': a number is wanted
+    """
+    if isinstance(function, type):
+        made: Any = function
+        made.__init__ = checked(made.__init__)
+        return function
+
+    @wraps(function)
+    def asked(*args: Any, **kwargs: Any) -> Any:
+        require_kinds(function, args, kwargs)
+        return function(*args, **kwargs)
+
+    return asked  # type: ignore[return-value]
 
 
 def require_kinds(
@@ -24,7 +53,7 @@ def require_kinds(
 ) -> None:
     """Refuse arguments that are of another kind than a function's signature says.
 
-    Ranges, names and units are for the function itself; so is whatever has a type of our own.
+    Ranges, names and units are for the function itself.
 
     Parameters
     ----------
@@ -49,9 +78,9 @@ def require_kinds(
     """
     names, wanted = _signature(function)
     for name, value in (*zip(names, args, strict=False), *kwargs.items()):
-        kinds = wanted.get(name, ())
-        if kinds and not any(_KINDS[kind][1](value) for kind in kinds):
-            said = " or ".join(_KINDS[kind][0] for kind in kinds if kind != "None")
+        kinds = wanted.get(name)
+        if kinds and not any(fits(value) for _, fits in kinds):
+            said = " or ".join(dict.fromkeys(text for text, _ in kinds if text))
             given = _LINES.repr(value)  # as Python has it, and not as a file
             raise ParameterError(f"{name} = {given}: {said} is wanted")
 
@@ -80,19 +109,71 @@ def whole_number(name: str, value: object, least: int, most: int) -> int:
     return operator.index(value)  # type: ignore[arg-type]
 
 
+_Wanted = tuple[str, Callable[[Any], bool]]
+
+
 @cache
-def _signature(function: Callable[..., Any]) -> tuple[list[str], dict[str, list[str]]]:
+def _signature(function: Callable[..., Any]) -> tuple[list[str], dict[str, list[_Wanted]]]:
     """Return the names of positional arguments, and the kinds of each that can be checked."""
     parameters = inspect.signature(function).parameters
     positional = [
         p.name for p in parameters.values()
         if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
     ]  # fmt: skip
+    known = getattr(inspect.unwrap(function), "__globals__", {})
     kinds = {
-        name: [part.partition("[")[0].strip() for part in str(p.annotation).split(" | ")]
+        name: [_kind(part.strip(), known) for part in _parts(str(p.annotation))]
         for name, p in parameters.items()
+        if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)
     }
-    return positional, {name: each for name, each in kinds.items() if {*each} <= {*_KINDS}}
+    return positional, {
+        name: [kind for kind in each if kind is not None]
+        for name, each in kinds.items() if None not in each
+    }  # fmt: skip
+
+
+def _parts(annotation: str) -> list[str]:
+    """Return what an annotation allows: the parts between bars that stand in no brackets.
+
+    Examples
+    --------
+    >>> _parts("Callable[[int | str], float] | None")
+    ['Callable[[int | str], float] ', ' None']
+    """
+    parts, depth = [""], 0
+    for sign in annotation:
+        depth += (sign in "[(") - (sign in "])")
+        if sign == "|" and not depth:
+            parts.append("")
+        else:
+            parts[-1] += sign
+    return parts
+
+
+def _kind(part: str, known: Mapping[str, Any]) -> _Wanted | None:
+    """Return words and test of a part of an annotation; None where anything may be meant.
+
+    Parameters
+    ----------
+    part
+        Name of a type, perhaps with what it holds in brackets.
+    known
+        What names mean where the function stands.
+    """
+    name = part.partition("[")[0]
+    if name in _KINDS:
+        return _KINDS[name]
+    meant = known.get(name)
+    if meant is None and name.startswith("xr."):
+        meant = getattr(known.get("xr"), name[3:], None)
+    kinds = get_args(meant) if isinstance(meant, UnionType) else (meant,)
+    if meant is Any or not all(isinstance(k, type) for k in kinds):
+        return None
+    if any(getattr(k, "_is_protocol", False) for k in kinds):
+        return None
+    names = [k.__name__ for k in kinds]
+    words = " or ".join(f"a{'n' if each[0] in 'AEIOU' else ''} {each}" for each in names)
+    return words, lambda value: isinstance(value, kinds)
 
 
 def _is_whole(value: object) -> bool:
@@ -101,6 +182,14 @@ def _is_whole(value: object) -> bool:
     except TypeError:
         return False
     return not isinstance(value, bool)
+
+
+def _are_numbers(value: object) -> bool:
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):
+        return False
+    return array.dtype.kind in "biufc"
 
 
 _KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
@@ -112,8 +201,12 @@ _KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "Mapping": ("a mapping of names to values", lambda v: isinstance(v, Mapping)),
     "Sequence": (
         "a list",
-        lambda v: isinstance(v, Iterable) and not isinstance(v, (str, bytes, Mapping)),
+        lambda v: isinstance(v, Iterable) and not isinstance(v, _ONE),
     ),
     "Progress": ("a function of a label and the finished share", callable),
+    "Callable": ("a function", callable),
+    "tuple": ("a tuple", lambda v: isinstance(v, Iterable) and not isinstance(v, _ONE)),
+    "type": ("a class", lambda v: isinstance(v, type)),
+    "Array": ("numbers", _are_numbers),
     "None": ("", lambda v: v is None),
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import traceback
 import warnings
+from difflib import get_close_matches
 
 from bywire.core.errors import BywireError
 
@@ -14,6 +15,9 @@ def said_with_line(error: BaseException, *inside: str) -> str:
     text = str(error) if isinstance(error, BywireError) else text
     if isinstance(error, SyntaxError) and error.filename:
         text = f"{type(error).__name__}: {error.msg}"
+    if isinstance(error, AttributeError) and error.name and error.obj is not None:
+        near = get_close_matches(error.name, dir(error.obj), n=1)
+        text += f": did you mean {near[0]!r}?" if near else ""
     if "truth value of a CasADi" in text:
         text = "an if, and, or, min or max on a number of the model: use bywire.core.ops.where"
     line = _innermost(error, *inside)

@@ -22,6 +22,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 
+from bywire.core.arguments import checked
 from bywire.core.author_lines import said_with_line, warn_at_line
 from bywire.core.errors import FileError, ModelError
 from bywire.core.unneeded import allow_dask
@@ -34,6 +35,7 @@ class BrakeWarning(UserWarning):
     """An installed brake that is left out."""
 
 
+@checked
 @dataclass(frozen=True)
 class Brake:
     """What makes a package or a file a brake.
@@ -145,6 +147,7 @@ def load_brakes(files: Iterable[str]) -> None:
         load_system(file)
 
 
+@checked
 def load_system(path: str | Path) -> Brake:
     """Load a brake from a file or a package, and have it known by its names from then on.
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
 
+from bywire.core.arguments import checked
 from bywire.core.brake import brakes, loaded_files
 from bywire.core.errors import ModelError, ParameterError
 from bywire.core.parameters import ParameterSet, require_units
@@ -17,6 +18,7 @@ from bywire.core.registry import Kind, instances
 _SAME = 1e-9  # of a derived value: rounding of its formula
 
 
+@checked
 @dataclass(frozen=True)
 class CitedSet:
     """A named parameter set.
@@ -184,6 +186,7 @@ def sets_of_loaded() -> tuple[str, ...]:
     return tuple(name for module in loaded for name in PARAMETER_SETS.of(module))
 
 
+@checked
 def parameters(name: str) -> ParameterSet:
     """Return the parameters of a set, validated.
 

@@ -111,8 +111,7 @@ def find_program(name: str) -> str | None:
         found = shutil.which(name)
         return None if found is None else os.path.abspath(found)
     folders = trusted_folders(os.environ.get("PATH", os.defpath).split(os.pathsep))
-    found = (shutil.which(os.path.join(each, name)) for each in folders)
-    return next(filter(None, found), None)
+    return next(filter(None, (shutil.which(os.path.join(each, name)) for each in folders)), None)
 
 
 def environment(untrusted: Sequence[str | Path] = ()) -> dict[str, str]:

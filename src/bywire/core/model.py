@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, NamedTuple, Protocol
 
+from bywire.core.errors import ModelError, place_of, unknown_name
 from bywire.core.registry import Kind
 from bywire.core.signals import zeros
 
@@ -221,11 +222,43 @@ class Model(Protocol):
         return range(len(pars))
 
 
+def require_states(model: Any) -> None:
+    """Refuse frictions and limits of a model that are none of its states.
+
+    Parameters
+    ----------
+    model
+        A model, or its class.
+
+    Raises
+    ------
+    ModelError
+        With the declaration, the name, and the nearest state.
+    """
+    fields = getattr(model.State, "_fields", None)
+    for kind in ("frictions", "limits") if fields is not None else ():
+        names = getattr(model, kind)
+        if isinstance(names, property):
+            continue
+        cls = model if isinstance(model, type) else type(model)
+        where = f"{place_of(cls)}: {model.name}: {kind}"
+        if not isinstance(names, tuple):
+            raise ModelError(
+                f"{where} = {names!r}: a tuple of states is wanted, "
+                f"as ({fields[0]!r},)"
+            )
+        for name in names:
+            if name not in fields:
+                error = unknown_name("state", str(name), fields)
+                raise ModelError(f"{where} names {name!r}, which is no field of State: {error}")
+
+
 def _declared(module: ModuleType) -> Iterator[type[Any]]:
     """Yield the complete models that a module defines."""
     for value in vars(module).values():
         defined = isinstance(value, type) and value.__module__ == module.__name__
         if defined and hasattr(value, "Memory") and hasattr(value, "balance"):
+            require_states(value)
             yield value
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
+from bywire.core.arguments import checked
 from bywire.core.errors import ModelError
 
 Kind = Literal["paper", "derived", "chosen", "calibrated"]
@@ -92,11 +93,13 @@ def _moved(place: str, moved: Mapping[str, str]) -> str:
     return place
 
 
+@checked
 def paper(value: Any, where: str) -> Cited:
     """Mark a value printed in the source."""
     return Cited(value, "paper", where)
 
 
+@checked
 def derived(value: Any, where: str) -> Cited:
     """Mark a value that follows from others.
 
@@ -114,11 +117,13 @@ def derived(value: Any, where: str) -> Cited:
     return Cited(value, "derived", where)
 
 
+@checked
 def chosen(value: Any, where: str) -> Cited:
     """Mark a value that is our choice, with its reason."""
     return Cited(value, "chosen", where)
 
 
+@checked
 def calibrated(value: Any, where: str) -> Cited:
     """Mark a value tuned to a statement of the source, with that statement."""
     return Cited(value, "calibrated", where)

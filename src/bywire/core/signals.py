@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 
 from annotated_types import Ge, Gt, Le, Lt
 
+from bywire.core.arguments import checked
 from bywire.core.errors import ModelError, place_of
 
 T = TypeVar("T", bound=tuple[Any, ...])
@@ -255,6 +256,7 @@ def joined(module: str, name: str, *tuples: type[Any]) -> Any:
     return merged
 
 
+@checked
 def zeros(tuple_type: type[T]) -> T:
     """Return a signal tuple whose every field is 0.0."""
     return tuple_type(*(0.0 for _ in tuple_type._fields))  # type: ignore[attr-defined,arg-type]

@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.core import units
+from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.data.channel_quality import (
     AlignedChannel,
@@ -37,6 +38,7 @@ class Aligned:
     report: AlignmentReport
 
 
+@checked
 def resample(
     measurement: xr.Dataset,
     interval: str | float,

@@ -19,6 +19,7 @@ import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.core.arguments import checked
 from bywire.core.errors import FileError, InputError, ParameterError, quoted
 from bywire.data.column_choice import Chosen, choose, left_out_note
 from bywire.data.file_format import Progress, ReadOptions, Source, no_progress
@@ -34,6 +35,7 @@ class MeasurementWarning(UserWarning):
     """What the user should know of how a measurement file was read."""
 
 
+@checked
 def read_measurement(
     path: str | Path,
     mapping: MeasurementMapping | Mapping[str, Any] | str | Path | None = None,

@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.core.arguments import checked
 from bywire.core.errors import FileError
 from bywire.core.interrupts import interrupts_deferred
 from bywire.core.scratch import replacing
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 _VALUES = 1 << 22  # that are handed over at a time
 
 
+@checked
 def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
     """Write a recording.
 
@@ -65,6 +67,7 @@ def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
     return path
 
 
+@checked
 def read_recording(path: str | Path) -> xr.Dataset:
     """Read a recording into memory.
 

@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from bywire.core.arguments import checked
 from bywire.core.errors import FileError, InputError
 from bywire.core.scratch import replacing
 from bywire.data.file_format import FileFormat, Progress, no_progress
 from bywire.data.format_registry import format_to_write
 
 
+@checked
 def write_measurement(
     dataset: xr.Dataset,
     path: str | Path,

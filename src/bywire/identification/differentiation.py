@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
+from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.identification.output_error import even_interval
@@ -73,6 +74,7 @@ def _centered(values: Array) -> Array:
     return np.convolve(padded, _HOLD, mode="valid")
 
 
+@checked
 def differentiated(
     data: xr.Dataset,
     signal: str,

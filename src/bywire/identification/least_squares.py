@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError, SolverError
 from bywire.core.typing import Array
 from bywire.identification.confidence import uncertainty
@@ -151,6 +152,7 @@ def _solved(problem: Problem, begin: Array, loss: Loss) -> Solution:
     return Solution(values, cost)
 
 
+@checked
 def estimate(
     problem: Problem, loss: Loss = "linear", start: Array | None = None, *, search: bool = True
 ) -> Estimate:

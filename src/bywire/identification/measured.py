@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError, UnitError, unknown_name
 from bywire.data.alignment import resample
 from bywire.data.channel_quality import AlignmentReport
@@ -43,6 +44,7 @@ class Measured:
     notes: tuple[str, ...]
 
 
+@checked
 def measured(
     sources: Sequence[str | Path | xr.Dataset],
     mapping: str | Path | None = None,
@@ -187,6 +189,7 @@ def _require_whole(data: xr.Dataset, where: str, gaps: bool) -> None:
             )
 
 
+@checked
 def wrong_sign(signal: str, other: str, evidence: str) -> ParameterError:
     """Return the refusal of two signals of which one has the wrong sign.
 

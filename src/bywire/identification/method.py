@@ -60,6 +60,8 @@ class Check:
         Whether the limit is a lower one.
     note
         What it means.
+    next_step
+        What to try next where it fails, with the words to type.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Check:
     limit: float | None = None
     at_least: bool = False
     note: str = ""
+    next_step: str = ""
 
     @property
     def holds(self) -> bool:

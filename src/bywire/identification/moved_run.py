@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.identification.unknown import Unknown
@@ -21,6 +22,7 @@ _SHIFT = 1e-6  # of an unknown's scale: for differences of the start
 _AFTERWARDS = ("initial.", "stimulus.")  # what no start depends on
 
 
+@checked
 def moved_run(run: Run, values: Mapping[str, float], start: Start | None = None) -> Run:
     """Return a run with unknowns changed.
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.arguments import checked
 from bywire.core.typing import Array
 from bywire.identification.confidence import autoregression, is_white
 from bywire.identification.estimate import Estimate
@@ -17,6 +18,7 @@ from bywire.identification.output_error import Trial
 _LEVEL = 1e-3  # of a false alarm
 
 
+@checked
 def lack_of_fit(
     name: str, residuals: Array, weights: Array, richer: Array, unknowns: int, note: str
 ) -> Check:
@@ -56,7 +58,11 @@ def lack_of_fit(
     # What a richer model bends is slow: there colored noise is larger than on the average.
     slow = 1.0 if is_white(rest) else autoregression(rest).at_zero_frequency / within
     value = float(e @ e - rest @ rest) / more / (within * max(slow, 1.0))
-    return Check(name, value, limit=float(special.fdtri(more, left, 1.0 - _LEVEL)), note=note)
+    return Check(
+        name, value, limit=float(special.fdtri(more, left, 1.0 - _LEVEL)), note=note,
+        next_step="see in the curve where it bends, and identify the part of the range that is "
+        "straight, or a law that bends",
+    )  # fmt: skip
 
 
 def by_output(

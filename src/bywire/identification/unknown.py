@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.typing import Array
@@ -64,6 +65,7 @@ class Unknown:
         return f"{self.trial}:{self.name}" if self.trial else self.name
 
 
+@checked
 def parameters_of(
     par: ParameterSet,
     names: Sequence[str],

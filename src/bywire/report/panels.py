@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bywire.core.arguments import checked
 from bywire.core.registry import Kind, instances
 from bywire.report.line_role import Role
 from bywire.report.wording import clean
@@ -20,6 +21,7 @@ _LINES = 2  # of a panel, set points apart: one look for each
 _LONGEST = 20  # characters along a low panel
 
 
+@checked
 @dataclass(frozen=True)
 class Trace:
     """A variable and what its line means."""
@@ -28,6 +30,7 @@ class Trace:
     role: Role = Role.MAIN
 
 
+@checked
 @dataclass(frozen=True)
 class Panel:
     """One panel of stacked time traces.
@@ -60,6 +63,7 @@ class Panel:
     height: float = 1.0
 
 
+@checked
 @dataclass(frozen=True)
 class Panels:
     """The panels of a brake, or of a rig.

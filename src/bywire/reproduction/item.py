@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from bywire.core.arguments import checked
+
 Tolerance = float | Literal["<=", ">="]
 Kind = Literal["printed", "reading", "axis", "requirement", "physical bound", "ours"]
 """what a statement is: a number in text, table or equation; a sentence that we put as a number;
@@ -108,6 +110,7 @@ class Item:
         return self.id.partition("@")[2]
 
 
+@checked
 def compared(
     name: str,
     fact: Fact,
@@ -141,6 +144,7 @@ def compared(
     return Item(name, fact.unit, fact.value, computed, tolerance, agrees, note, fact.kind)
 
 
+@checked
 def found(name: str, unit: str, computed: float, note: str) -> Item:
     """Return a number that the source does not state.
 

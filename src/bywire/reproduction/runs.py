@@ -13,6 +13,7 @@ import xarray as xr
 from bywire.bench.bench import Bench
 from bywire.bench.result import Result
 from bywire.bench.running import Progress, run
+from bywire.core.arguments import checked
 from bywire.core.interrupts import raise_if_stopped
 
 
@@ -79,6 +80,7 @@ class Runs:
         return result
 
 
+@checked
 def kpis(result: Result) -> dict[str, float]:
     """Return the KPIs of a result by name, SI."""
     return {kpi.name: kpi.value for kpi in result.kpis}

@@ -13,6 +13,7 @@ from http.server import ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import quote
 
+from bywire.core.arguments import checked
 from bywire.core.errors import FileError, ParameterError, unknown_name
 from bywire.server.address import HERE, PORT
 from bywire.server.field import is_file_name
@@ -92,6 +93,7 @@ def opened(
             ) from None
 
 
+@checked
 def serve(
     subject: str | Path = "", *, port: int = PORT, folder: str | Path = "",
     say: Callable[[str], None] = print,

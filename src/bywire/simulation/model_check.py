@@ -9,7 +9,7 @@ import casadi as ca
 
 from bywire.core.assembly import Assembly
 from bywire.core.errors import ModelError
-from bywire.core.model import Model
+from bywire.core.model import Model, require_states
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
 from bywire.core.wiring_check import check_wiring
@@ -26,14 +26,7 @@ def check_model(model: Model, par: ParameterSet) -> None:
     """
     for part in ("State", "Memory", "Stimulus", "Flow", "Output"):
         _annotated(model, part)
-    fields = model.State._fields
-    for kind in ("frictions", "limits"):
-        for name in getattr(model, kind):
-            if name not in fields:
-                raise ModelError(
-                    f"{model.name}: {kind} names {name!r}, which is no field of State "
-                    f"({', '.join(fields)})"
-                )
+    require_states(model)
     if not model.tasks(par):
         raise ModelError(
             f"{model.name}: tasks returns none, but one task must sample the stimulus, if only "

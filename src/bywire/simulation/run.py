@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_table
@@ -140,6 +141,7 @@ def request_for(run: Run, signals: Sequence[str] | None = None) -> Request:
     )
 
 
+@checked
 def simulate(
     run: Run,
     signals: Sequence[str] | None = None,

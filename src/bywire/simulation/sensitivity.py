@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bywire.core.arguments import checked
 from bywire.core.errors import CompilerError, ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite, work_of
@@ -107,6 +108,7 @@ class TangentKernel:
         run_in_calls(request.schedule, begin, end, call, _CHUNK)
 
 
+@checked
 def simulate_with_sensitivities(
     run: Run,
     parameters: Sequence[str],

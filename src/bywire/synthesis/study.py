@@ -10,6 +10,7 @@ from typing import Any
 import xarray as xr
 
 from bywire.bench.kpis.kpi import Kpi
+from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
@@ -158,11 +159,13 @@ class Study:
                     )
 
 
+@checked
 def variable(values: Any, dims: tuple[str, ...], unit: str, label: str) -> xr.Variable:
     """Return a variable with its unit and label."""
     return xr.Variable(dims, values, {"units": unit, "long_name": label})
 
 
+@checked
 def variables(
     values: Mapping[str, Any], dims: tuple[str, ...], labels: Mapping[str, tuple[str, str]]
 ) -> dict[str, xr.Variable]:
@@ -170,6 +173,7 @@ def variables(
     return {name: variable(array, dims, *labels[name]) for name, array in values.items()}
 
 
+@checked
 def require_ranges(options: ParameterSet, ranges: Iterable[tuple[str, str, str]]) -> None:
     """Refuse options of which a lower end is not below the upper one.
 

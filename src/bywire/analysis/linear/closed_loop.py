@@ -9,11 +9,13 @@ import numpy as np
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.sampled_system import SampledSystem, sampled_models
+from bywire.core.arguments import checked
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
 
 
+@checked
 def closed_loop(
     model: Model,
     par: ParameterSet,

@@ -20,6 +20,7 @@ from bywire.analysis.linear.smooth_functions import (
     smooth_functions,
     vector,
 )
+from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
@@ -30,6 +31,7 @@ Friction = Literal["removed", "sliding", "stuck"]
 _TOUCH = 1e-12  # overlap or gap [m] below which a contact counts as neither closed nor open
 
 
+@checked
 def linearize(
     model: Model,
     par: ParameterSet,

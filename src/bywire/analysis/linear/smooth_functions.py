@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.model import Model
+from bywire.core.model import Model, require_states
 from bywire.core.ops import where
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
@@ -127,6 +127,7 @@ def _plant(
     """Return the function of rates and outputs and their Jacobians, and what rates depend on."""
     import casadi as ca
 
+    require_states(model)
     K = ca.SX.sym("K", gap.shape[0], gap.shape[0])
     s = ca.SX.sym("s", len(model.frictions))
     g = ca.SX.sym("g", len(model.frictions))

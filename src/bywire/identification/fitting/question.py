@@ -12,6 +12,7 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.bench.bench import Bench
+from bywire.core.arguments import checked
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Factor, Unit
 from bywire.core.registry import Kind, instances
@@ -30,6 +31,7 @@ _NUMBER = re.compile(r"[-+]?\.?\d")  # how a noise begins
 Share = Annotated[float, Unit("1", 0.01), Field(ge=0, le=1, allow_inf_nan=False)]
 
 
+@checked
 @dataclass(frozen=True)
 class Question:
     """What a method of any bench is asked: what is measured there, and what is unknown.

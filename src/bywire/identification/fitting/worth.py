@@ -91,16 +91,36 @@ def checks_of(
     return (
         Check("residual_over_noise", left, limit=options.most_residual,
               note="1 where nothing but the sensors' noise is left"
-              + _few(fit.residuals, far, robust) + (_BETWEEN if resampled else "")),
+              + _few(fit.residuals, far, robust) + (_BETWEEN if resampled else ""),
+              next_step=_missing(fit)),
         *((_outliers(far, options),) if robust else ()),
         Check("variance_explained", explained(trials, fit, counted), limit=_EXPLAINED,
               at_least=True,
-              note="share of the outputs' variance, over their noise, that the model predicts"),
+              note="share of the outputs' variance, over their noise, that the model predicts",
+              next_step="check that --input is what drove the record, its unit and its sign; "
+              "'bywire replay' draws both"),
         Check("parameters_without_meaning", float(len(vague)), limit=0.0,
-              note=said or "none at its bound, none with a 95 % interval wider than +-100 %"),
+              note=said or "none at its bound, none with a 95 % interval wider than +-100 %",
+              next_step="leave these --unknown out, give a --prior, or record a motion that they "
+              "change"),
         Check("not_told", float(len(untold)),
               note=", ".join(untold) or "the data tells all that was asked for"),
     )  # fmt: skip
+
+
+def _missing(fit: Estimate) -> str:
+    """Return what to try at the output of which most is left."""
+    left = [each for each in fit.leftovers() if each.noise]
+    if not left:
+        return ""
+    worst = max(left, key=lambda each: each.rms / (each.noise or 1.0))
+    name = worst.label.rpartition(":")[2]
+    return (
+        f"look at {worst.label}, of which most is left: if its curves are shifted, add --unknown "
+        f"offset.{name}; if they part at the beginning, --estimate-start; if another parameter "
+        "shapes what is left, make it an --unknown; if it only scatters, give its noise with "
+        f"--output '{name}=...'"
+    )
 
 
 def _few(r: Array, far: NDArray[np.bool_], robust: bool) -> str:
@@ -115,6 +135,7 @@ def _outliers(far: NDArray[np.bool_], options: Options) -> Check:
         "outliers", float(far.mean()), limit=options.most_outliers,
         note=f"{far.sum()} of {far.size} residuals stand out by {FAR:g} times the noise or more: "
         "beyond the limit they are the model's",
+        next_step="look where they stand: a stretch of them is a motion that the model lacks",
     )  # fmt: skip
 
 
@@ -131,7 +152,8 @@ def noise_check(doubtful: Mapping[str, str], given: Mapping[str, str]) -> tuple[
     if all(given.values()):
         return ()
     note = "; ".join(doubtful.values()) or "what scatters in the record is noise"
-    return (Check("noise_not_told", float(len(doubtful)), limit=0.0, note=note),)
+    return (Check("noise_not_told", float(len(doubtful)), limit=0.0, note=note,
+                  next_step="record it at rest, and give its standard deviation"),)  # fmt: skip
 
 
 def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
@@ -142,7 +164,8 @@ def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
     if reached < _MET:
         note += ": there may be a lower one; take more --starts, narrower ranges (--unknown " \
                 "NAME=LOW..HIGH), or fewer unknowns"
-    return (Check("starts_at_minimum", float(reached), limit=_MET, at_least=True, note=note),)
+    return (Check("starts_at_minimum", float(reached), limit=_MET, at_least=True, note=note,
+                  next_step="take --starts 16, or a range for each --unknown"),)  # fmt: skip
 
 
 def _of_bench(fit: Estimate, label: str) -> bool:
@@ -170,7 +193,9 @@ def validation_of(held: Prediction, options: Options) -> tuple[Check, ...]:
         still = "" if math.isfinite(vaf) else "; the measured signal does not move"
         checks += [
             Check(f"validation.{name}.vaf", vaf, limit=options.least_vaf, at_least=True,
-                  note=f"variance accounted for in the record that was not fitted{still}"),
+                  note=f"variance accounted for in the record that was not fitted{still}",
+                  next_step="fit a record that covers what the held-out one does, or fewer "
+                  "unknowns"),
             Check(f"validation.{name}.nrmse", figures["nrmse"] / 100.0,
                   note="root mean square of the error there, over the range"),
         ]  # fmt: skip

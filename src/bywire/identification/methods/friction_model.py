@@ -108,9 +108,13 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
         figures=_figures(choice, unit),
         checks=(
             Check("misfit_over_friction", _misfit(whole, predicted), limit=_MISFIT,
-                  note="what is left on average at a speed or a pressure, over the friction"),
+                  note="what is left on average at a speed or a pressure, over the friction",
+                  next_step="see in the curve where it is left: at low speed, record slower "
+                  "strokes; over pressure, give p as well; if it differs from record to record, "
+                  "identify them one by one"),
             Check("validation_over_training", best.validation_error / best.training_error,
-                  limit=1.5, note="error on data held out over that on data fitted"),
+                  limit=1.5, note="error on data held out over that on data fitted",
+                  next_step="measure more records, or the same speeds and pressures in each"),
             _driving(best.estimate),
         ),
         curves=(_curve(records, whole, predicted),),
@@ -128,6 +132,8 @@ def _driving(fit: Estimate) -> Check:
     return Check(
         "terms_that_drive", float(len(below)), limit=0.0,
         note=said or "no part of the law has a sign that friction cannot have",
+        next_step="check the signs of friction and speed, and whether speeds and pressures "
+        "spread widely enough to tell the parts of the law apart",
     )  # fmt: skip
 
 

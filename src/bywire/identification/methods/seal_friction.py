@@ -133,7 +133,8 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
         },
         checks=(
             Check("misfit_over_friction", sigma / friction, limit=_MISFIT,
-                  note="what the line leaves of the mean forces, over the mean friction"),
+                  note="what the line leaves of the mean forces, over the mean friction",
+                  next_step=_NEXT),
             Check("stroke_scatter", float(np.sqrt(np.mean([g.scatter**2 for g in groups]))), "N",
                   note="from stroke to stroke"),
             *_bore_check(fit["A"], options.bore),
@@ -149,6 +150,14 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     )  # fmt: skip
 
 
+_NEXT = (
+    "look at 'pressure_between_directions' and the curve of each record: if one record lies off, "
+    "identify without it; if all forces are shifted, take --option zero=free; if friction depends "
+    "on speed or bends over pressure, take 'bywire identify friction-model' on friction, speed and "
+    "pressure, which compares such laws"
+)
+
+
 def _bore_check(area: float, bore: float) -> tuple[Check, ...]:
     """Return whether the area is that of the bore, where that is known: units show in it."""
     if not bore:
@@ -156,7 +165,9 @@ def _bore_check(area: float, bore: float) -> tuple[Check, ...]:
     known = 0.25 * math.pi * bore**2
     return (Check("area_off_bore", abs(area / known - 1.0), limit=_OFF_BORE,
                   note=f"{1e6 * area:.5g} mm^2 found, the bore has {1e6 * known:.5g} mm^2: "
-                  "beyond the limit a unit of pressure or force is wrong"),)  # fmt: skip
+                  "beyond the limit a unit of pressure or force is wrong",
+                  next_step="check both units in the file (--output 'p=COLUMN [bar]'), and the "
+                  "bore"),)  # fmt: skip
 
 
 def _unknown(name: str, start: float, F: Array, p: Array) -> Unknown:

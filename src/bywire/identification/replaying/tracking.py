@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.core.arguments import checked
 from bywire.core.typing import Array
 from bywire.identification.output_error import even_interval
 from bywire.identification.replaying.recursive import Tracked, kalman, likeliest
@@ -45,6 +46,7 @@ class Track:
     consistency: tuple[float, float]
 
 
+@checked
 def track(name: str, data: xr.Dataset, par: Any, block: float | None = None) -> Track:
     """Track a parameter.
 

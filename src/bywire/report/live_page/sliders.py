@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from itertools import zip_longest
 
 from bywire.bench.bench import Bench
+from bywire.core.arguments import checked
 from bywire.core.registry import Kind, instances
 
 _COUNT = 6  # that stand first where no brake chooses
 
 
+@checked
 @dataclass(frozen=True)
 class Sliders:
     """Parameters that are worth a slider, for they say most of an assembly.
