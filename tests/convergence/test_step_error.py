@@ -228,7 +228,8 @@ def earlier_error(value: float, half: float, double: float | None) -> float:
 class Score:
     """How many true errors lie within three estimates, and how many estimates are too large.
 
-    The latter are three times too large, of those that are more than rounding.
+    The latter are three times too large, of those that are more than what all figures have:
+    rounding, and the interval of the rows at which times are read.
     """
 
     figures: int = 0
@@ -236,9 +237,11 @@ class Score:
     compared: int = 0
     excessive: int = 0
 
-    def add(self, off: float, error: float, least: float) -> None:
+    def add(self, off: float, error: float, shared: float, value: float) -> None:
+        rounding = 1e-9 * abs(value)
+        least = shared + rounding
         self.figures += 1
-        self.within += off <= 3.0 * error + least
+        self.within += off <= 3.0 * error + rounding
         if least < error < math.inf:
             self.compared += 1
             self.excessive += error > 3.0 * max(off, least / 3.0)
@@ -266,23 +269,25 @@ def test_true_error_lies_within_three_times_the_estimate(count, fine, left_out, 
     for _ in range(count):
         bench = random_bench(rng, left_out)
         made = run(bench, estimate_error=True)
+        same = with_step_errors(made.kpis, {0.5: made.kpis}, made.recordings)
+        shared = {each.name: each.error for each in same}  # whatever the steps show
         steps = (fine, bench.step / 2, 2 * bench.step)
         true, half, double = (_figures(bench, step) for step in steps)
         for each in made.kpis:
             off = abs(each.value - true[each.name])
             if math.isnan(each.error) and math.isnan(true[each.name]):
                 continue
-            least = 1e-9 * abs(each.value)
-            now.add(math.inf if math.isnan(off) else off, each.error, least)
+            known = (shared[each.name], each.value)
+            now.add(math.inf if math.isnan(off) else off, each.error, *known)
             if math.isfinite(each.error) and math.isfinite(off):
-                other = double.get(each.name)
-                before.add(off, earlier_error(each.value, half[each.name], other), least)
+                earlier = earlier_error(each.value, half[each.name], double.get(each.name))
+                before.add(off, earlier + shared[each.name], *known)
     with capsys.disabled():
         print(f"\n{count} benches: {now}; before: {before}")
     assert now.figures > 5 * count
     assert binomtest(now.within, now.figures, 0.95, alternative="less").pvalue > 0.05
-    if count >= 40:
-        assert now.excessive / now.compared < before.excessive / before.compared
+    if count >= 40:  # of pure scatter 21 % are, however good the estimate
+        assert now.excessive < 0.27 * now.compared
 
 
 def _figures(bench: Bench, step: float) -> dict[str, float]:
