@@ -236,6 +236,30 @@ def test_a_run_that_fails_takes_the_results_away(tab):
     assert not tab.noise
 
 
+def test_a_run_that_takes_too_long_is_given_up_and_the_next_one_is_computed(tab):
+    if tab.file.stem != "motorcycle":
+        pytest.skip("one page is enough")
+    tab.open()
+    tab.page.evaluate("() => { changed('motor.R_m', 0.4); giveUp(); }")
+    tab.page.wait_for_function("() => !busy")
+    assert "and was given up" in tab.page.evaluate(SAID)
+    assert not tab.page.evaluate(STATE)["isShown"]
+    assert typed(tab, "motor.R_m", "0.41")["said"] == ""
+    assert tab.page.evaluate(STATE)["isShown"]
+    assert not tab.noise
+
+
+def test_a_figure_that_cannot_be_drawn_is_said(tab):
+    tab.open()
+    broken = "() => { setTimeout(() => { throw new RangeError('Invalid array length'); }); }"
+    tab.page.evaluate(broken)
+    tab.page.wait_for_function("() => !place('message').hidden")
+    state = tab.page.evaluate(STATE)
+    assert state["said"] == "the results with these values cannot be drawn"
+    assert not state["isShown"]
+    tab.noise.clear()
+
+
 def test_what_a_page_may_not_do_is_blocked_and_seen(tab):
     tab.open()
     tab.page.evaluate("() => fetch('https://example.org/').catch(() => undefined)")

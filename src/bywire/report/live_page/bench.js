@@ -4,12 +4,13 @@ const read = (id) => JSON.parse(document.getElementById(id).textContent);
 const bench = read("bench");
 const { description, digest, panels, chosen, judged, loops } = bench;
 const REST = 150; // ms without a move, after which loops and what is out of sight follow: sliders come first
+let longest = 20000; // ms that a run may take: then it is given up, and its worker with it
 const parameters = description.parameters.filter(({ used }) => used);
 const values = Object.fromEntries(parameters.map(({ name, start }) => [name, start]));
 const kept = [];
 const place = (id) => document.getElementById(id);
 const faults = new Map(); // what is wrong now, by where: a field, the link, the run
-let run = null, busy = false, wanted = null, resting = 0, slow = 0, moved = 0;
+let run = null, busy = false, wanted = null, resting = 0, slow = 0, late = 0, moved = 0, worker = null;
 
 /** Say what is wrong, or that nothing is any more, somewhere; the latest fault is shown. */
 function complain(text, where = "") {
@@ -99,6 +100,7 @@ function ask() {
     outdate(true);
   }, REST);
   place("loops").classList.add("stale"); // they follow when the sliders rest
+  late = setTimeout(giveUp, longest);
   worker.postMessage({ values: wanted });
   wanted = null;
 }
@@ -110,19 +112,48 @@ function answered({ data: { error, time, table, figures, settled, loops: compute
   }
   busy = false;
   clearTimeout(slow);
-  if (error) {
-    fail(error);
-  } else {
-    complain("", "run");
-    place("shown").hidden = false;
-    run = { time, signals: columnsOf(table, time, description.signals.map(({ name }) => name)), figures };
-    place("work").textContent = settled ? "" : "contacts or frictions did not settle in some step";
-    place("keep").disabled = place("csv").disabled = false;
-    judge();
-    plots.draw(run, kept, values);
-    if (loops.length) resting = setTimeout(() => worker.postMessage({ isAboutLoops: true }), REST);
-  }
+  clearTimeout(late);
+  if (error) fail(error);
+  else show({ time, table, figures, settled });
   if (wanted) ask();
+}
+
+/** Show a run. */
+function show({ time, table, figures, settled }) {
+  complain("", "run");
+  place("shown").hidden = false;
+  run = { time, signals: columnsOf(table, time, description.signals.map(({ name }) => name)), figures };
+  place("work").textContent = settled ? "" : "contacts or frictions did not settle in some step";
+  place("keep").disabled = place("csv").disabled = false;
+  judge();
+  plots.draw(run, kept, values);
+  if (loops.length) resting = setTimeout(() => worker.postMessage({ isAboutLoops: true }), REST);
+}
+
+/* A figure that cannot be drawn fails a moment after it was asked for: nothing of it may stay. */
+addEventListener("error", (event) => {
+  event.preventDefault();
+  [plots, ...views].forEach((each) => each.forget()); // half of a figure may stand
+  fail("the results with these values cannot be drawn");
+});
+
+/** Give a run up that takes too long. */
+function giveUp() {
+  worker.terminate();
+  busy = false;
+  clearTimeout(slow);
+  begin();
+  fail(`the run with these values takes longer than ${longest / 1000} s and was given up`);
+  if (wanted) ask();
+}
+
+/** Start the worker that computes beside the page. */
+function begin() {
+  const text = `${read("loader")}\n${read("worker")}`;
+  worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
+  worker.addEventListener("message", answered);
+  worker.addEventListener("error", (event) => fail(`the bench does not run: ${event.message}`));
+  worker.postMessage({ kernel: read("kernel"), given: { description, judged, loops, keep: bench.keep } });
 }
 
 function changed(name, value) {
@@ -145,7 +176,7 @@ function showKept() {
     drop.addEventListener("click", () => {
       kept.splice(k, 1);
       showKept();
-      plots.draw(run, kept, values);
+      if (run) plots.draw(run, kept, values);
     });
     return element("li", { title: each.told }, each.name, drop);
   }));
@@ -204,15 +235,10 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   for (const each of [plots, ...views]) each.forget();
   again();
 });
-let worker;
 if (typeof WebAssembly === "undefined" || typeof Worker === "undefined") {
   complain("this browser runs no WebAssembly in workers, by which the bench is computed: take a current one");
 } else {
-  const text = `${read("loader")}\n${read("worker")}`;
-  worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
-  worker.addEventListener("message", answered);
-  worker.addEventListener("error", (event) => fail(`the bench does not run: ${event.message}`));
-  worker.postMessage({ kernel: read("kernel"), given: { description, judged, loops, keep: bench.keep } });
+  begin();
   take(location.hash.slice(1));
   ask();
   addEventListener("hashchange", () => {
