@@ -99,11 +99,13 @@ def _is_alike(case: Case, other: Case) -> bool:
     plans = [(c.duration, c.settle, c.keep, c.record) for c in (case, other)]
     if plans[0] != plans[1] or type(case.model) is not type(other.model):
         return False
-    begun = [np.array([*c.state, *c.memory], dtype=float) for c in (case, other)]
+    begun, also_begun = (
+        np.array([*c.state, *c.memory], dtype=float) for c in (case, other)
+    )
     times = np.linspace(-case.settle, case.duration, _TIMES)
     driven, also = case.stimulus(times), other.stimulus(times)
     return (
-        np.array_equal(*begun, equal_nan=True)
+        np.array_equal(begun, also_begun, equal_nan=True)
         and driven.keys() == also.keys()
         and all(np.array_equal(driven[n], also[n], equal_nan=True) for n in driven)
     )

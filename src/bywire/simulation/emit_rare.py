@@ -48,7 +48,7 @@ def most_tries(stages: Stages) -> int:
 
     A part takes an exact pass or a few, in which all combinations of signs may be tried.
     """
-    return max(_TRIES // (10 + 3**stages.rows), 1)
+    return max(_TRIES // (10 + int(3**stages.rows)), 1)
 
 
 def rare_header(stages: Stages) -> str:

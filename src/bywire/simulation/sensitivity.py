@@ -6,8 +6,10 @@ import ctypes
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bywire.core.arguments import checked
 from bywire.core.errors import CompilerError, ParameterError, unknown_name
@@ -100,10 +102,13 @@ class TangentKernel:
 
         def call(first: int, last: int, row: int) -> int:
             plan = plan_array(request.schedule, first, last, request.selection.size)
-            arrays = (request.stimulus, state, plan, request.selection, rows[row:], seeds, tangents,
-                      rows_t[row:])  # fmt: skip
+            arrays: list[NDArray[Any]] = [
+                request.stimulus, state, plan, request.selection, rows[row:], seeds, tangents,
+                rows_t[row:],
+            ]  # fmt: skip
             step = ctypes.c_double(request.schedule.step)
-            return int(self._run(pointer(request.parameters), step, *map(pointer, arrays)))
+            places = [pointer(array) for array in arrays]
+            return int(self._run(pointer(request.parameters), step, *places))
 
         run_in_calls(request.schedule, begin, end, call, _CHUNK)
 

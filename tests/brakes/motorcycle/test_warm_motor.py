@@ -128,8 +128,9 @@ def test_a_derated_motor_settles_where_heat_out_is_heat_in() -> None:
 def test_derating_keeps_a_motor_below_its_limit_that_would_pass_it() -> None:
     options = {"input": "p_set", "output": "p_mc", "end": "45 bar", "period": "0.25 s",
                "share": 0.5, "duration": "15 s"}  # fmt: skip
-    hot = {**WARM, "motor_heat.T_a": "100 degC", "ecu.derating.T_a_hat": "100 degC"}
-    free, derated = duty(options, **hot), duty(options, **hot, **KNOWN)
+    hot = {**WARM, "motor_heat.T_a": "100 degC"}
+    known = {**KNOWN, "ecu.derating.T_a_hat": "100 degC"}
+    free, derated = duty(options, **hot), duty(options, **hot, **known)
     assert any("the winding passes 155 degC, its limit, at t = " in w for w in free.warnings)
     assert not any("winding" in w for w in derated.warnings)
     assert free.kpi("time_derated").value == 0.0
