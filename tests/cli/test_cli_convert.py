@@ -72,7 +72,7 @@ def test_there_and_back(bywire, run, tmp_path, out):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("run.csv", "out.nc"), "the time has no unit: write in a mapping"),
+        (("run.csv", "out.nc"), "'p', 'x', 't': they have no unit: type --signals"),
         (("none.csv", "out.nc"), "none.csv cannot be read (No such file"),
         (("run.csv", "out.xyz"), "the ending '.xyz' belongs to no format"),
         (("run.csv", "run.csv", "--map", "map.toml"), "is there already"),

@@ -8,7 +8,11 @@ from pathlib import Path
 import pytest
 from command_line import Outcome, refused
 
-from systems.loading import SPRING_AXIS, forgotten
+from bywire.bench.bench import Bench
+from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.server import common_fields
+from bywire.server.place import Place
+from systems.loading import SPRING_AXIS, forgotten, loaded
 
 Bywire = Callable[..., Outcome]
 ROOT = Path(__file__).parents[2]
@@ -108,7 +112,44 @@ def test_what_it_does_not_declare_is_said(bywire: Bywire) -> None:
     refused(bywire("margins", "travel", *SYSTEM), "declares no loop", "docs/modeling.md")
     refused(bywire("linearize", "travel", *SYSTEM), "declares no loop or plant")
     refused(bywire("study", "travel", *SYSTEM), "declares no study")
-    refused(bywire("run", "step", *SYSTEM), "is for any brake: say for which", "spring-axis-one")
+
+
+def test_an_experiment_of_any_brake_takes_the_only_parameter_set(
+    bywire: Bywire, tmp_path: Path
+) -> None:
+    refused(bywire("run", "step"), "is for any brake: say for which", "dardanelli2010")
+    plain = ("--set", "options.input=F_set", "--set", "options.output=x")
+    done = bywire("run", "step", *plain, *SYSTEM, "--json")
+    assert done.status == 0, done.err
+    assert done.object["kpis"] == bywire("run", "step", *STEP, *SYSTEM, "--json").object["kpis"]
+    bench = tmp_path / "axis.toml"
+    bench.write_text('experiment = "step"\n[options]\ninput = "F_set"\noutput = "x"\n')
+    assert bywire("run", bench, *SYSTEM, "--json").object["kpis"] == done.object["kpis"]
+    simulated = ("--output", "x=1 um", "--unknown", "k", "--synthetic", 1, "--starts", 1)
+    fitted = bywire("identify", "output-error", "--bench", bench, *simulated, *SYSTEM, "--json")
+    assert fitted.object["parameters"] == pytest.approx({"k": 1e4}, rel=1e-3)
+
+
+def test_a_choice_of_parameter_sets_is_the_systems_own(bywire: Bywire, tmp_path: Path) -> None:
+    two = "\nSECOND = CitedSet('two', 'spring-axis', '', '', Parameters, VALUES)\n"
+    system = written(tmp_path, "two_springs", two.replace("'two'", "'spring-axis-two'"))
+    several = bywire("run", "step", "--system", system)
+    assert "(spring-axis-one, spring-axis-two)" in several.err
+
+
+def test_python_and_forms_take_the_only_parameter_set(tmp_path: Path) -> None:
+    with loaded(SPRING_AXIS):
+        options = {"input": "F_set", "output": "x"}
+        assert Bench("step", options=options).parameters == "spring-axis-one"
+        field, place = common_fields.bench(), Place(tmp_path)
+        changes = {f"options.{name}": value for name, value in options.items()}
+        asked = {"bench": field.read("step", place), "set": changes}
+        assert common_fields.read_bench(asked, place).parameters == "spring-axis-one"
+    with pytest.raises(ParameterError, match="is for any brake: say for which"):
+        Bench("step")
+    with pytest.raises(UnknownNameError, match="unknown experiment 'stepp': did you mean 'step'"):
+        Bench("stepp")
+    assert Bench("hard-braking").parameters == "dardanelli2010"
 
 
 def test_what_the_option_itself_lacks_is_said(bywire: Bywire, tmp_path: Path) -> None:

@@ -29,8 +29,11 @@ def ringing(stiffness: float, damping: float, t: Array = T) -> Array:
     return np.asarray(np.exp(-damping * t) * np.cos(swing * t))
 
 
-def fit_of(measured: Array, noise: float = NOISE, start: float = 40.0) -> Estimate:
-    """Return stiffness and damping of what rang off."""
+def fit_of(
+    measured: Array, noise: float = NOISE, start: float = 40.0, size: float = 1.0,
+    finer: Array | None = None,
+) -> Estimate:  # fmt: skip
+    """Return stiffness and damping of what rang off; ``finer``: what half steps change."""
     unknowns = (Unknown("k", start, 1.0, 400.0, 40.0, "N/m"), Unknown("d", 0.1, 0.0, 2.0, 0.1))
 
     def evaluate(values: Array) -> tuple[Array, Array]:
@@ -41,9 +44,13 @@ def fit_of(measured: Array, noise: float = NOISE, start: float = 40.0) -> Estima
         ])  # fmt: skip
         return (ringing(*values) - measured) / noise, J / noise
 
+    def in_half_steps(values: Array) -> tuple[Array, Array]:
+        r, J = evaluate(values)
+        return r + finer / noise, J
+
     return estimate(Problem(unknowns, evaluate, parts=(
-        Part("x", "", T.size, "m", noise, float(np.std(measured))),
-    )))  # fmt: skip
+        Part("x", "", T.size, "m", noise, float(np.std(measured)), size),
+    ), finer=None if finer is None else in_half_steps))  # fmt: skip
 
 
 def noise(seed: int, size: float = NOISE) -> Array:
@@ -64,6 +71,36 @@ def test_a_barely_damped_model_that_is_wrong_is_warned_of() -> None:
     assert any("the intervals do not hold" in note for note in fit.notes)
     assert fit.leftovers()[0].over_noise > 20.0
     assert "the intervals do not hold" in str(fit)
+
+
+@pytest.mark.parametrize("stored", [float, np.float32], ids=["double", "single"])
+@pytest.mark.parametrize("rest", [0.0, 30.0])
+def test_what_rounding_leaves_is_no_misfit(stored: type, rest: float) -> None:
+    """A record of the model itself, stored in so many digits: 36 N/m come back."""
+    measured = (ringing(36.0, 0.1) + rest).astype(stored).astype(float) - rest
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", MisfitWarning)
+        fit = fit_of(measured, size=1.0 + rest)
+    assert fit["k"] == pytest.approx(36.0, rel=1e-5)
+    assert fit.is_exact
+    assert any("nothing but rounding is left" in note for note in fit.notes)
+
+
+def test_a_misfit_of_a_millionth_is_still_one() -> None:
+    with pytest.warns(MisfitWarning, match="something is missing in it or wrong"):
+        fit = fit_of(ringing(36.0, 0.1) + 1e-6 * np.sin(T) * T)
+    assert not fit.is_exact
+
+
+@pytest.mark.parametrize(("off", "is_said"), [(3e-4, False), (3e-6, True)])
+def test_what_the_step_of_the_simulation_explains_is_no_misfit(off: float, is_said: bool) -> None:
+    """Half steps change the model by more, or by less, than it leaves."""
+    measured = ringing(36.0, 0.1) + 1e-5 * np.sin(T)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", MisfitWarning)
+        fit = fit_of(measured, finer=off * np.cos(0.7 * T))
+    assert is_said == any("something is missing" in str(each.message) for each in said)
+    assert fit.leftovers()[0].numerical == pytest.approx(off / np.sqrt(2.0), rel=0.2)
 
 
 @pytest.mark.parametrize("kind", ["white", "wrong scale", "rounded", "spikes", "filtered"])
@@ -164,3 +201,16 @@ def test_half_steps_that_fail_are_said_to() -> None:
     with pytest.warns(MisfitWarning, match="is not known: left the numbers"):
         fit = slope_of(0.0, off=1.0)
     assert fit.step_errors is None
+
+
+@pytest.mark.parametrize("share", [-0.4, 0.6])
+def test_intervals_hold_where_neighbors_cancel_out_or_add_up(share: float) -> None:
+    """The mean of 400 readings, of whose noise a share comes again in the next one: closed form."""
+    count, n, size = 200, 400, 1.0
+    random = np.random.default_rng(11)
+    deviations = []
+    for _ in range(count):
+        e = random.normal(0.0, size, n + 1)
+        deviations.append(np.sqrt(uncertainty(np.ones((n, 1)), e[1:] + share * e[:-1]).covariance))
+    true = size * (1.0 + share) / np.sqrt(n)
+    assert float(np.mean(deviations)) == pytest.approx(true, rel=0.15)

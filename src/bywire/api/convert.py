@@ -113,6 +113,7 @@ def convert(
     *,
     mapping: str | Path | None = None,
     signals: Sequence[str] = (),
+    time: str = "",
     rate: str | float | None = None,
     method: str = "",
     exclude: Sequence[str] | None = None,
@@ -130,7 +131,11 @@ def convert(
     mapping
         File that says what the columns mean.
     signals
-        Signals to keep; all by default.
+        Signals to keep, all by default: names, or columns such as ``"Pressure [psi]"`` and
+        ``"p_mc=Pressure [psi]"``, which gives one a name.
+    time
+        Column of the instants, such as ``"Zeit [s]"``, or a sample rate; that of the file by
+        default.
     rate
         Rate of the one time axis, for instance ``"1 kHz"`` [Hz]; by default every signal keeps its
         own instants.
@@ -158,7 +163,8 @@ def convert(
         When the file cannot be read or written, or something does not fit.
     """
     from bywire.data.format_registry import format_to_write
-    from bywire.data.measurement import read_with_notes
+    from bywire.data.measurement import mapping_of
+    from bywire.data.named_columns import read_wanted
     from bywire.data.writing import require_free, write_measurement
 
     shown = no_progress if progress is None else progress
@@ -171,9 +177,7 @@ def convert(
             raise ParameterError(
                 f"--{option} {value}: it says how to resample: give the rate too, as --rate '1 kHz'"
             )
-    dataset, notes = read_with_notes(
-        source, mapping, signals=list(signals) or None, progress=shown
-    )
+    dataset, notes = read_wanted(source, mapping_of(mapping), signals, time, shown)
     report = None
     if rate is not None:
         dataset, report = _aligned(dataset, rate, method, exclude, max_gap)

@@ -11,10 +11,11 @@ import xarray as xr
 
 from bywire.api import earlier_result
 from bywire.api.identification import Identification
-from bywire.api.method_choice import ChosenMethod, Source, choose
+from bywire.api.method_choice import ChosenMethod, Source, choose, columns_of
 from bywire.core.blas import on_one_thread
 from bywire.core.errors import ParameterError
 from bywire.data.file_format import Progress, no_progress
+from bywire.data.named_columns import NamedColumns
 from bywire.identification.fitting.question import Question
 from bywire.identification.measured import Measured, measured, name_of
 from bywire.identification.method import Effort, Identified
@@ -44,6 +45,7 @@ def identify(
     *,
     question: Question = _NOTHING,
     mapping: str | Path | None = None,
+    time: str = "",
     options: Mapping[str, Any] = _NONE,
     starts: int = 16,
     seed: int = 1,
@@ -63,9 +65,13 @@ def identify(
         Parameter set from which the search begins (of the method's brake, the main one by
         default), and what of it is changed: SI numbers, or texts with units.
     question
-        For methods of any bench: which one, what is measured there, and what is unknown.
+        For methods of any bench: which one, what is measured there, and what is unknown. Of a
+        method of a brake's own, ``outputs`` may name the columns of its signals.
     mapping
         File that says what the columns of measurement files mean.
+    time
+        Column of the instants, such as ``"Zeit [s]"``, or a sample rate; that of the file by
+        default.
     options
         Options of the method, likewise.
     starts, seed
@@ -105,13 +111,14 @@ def identify(
     shown = no_progress if progress is None else progress
     chosen = choose(
         method, parameters, overrides, options, question, measurements=sources, mapping=mapping,
-        progress=shown,
+        time=time, progress=shown,
     )  # fmt: skip
-    _require_one_source(chosen, sources, synthetic, mapping)
+    named = columns_of(chosen.method, question, time)
+    _require_one_source(chosen, sources, synthetic, mapping, time)
     place = None if folder is None else Path(folder)
     if place is not None:
         earlier_result.require_own(place, method)
-    data, source = _data(chosen, sources, mapping, synthetic, shown)
+    data, source = _data(chosen, sources, mapping, named, synthetic, shown)
     files = tuple(
         Path(each) for each in (*sources, question.holdout) if isinstance(each, str | Path)
     )
@@ -155,6 +162,7 @@ def _require_one_source(
     sources: Sequence[Source],
     synthetic: int | None,
     mapping: str | Path | None,
+    time: str,
 ) -> None:
     method = chosen.method
     if sources and synthetic is not None:
@@ -167,14 +175,16 @@ def _require_one_source(
             f"{method.name} needs one of: measurement files with the signals {signals}, "
             "--synthetic SEED, or --study COUNT"
         )
-    if mapping is not None and not sources:
-        raise ParameterError("--map is for measurement files: leave it out")
+    for flag, given in {"--map": mapping is not None, "--time": bool(time)}.items():
+        if given and not sources:
+            raise ParameterError(f"{flag} is for measurement files: leave it out")
 
 
 def _data(
     chosen: ChosenMethod,
     sources: Sequence[Source],
     mapping: str | Path | None,
+    named: NamedColumns,
     synthetic: int | None,
     progress: Progress,
 ) -> tuple[Measured, str]:
@@ -183,7 +193,8 @@ def _data(
     if synthetic is None:
         read = measured(
             sources, mapping, method.signals, optional=method.optional, gaps=method.gaps,
-            multiple=None if method.bench is None else method.bench.step, progress=progress,
+            multiple=None if method.bench is None else method.bench.step, named=named,
+            progress=progress,
         )  # fmt: skip
         return read, ", ".join(name_of(source) for source in sources)
     progress("simulated experiment", 0.0)

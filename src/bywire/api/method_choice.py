@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from bywire.api.parameter_choice import set_for
-from bywire.api.replay import driven_bench
+from bywire.api.replay import columns_of_bench, driven_bench
 from bywire.bench.relative_changes import settled
 from bywire.bench.values import parsed
-from bywire.core.errors import InputError, ParameterError, unknown_name
+from bywire.core.errors import InputError, ParameterError, unknown_name, unknown_of_few
 from bywire.data.file_format import Progress, no_progress
+from bywire.data.named_columns import NamedColumns
 from bywire.identification.fitting.question import (
     BENCH_METHODS,
     BenchMethod,
@@ -63,6 +64,7 @@ def choose(
     *,
     measurements: Sequence[Source] = (),
     mapping: str | Path | None = None,
+    time: str = "",
     progress: Progress = no_progress,
 ) -> ChosenMethod:
     """Return the method of a name with what it needs.
@@ -75,8 +77,9 @@ def choose(
         Parameter set, and what of it and of the method's options is changed.
     question
         For methods of any bench.
-    measurements, mapping
-        What is identified, and what the columns of its files mean; none for simulated ones.
+    measurements, mapping, time
+        What is identified, what the columns of its files mean, and which one holds the instants;
+        none for simulated ones.
     progress
         Called with a label and the finished share.
 
@@ -88,16 +91,12 @@ def choose(
     bench_method = BENCH_METHODS.all().get(name)
     if bench_method is None:
         method = find_method(name)
-        if question.given:
-            raise ParameterError(
-                f"{question.given[0]} is for methods of any bench "
-                f"({', '.join(BENCH_METHODS.all())}): leave it out for {name}"
-            )
+        _require_columns_alone(method, question)
     else:
         if question.holdout is not None:
             _require_not_fitted(question.holdout, measurements)
         chosen = {"parameters": parameters} if parameters else {}
-        method = _on_bench(bench_method, question, {**chosen, **overrides}, mapping, progress)
+        method = _on_bench(bench_method, question, {**chosen, **overrides}, mapping, time, progress)
     if len(measurements) > 1 and not method.several:
         raise ParameterError(f"{name} takes one measurement, not {len(measurements)}")
     idle = [key for key in options if key.split(".")[0] in method.simulated]
@@ -108,6 +107,51 @@ def choose(
         )
     loss = {"loss": question.loss} if question.loss else {}
     return _with_parameters(method, _options(method, {**options, **loss}), parameters, overrides)
+
+
+def _require_columns_alone(method: Method, question: Question) -> None:
+    """Refuse what methods of any bench take, but columns of the method's signals.
+
+    Raises
+    ------
+    InputError
+        For anything else that is asked, and signals that the method does not take.
+    """
+    noisy = any(question.noise.values())
+    beyond = [flag for flag in question.given if flag not in ("--input", "--output")]
+    if beyond or noisy:
+        raise ParameterError(
+            f"{(beyond or ['--output with a noise'])[0]} is for methods of any bench "
+            f"({', '.join(BENCH_METHODS.all())}): leave it out for {method.name}"
+        )
+    signals = {**method.signals, **method.optional}
+    for name in (*question.inputs, *question.columns):
+        if name not in signals:
+            raise unknown_of_few(f"signal of {method.name}", name, signals)
+
+
+def columns_of(method: Method, question: Question, time: str) -> NamedColumns:
+    """Return the columns of measurement files that a question names.
+
+    Parameters
+    ----------
+    method
+        What takes the signals.
+    question
+        Columns of outputs, and of what drives the model.
+    time
+        Column of the instants.
+
+    Raises
+    ------
+    ParameterError
+        When one name means two columns.
+    """
+    outputs = question.columns
+    units = {**method.optional, **method.signals}
+    if method.bench is None:
+        return NamedColumns({**question.inputs, **outputs}, time, units)
+    return columns_of_bench(question.inputs, outputs, time, units)
 
 
 def _with_parameters(
@@ -167,6 +211,7 @@ def _on_bench(
     question: Question,
     changes: Mapping[str, Any],
     mapping: str | Path | None,
+    time: str,
     progress: Progress,
 ) -> Method:
     """Return a method of any bench for the one that is asked about."""
@@ -180,6 +225,6 @@ def _on_bench(
         return on_bench
     held = measured(
         [question.holdout], mapping, on_bench.signals, optional=on_bench.optional, gaps=True,
-        multiple=bench.step, progress=progress,
+        multiple=bench.step, named=columns_of(on_bench, question, time), progress=progress,
     )  # fmt: skip
     return method.on(bench, replace(question, holdout=held.data))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -13,10 +13,14 @@ from bywire.api.replay_answer import Replay
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
 from bywire.core.errors import ParameterError
+from bywire.core.model import Model
+from bywire.core.signals import signals_of
 from bywire.data.file_format import Progress, no_progress
+from bywire.data.named_columns import NamedColumns
 from bywire.identification.measured import measured, name_of
 from bywire.identification.replaying import bench_replay, tracking
 from bywire.identification.replaying.fit import judged
+from bywire.identification.replaying.measured_run import case_of
 from bywire.identification.replaying.segments import (
     Segment,
     found_in,
@@ -38,7 +42,8 @@ def replay(
     *,
     mapping: str | Path | None = None,
     inputs: Mapping[str, str] = _NONE,
-    outputs: Sequence[str] = (),
+    outputs: Sequence[str] | Mapping[str, str] = (),
+    time: str = "",
     case: str = "",
     tolerances: Sequence[str] = (),
     segments: str | Path = "",
@@ -58,9 +63,14 @@ def replay(
     mapping
         File that says what the columns of a measurement file mean.
     inputs
-        Stimulus of the model -> measured signal; by default all of the same name.
+        Stimulus of the model -> measured signal, or column such as ``"Demand [bar]"``; by default
+        all of the same name.
     outputs
-        What is compared; by default all that are measured and tell how well the model fits.
+        What is compared; by default all that are measured and tell how well the model fits. A
+        mapping names their columns: ``{"p_mc": "Pressure [psi]"}``, empty for the same name.
+    time
+        Column of the instants, such as ``"Zeit [s]"``, or a sample rate; that of the file by
+        default.
     case
         Run of the experiment; the first by default.
     tolerances
@@ -89,16 +99,63 @@ def replay(
     shown = no_progress if progress is None else progress
     driven = driven_bench(bench, overrides)
     limits = read_tolerances(tolerances)
-    read = measured([measurement], mapping, gaps=True, progress=shown)
+    columns = {n: c for n, c in outputs.items() if c} if isinstance(outputs, Mapping) else {}
+    units = _units_of(case_of(driven, case).model, inputs, outputs)
+    named = columns_of_bench(inputs, columns, time, units)
+    read = measured([measurement], mapping, gaps=True, named=named, progress=shown)
     shown("replay", 0.0)
     replayed = bench_replay.replay(
-        driven, read.data, inputs or None, outputs or None, case, estimate_error=estimate_error
+        driven, read.data, inputs or None, list(outputs) or None, case,
+        estimate_error=estimate_error,
     )
     shown("replay", 1.0)
     stretches = _segments(segments, replayed.inputs, limits)
     fits = judged(replayed.outputs, stretches, replayed.others)
     tracks = [tracking.track(name, read.data, replayed.run.par) for name in track]
     return Replay(driven, name_of(measurement), replayed, fits, tuple(tracks), tuple(read.notes))
+
+
+def columns_of_bench(
+    inputs: Mapping[str, str], columns: Mapping[str, str], time: str, units: Mapping[str, str]
+) -> NamedColumns:
+    """Return the columns that are named for a bench's inputs and outputs.
+
+    An input keeps the name that it was given; an output is called as the model calls it.
+
+    Parameters
+    ----------
+    inputs, columns
+        Column of each stimulus, and of each output whose column is named.
+    time
+        Column of the instants.
+    units
+        SI unit of every signal that matters, by name.
+
+    Raises
+    ------
+    ParameterError
+        When one name means two columns.
+    """
+    driving = {column: stimulus for stimulus, column in inputs.items()}
+    for name, column in columns.items():
+        if name in driving and column != name:
+            raise ParameterError(
+                f"{name} means two columns: {name} itself, which drives {driving[name]}, and "
+                f"{column}; write the first one with its unit, as --input "
+                f"{driving[name]}={name}[UNIT]"
+            )
+    return NamedColumns({**{c: c for c in driving}, **columns}, time, units, driving)
+
+
+def _units_of(
+    model: Model, inputs: Mapping[str, str], outputs: Iterable[str]
+) -> dict[str, str]:
+    """Return the SI units of the signals that a replay may need, by name."""
+    stimuli, known = signals_of(model.Stimulus), signals_of(model.Output)
+    units = {name: signal.unit for name, signal in {**known, **stimuli}.items()}
+    wanted = {**dict.fromkeys(outputs or known), **dict.fromkeys([] if inputs else stimuli)}
+    given = {column: stimuli[name].unit for name, column in inputs.items() if name in stimuli}
+    return {name: units[name] for name in wanted if name in units} | given
 
 
 def driven_bench(bench: Bench | str | Path, changes: Mapping[str, Any]) -> Bench:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bywire.bench.bench_source import usual_set
 from bywire.bench.experiment import Case, Cases, Experiment, as_run
 from bywire.bench.experiment_choice import experiment_of
 from bywire.bench.extent import check_seed, checked_interval, checked_step
@@ -36,7 +37,8 @@ class Bench:
     experiment
         Name of the experiment.
     parameters
-        Name of a parameter set of the catalog.
+        Name of a parameter set of the catalog. Where it is empty, the main set of the experiment's
+        brake; an experiment of any brake takes the only set of the brakes loaded by path.
     overrides, options
         Other parameters and options of the experiment, by dotted name: SI numbers, or texts with
         units such as ``"0.35 ohm"``. Durations below may be written so as well. Parameters may also
@@ -74,7 +76,7 @@ class Bench:
     """
 
     experiment: str
-    parameters: str
+    parameters: str = ""
     overrides: Mapping[str, Any] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
     stimulus: Mapping[str, Any] = field(default_factory=dict)
@@ -99,6 +101,7 @@ class Bench:
         check_seed(self.seed)
         if self.engine not in engine_names():
             raise unknown_name("engine", self.engine, engine_names())
+        object.__setattr__(self, "parameters", self.parameters or usual_set(self.experiment))
         known = PARAMETER_SETS.find(self.parameters)
         object.__setattr__(self, "overrides", settled(known.parameters(), self.overrides))
         if self.assembly == known.assembly:

@@ -17,7 +17,7 @@ from bywire.bench.relative_changes import is_relative, settled
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.bench.stimulus_sections import stimulus_sections
 from bywire.bench.values import parsed, require_unit, require_units
-from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.data.file_kinds import BENCH, require_kind
 from bywire.data.toml_file import read_toml
@@ -89,6 +89,9 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
 def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
     """Return the bench of a bench file's content; relative paths start at ``folder``."""
     _require_shape(content)
+    sets = sets_of_loaded()
+    if len(sets) == 1:
+        content = {"parameters": sets[0], **content}
     for key in ("experiment", "parameters"):
         if key not in content:
             raise ParameterError(f"{key} is missing: write {key} = \"...\" (see 'bywire list')")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
-from bywire.core.catalog import PARAMETER_SETS, main_set
+from bywire.core.catalog import PARAMETER_SETS, main_set, sets_of_loaded
 from bywire.core.errors import ParameterError
 from bywire.data.file_kinds import BENCH
 from bywire.data.meant_file import first_there, near_files
@@ -36,21 +36,36 @@ def content_of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, s
         For an experiment of any brake, where ``changes`` do not say for which.
     """
     name = str(file)
-    if not _NAME.fullmatch(name) or file.is_file():
+    if file.is_file() or not names_experiment(name):
         return {}
-    definition = EXPERIMENTS.get(name)
-    if definition is None and name not in _any_brake():
-        return {}
-    if "parameters" in changes:
-        return {"experiment": name}
-    if definition is None:
-        sets = ", ".join(PARAMETER_SETS.all())
-        raise ParameterError(
-            f"experiment {name!r} is for any brake: say for which, with --set parameters=NAME "
-            f"({sets})"
-        )
-    chosen = main_set(definition.assembly, beside=type(definition.defaults))
-    return {"experiment": name, "parameters": chosen}
+    chosen = {} if "parameters" in changes else {"parameters": usual_set(name)}
+    return {"experiment": name, **chosen}
+
+
+def usual_set(name: str) -> str:
+    """Return the parameter set with which an experiment runs unless another one is named.
+
+    That is the main set of its brake. An experiment of any brake takes the only set of the brakes
+    that were loaded by path.
+
+    Raises
+    ------
+    UnknownNameError
+        When there is no experiment of that name.
+    ParameterError
+        For an experiment of any brake where there are several sets to choose from.
+    """
+    definition, is_generic, sets = EXPERIMENTS.get(name), name in _any_brake(), sets_of_loaded()
+    if is_generic and len(sets) == 1:
+        return sets[0]
+    if definition is not None:
+        return main_set(definition.assembly, beside=type(definition.defaults))
+    if not is_generic:
+        raise EXPERIMENTS.unknown(name, GENERIC_EXPERIMENTS)
+    raise ParameterError(
+        f"experiment {name!r} is for any brake: say for which, with --set parameters=NAME "
+        f"({', '.join(sets or PARAMETER_SETS.all())})"
+    )
 
 
 def meant_by(file: Path) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bywire.cli.options import JsonFlag, Map
+from bywire.cli.options import JsonFlag, Map, Time
 from bywire.cli.show import show
 
 
@@ -19,7 +19,10 @@ def convert(
         Path, typer.Argument(metavar="OUT", help="File to write.", show_default=False)
     ],
     map_: Map = None,
-    signals: Annotated[str, typer.Option(help="Signals to keep, e.g. 'p_mc, x_mc'.")] = "",
+    signals: Annotated[
+        str, typer.Option(help="Signals to keep, e.g. 'p_mc, x_mc' or 'p_mc=Pressure [psi]'.")
+    ] = "",
+    time: Time = "",
     rate: Annotated[
         str, typer.Option(help="Bring all signals to one time axis, e.g. '1 kHz'.")
     ] = "",
@@ -45,7 +48,7 @@ def convert(
     left_out = [] if exclude == "nothing" else _listed(exclude)
     show(
         lambda progress: convert_file(
-            source, target, mapping=map_, signals=_listed(signals), rate=rate or None,
+            source, target, mapping=map_, signals=_listed(signals), time=time, rate=rate or None,
             method=method, exclude=left_out if exclude else None, max_gap=max_gap,
             format=format_, force=force, progress=progress,
         ),

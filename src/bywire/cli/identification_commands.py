@@ -18,6 +18,7 @@ from bywire.cli.options import (
     Map,
     OutFolder,
     Parameters,
+    Time,
     changes,
     named,
 )
@@ -35,7 +36,7 @@ TestBench = Annotated[
 ]
 NoisyOutputs = Annotated[
     list[str] | None,
-    typer.Option("--output", metavar="SIGNAL[=NOISE]", rich_help_panel=_ANY_BENCH,
+    typer.Option("--output", metavar="SIGNAL[=COLUMN]", rich_help_panel=_ANY_BENCH,
                  help=texts.NOISY_OUTPUT),
 ]  # fmt: skip
 Unknowns = Annotated[
@@ -75,6 +76,7 @@ def identify(
         typer.Argument(metavar="[MEASUREMENT]...", help=texts.MEASUREMENTS, show_default=False),
     ] = None,
     map_: Map = None,
+    time: Time = "",
     parameters: Parameters = "",
     set_: Changes = None,
     option: Annotated[
@@ -119,13 +121,13 @@ def identify(
     if study is None:
         show(
             lambda progress: identify_parameters(
-                method, measurements or [], mapping=map_, starts=starts or 16,
+                method, measurements or [], mapping=map_, time=time, starts=starts or 16,
                 synthetic=synthetic, progress=progress, **shared,
             ),
             out, json,
         )  # fmt: skip
         return
-    _require_no_measurement(method, measurements, synthetic, map_, holdout)
+    _require_no_measurement(method, measurements, synthetic, map_, time or None, holdout)
     count = study
     show(
         lambda progress: trust(method, count, starts=starts or 1, progress=progress, **shared),
@@ -134,14 +136,15 @@ def identify(
 
 
 def _require_no_measurement(
-    method: str, measurements: object, synthetic: int | None, mapping: object, holdout: object
-) -> None:
+    method: str, measurements: object, synthetic: int | None, mapping: object, time: object,
+    holdout: object,
+) -> None:  # fmt: skip
     """Refuse what a study of simulated experiments cannot use."""
     if measurements or synthetic is not None:
         raise ParameterError(
             f"{method}: give only one of measurement files, --synthetic SEED, --study COUNT"
         )
-    for flag, value in {"--map": mapping, "--holdout": holdout}.items():
+    for flag, value in {"--map": mapping, "--time": time, "--holdout": holdout}.items():
         if value is not None:
             raise ParameterError(f"{flag} is for measurement files: leave it out")
 
@@ -154,8 +157,9 @@ def replay(
     input_: Inputs = None,
     output: Annotated[
         list[str] | None,
-        typer.Option("--output", metavar="SIGNAL", help=texts.REPLAY_OUTPUT),
+        typer.Option("--output", metavar="SIGNAL[=COLUMN]", help=texts.REPLAY_OUTPUT),
     ] = None,
+    time: Time = "",
     case: CaseName = "",
     tolerance: Annotated[
         list[str] | None,
@@ -178,8 +182,8 @@ def replay(
     show(
         lambda progress: replay_measurement(
             measurement, bench, changes(set_), mapping=map_, inputs=changes(input_, "--input"),
-            outputs=output or [], case=case, tolerances=tolerance or [], segments=segments,
-            track=track or [], progress=progress, estimate_error=error_estimate,
+            outputs=named(output, "--output"), time=time, case=case, tolerances=tolerance or [],
+            segments=segments, track=track or [], progress=progress, estimate_error=error_estimate,
         ),
         out, json,
     )  # fmt: skip

@@ -53,6 +53,7 @@ Frequencies = Annotated[str, typer.Option(help=texts.FREQUENCIES)]
 Map = Annotated[Path | None, typer.Option("--map", metavar="PATH", help=texts.MAP)]
 Inputs = Annotated[
     list[str] | None,
-    typer.Option("--input", metavar="STIMULUS=SIGNAL", help=texts.INPUTS),
+    typer.Option("--input", metavar="STIMULUS=COLUMN", help=texts.INPUTS),
 ]
+Time = Annotated[str, typer.Option("--time", metavar="COLUMN", help=texts.TIME)]
 CaseName = Annotated[str, typer.Option("--case", help=texts.CASE)]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
-from bywire.core.brake import brakes
+from bywire.core.brake import brakes, loaded_files
 from bywire.core.errors import ModelError, ParameterError
 from bywire.core.parameters import ParameterSet, require_units
 from bywire.core.provenance import Cited, chosen
@@ -84,6 +84,16 @@ def main_set(assembly: str, beside: type | None = None) -> str:
     raise ModelError(
         f"there is no parameter set for a {assembly}: declare a bywire.CitedSet of that assembly"
     )
+
+
+def sets_of_loaded() -> tuple[str, ...]:
+    """Return the names of the parameter sets of all brakes that were loaded by their path.
+
+    Such a brake is the one that a user means: its set is taken where it is the only one.
+    """
+    files = loaded_files()
+    loaded = [brake.module for brake in brakes().values() if brake.file in files]
+    return tuple(name for module in loaded for name in PARAMETER_SETS.of(module))
 
 
 def parameters(name: str) -> ParameterSet:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,53 @@ _CLOCKS = ("time", "t", "zeit", "timestamp", "time stamp", "date time", "datetim
 _SHOWN = 12
 _NO_VALUE = (9.9e37, -9.9e37, 9.91e37)
 """what instruments send where they have no value, by SCPI: infinite, and not a number"""
+
+
+class MissingUnitsError(UnitError):
+    """Columns that have no unit, all of those that are to be read.
+
+    Parameters
+    ----------
+    file
+        Where they stand.
+    signals
+        Name of the signal -> its column.
+    clock
+        Column of the instants, where it has none either.
+    """
+
+    def __init__(self, file: Path, signals: Mapping[str, str], clock: str = "") -> None:
+        self.signals, self.clock = dict(signals), clock
+        columns = [*map(quoted, self.signals.values()), *([quoted(clock)] if clock else [])]
+        each = "it has" if self.signals else "the time has"
+        self.lacking = (
+            f"{file}, columns {', '.join(columns)}: they have no unit"
+            if len(columns) > 1
+            else f"{file}, column {columns[0]}: {each} no unit"
+        )
+        title, inside = f"{clock} [ms]", f'time = {{ column = "{clock}", unit = "ms" }}'
+        for name, column in self.signals.items():
+            title, inside = f"{column} [mm]", f"[signals.{name}] unit = 'mm'"
+        super().__init__(
+            f"{self.lacking}: write it behind the title, as '{title}', or in a mapping, as "
+            f"{inside}, or '1' for none"
+        )
+
+
+class NoClockError(FileError):
+    """A file that does not say when it was measured.
+
+    Parameters
+    ----------
+    text
+        What to do about it.
+    signals
+        Name of the signal -> its column, of those to be read that have no unit either.
+    """
+
+    def __init__(self, text: str, signals: Mapping[str, str]) -> None:
+        self.text, self.signals = text, dict(signals)
+        super().__init__(text)
 
 
 @dataclass(frozen=True)
@@ -129,7 +176,31 @@ def choose(
         raise FileError(
             f"{file} holds no signal: {_listing(source.columns)}" + (f"; {why}" if why else "")
         )
-    return [_chosen(file, source, meaning, signal) for signal in wanted.values()]
+    chosen: list[Chosen] = []
+    lacking: dict[str, str] = {}
+    clock, timeless = "", ""
+    for signal in wanted.values():
+        try:
+            unit = signal.unit or _title_unit(source, signal.column)
+            chosen.append(_chosen(file, source, meaning, replace(signal, unit=unit)))
+        except MissingUnitsError as error:
+            lacking |= error.signals
+            clock = clock or error.clock
+        except NoClockError as error:
+            lacking |= error.signals
+            timeless = error.text
+    if timeless:
+        raise NoClockError(timeless, lacking)
+    if lacking or clock:
+        raise MissingUnitsError(file, lacking, clock)
+    return chosen
+
+
+def _title_unit(source: Source, column: str) -> str:
+    """Return the unit that stands in brackets behind the name of a column, if it is not its own."""
+    columns = source.columns
+    is_name = column in columns or any(column == each.path for each in columns.values())
+    return "" if is_name else split_title(column)[1]
 
 
 def every_signal(
@@ -138,7 +209,7 @@ def every_signal(
     """Return every column that is no clock under its own name."""
     clocks = {c.clock for c in source.columns.values()}
     if meaning.clock is not None and meaning.clock.column:
-        clocks |= {meaning.clock.column}
+        clocks |= {_column(file, source, meaning.clock.column, "time.column").name}
     elif clocks == {None} or meaning.clock is not None:
         clocks |= {_usual_clock(source)}
     names = [name for name in source.columns if name not in clocks]
@@ -151,14 +222,17 @@ def _chosen(
     column = _column(
         file, source, signal.column, f"signals.{signal.name}.column", signal.number
     )
-    clock = _clock(file, source, column, signal.clock or meaning.clock)
     unit = signal.unit or column.unit
+    lacking = {} if unit else {signal.name: column.name}
+    try:
+        clock = _clock(file, source, column, signal.clock or meaning.clock)
+    except MissingUnitsError as error:
+        raise MissingUnitsError(file, lacking, error.clock) from None
+    except NoClockError as error:
+        raise NoClockError(error.text, lacking) from None
     where = f"{file}, column {quoted(column.name)}"
-    if not unit:
-        raise UnitError(
-            f"{where}: it has no unit: write it behind the title, as '{signal.name} [mm]', or in a "
-            f"mapping, as [signals.{signal.name}] unit = 'bar', or '1' for none"
-        )
+    if lacking:
+        raise MissingUnitsError(file, lacking)
     symbol = si_symbol(_known_unit(unit, where))
     if signal.unit and column.unit and signal.scale is None:
         _require_same(signal, column, where)
@@ -203,6 +277,7 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
     if given is not None and given.rate:
         return given
     if given is not None:
+        given = replace(given, unit=given.unit or _title_unit(source, given.column))
         clock = _column(file, source, given.column, "time.column", given.number)
     else:
         name = column.clock or _usual_clock(source)
@@ -211,22 +286,20 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
                 "; where other lines stand before the table, a mapping's skip_lines tells how many"
             )
             why = "; ".join(("", *left_out_note(source.left_out)))
-            raise FileError(
+            raise NoClockError(
                 f"{file} does not say when it was measured: call a column 'time [s]', or write in "
                 "a mapping "
                 'time = { column = "t", unit = "ms" } or rate = "1 kHz"; '
                 + _listing(source.columns)
                 + (before if len(source.columns) == 1 or source.remarks else "")
-                + why
+                + why,
+                {},
             )
         clock = source.columns[name]
     unit = (given.unit if given is not None else "") or clock.unit
     where = f"{file}, column {quoted(clock.name)}"
     if not unit:
-        raise UnitError(
-            f"{where}: the time has no unit: write in a mapping "
-            f'time = {{ column = "{clock.name}", unit = "ms" }}'
-        )
+        raise MissingUnitsError(file, {}, clock.name)
     if not measures(_known_unit(unit, where), "s"):
         raise UnitError(f"{where}: {unit!r} is no unit of time: choose another column")
     if given is not None and given.unit and clock.unit:

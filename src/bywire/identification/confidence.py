@@ -13,6 +13,7 @@ _TOGETHER = (1, 8, 64)  # neighbors summed up
 _BLOCKS = 10  # per unknown, at least
 _KEPT = 0.9  # of the square of the Jacobian, at least
 _LEVEL = 0.01  # of the test whether residuals are white
+_NEAREST = 3  # lags
 _GROUPS = (8, 16, 64)  # blocks of the record, besides samples one by one
 _FEWEST_GROUPS = 6.0  # that tell a variance
 
@@ -51,6 +52,8 @@ def uncertainty(
     larger just where it is (noise that grows with the signal, a model that is wrong in a part of
     the range), the scores themselves say it, sample by sample (White 1980) or summed over blocks
     of the record (Bester, Conley and Hansen 2011): deviations that they refute at 1 % are theirs.
+    Where neighbors go together, the scores are those of what the autoregressive model makes of
+    the residuals, whose neighbors do not.
 
     Parameters
     ----------
@@ -107,6 +110,10 @@ def _as_scattered(sure: Uncertainty, influence: Array, r: Array) -> Uncertainty:
     """
     from scipy import special  # of which stats is made, and takes long to load
 
+    if sure.colored:  # neighbors that cancel out scatter less than the sum of their squares
+        model = autoregression(r)
+        later = _filtered(influence[::-1], model.coefficients)[: r.size]
+        influence, r = later[::-1], filtered(model.coefficients, [1.0], r)
     n, p = influence.shape
     largest, freedom = np.ones(p), sure.freedom
     for groups in (n, *(count for count in _GROUPS if n >= 10 * count)):
@@ -211,7 +218,11 @@ def autocorrelation(residuals: Array, lags: int) -> Array:
 
 
 def is_white(residuals: Array, lags: int = 20) -> bool:
-    """Return whether neighbors do not go together (Ljung and Box 1978, level 1 %)."""
+    """Return whether neighbors do not go together (Ljung and Box 1978, level 1 %).
+
+    Asked twice, of the nearest neighbors and of all lags: over 20 lags that of the nearest one
+    is easily lost.
+    """
     from scipy import special  # of which stats is made, and takes long to load
 
     n = residuals.size
@@ -219,5 +230,7 @@ def is_white(residuals: Array, lags: int = 20) -> bool:
     if lags < 1:
         return True
     rho = autocorrelation(residuals, lags)[1:]
-    statistic = n * (n + 2) * float(np.sum(rho**2 / (n - np.arange(1, lags + 1))))
-    return bool(special.chdtrc(lags, statistic) > _LEVEL)
+    terms = n * (n + 2) * rho**2 / (n - np.arange(1, lags + 1))
+    asked = {min(_NEAREST, lags), lags}
+    level = _LEVEL / len(asked)
+    return all(special.chdtrc(most, float(terms[:most].sum())) > level for most in asked)

@@ -96,8 +96,9 @@ class Estimate:
     @property
     def correlation(self) -> Array:
         """Correlations of the estimates, shape (p, p)."""
-        size = self.deviations
-        return np.asarray(self.covariance / np.outer(size, size))
+        product = np.outer(self.deviations, self.deviations)
+        alone = np.eye(len(product))  # of values without a deviation, where nothing at all is left
+        return np.divide(self.covariance, product, out=alone, where=product > 0.0)
 
     def intervals(self, level: float = 0.95) -> Array:
         """Return the confidence intervals (Student's t), shape (p, 2)."""
@@ -185,12 +186,21 @@ class Estimate:
         """Root mean square of the residuals; 1 where they are over a noise that is as assumed."""
         return math.sqrt(float(np.mean(self.residuals**2)))
 
+    @property
+    def is_exact(self) -> bool:
+        """Whether nothing but rounding is left: the record is the model's own."""
+        leftovers = self.leftovers()
+        return bool(leftovers) and all(left.is_rounding for left in leftovers)
+
     def leftovers(self) -> tuple[Leftover, ...]:
         """Return what the model leaves of each part of the measurement, in its unit."""
         begin, parts = 0, []
         for part in self.parts:
             r = self.residuals[begin : begin + part.count] * (part.noise or 1.0)
-            parts.append(Leftover(part.label, part.unit, r, part.noise, part.spread))
+            parts.append(
+                Leftover(part.label, part.unit, r, part.noise, part.spread, part.size,
+                         part.numerical)
+            )  # fmt: skip
             begin += part.count
         return tuple(parts)
 

@@ -14,6 +14,10 @@ _FLAT = 1e-7  # singular value per the largest one: below it rounding decides
 _FAR = 10.0  # times the noise: residuals that no noise explains
 _MISFIT = 4.0  # times the noise: sensors whose noise is filtered leave up to 3
 _AS_ASSUMED = (0.5, 1.5)  # times the noise that was assumed: it explains what is left
+_EXACT = (
+    "nothing but rounding is left: the record agrees with the model to the last digits, and its "
+    "intervals do not hold for a measured record, which has noise"
+)
 _CONTRADICTED = 3.0  # standard deviations of a prior
 
 
@@ -25,10 +29,14 @@ def misfit(estimate: Estimate) -> str:
     """Return what a model leaves that is no noise, in a sentence; empty where it is noise.
 
     What neighboring residuals differ by is noise; what they have in common above it is the
-    model's. Where a noise was assumed and explains what is left, it is believed.
+    model's. Where a noise was assumed and explains what is left, it is believed. What rounding or
+    the step of the simulation explains says nothing of the model.
     """
     worst = max(
-        (left for left in estimate.leftovers() if left.over_noise > _MISFIT),
+        (
+            left for left in estimate.leftovers()
+            if left.over_noise > _MISFIT and not left.is_numerical
+        ),
         key=lambda left: left.over_noise, default=None,
     )  # fmt: skip
     if worst is None:
@@ -106,5 +114,7 @@ def notes_of(estimate: Estimate) -> tuple[str, ...]:
                 f"{shown(deviation, difference_unit(u.unit))}) away: the prior or the model is "
                 "wrong"
             )
+    if estimate.is_exact:
+        notes.append(_EXACT)
     wrong = misfit(estimate)
     return (*notes, wrong) if wrong else tuple(notes)

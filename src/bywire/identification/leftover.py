@@ -10,6 +10,7 @@ import numpy as np
 from bywire.core.typing import Array
 
 _FEWEST = 30  # residuals that tell their noise
+_RESOLVED = 2.0**-24  # of a signal's size: what single precision and the finest converters resolve
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,10 @@ class Part:
         What they were divided by [unit]; None where no noise was assumed.
     spread
         Standard deviation of what the model has to explain [unit].
+    size
+        Largest magnitude of what was measured [unit].
+    numerical
+        Root mean square of what half the step of the simulation changes [unit].
     """
 
     name: str
@@ -36,6 +41,8 @@ class Part:
     unit: str = "1"
     noise: float | None = None
     spread: float = 0.0
+    size: float = 0.0
+    numerical: float = 0.0
 
     @property
     def label(self) -> str:
@@ -55,8 +62,8 @@ class Leftover:
         Computed less measured [unit], shape (n,).
     noise
         Standard deviation that was assumed [unit]; None for none.
-    spread
-        Standard deviation of what the model has to explain [unit].
+    spread, size, numerical
+        As of its `Part` [unit].
     """
 
     label: str
@@ -64,11 +71,23 @@ class Leftover:
     residuals: Array
     noise: float | None
     spread: float
+    size: float = 0.0
+    numerical: float = 0.0
 
     @property
     def rms(self) -> float:
         """Root mean square [unit]."""
         return math.sqrt(float(np.mean(self.residuals**2))) if self.residuals.size else 0.0
+
+    @property
+    def is_rounding(self) -> bool:
+        """Whether no more is left than numbers resolve: the record is the model's own."""
+        return self.rms <= _RESOLVED * max(self.size, self.spread)
+
+    @property
+    def is_numerical(self) -> bool:
+        """Whether no more is left than rounding, or the step of the simulation, explains."""
+        return self.is_rounding or self.rms <= self.numerical
 
     @property
     def fit(self) -> float:

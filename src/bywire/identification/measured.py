@@ -14,13 +14,15 @@ from bywire.data.alignment import resample
 from bywire.data.channel_quality import AlignmentReport
 from bywire.data.column_units import measures, unit_of_symbol
 from bywire.data.file_format import Progress, no_progress
+from bywire.data.mapping import MeasurementMapping
 from bywire.data.mapping_file import read_mapping
-from bywire.data.measurement import read_with_notes
+from bywire.data.named_columns import NamedColumns, read_named, renamed
 from bywire.identification.noise import noise_of
 from bywire.identification.records import joined
 
 _UNEVEN = 1e-3  # of a step
 _FEWEST = 10  # samples that tell noise
+_NOT_NAMED = NamedColumns()
 NOISE_OF_SAMPLES = "noise_of_samples"
 """attribute of a signal that was resampled: noise of the samples before, SI"""
 
@@ -50,6 +52,7 @@ def measured(
     interval: float | None = None,
     multiple: float | None = None,
     gaps: bool = False,
+    named: NamedColumns = _NOT_NAMED,
     progress: Progress = no_progress,
 ) -> Measured:
     """Read one measurement, or several records of it.
@@ -70,6 +73,8 @@ def measured(
         What that is rounded to multiples of where the record has to be resampled [s].
     gaps
         Whether samples may be missing.
+    named
+        What else is known of the columns.
     progress
         Called with a label and the finished share.
 
@@ -78,13 +83,13 @@ def measured(
     InputError
         When a file cannot be read, a signal is missing or measures something else.
     """
-    meaning = None if mapping is None else read_mapping(mapping)
+    meaning = MeasurementMapping() if mapping is None else read_mapping(mapping)
     records, notes = {}, []
     for number, source in enumerate(sources):
         if isinstance(source, xr.Dataset):
-            data, where, label = source, "the measurement", f"record_{number}"
+            data, where, label = renamed(source, named), "the measurement", f"record_{number}"
         else:
-            data, remarks = read_with_notes(source, meaning, progress=progress)
+            data, remarks = read_named(Path(source), meaning, named, progress)
             where = str(source)
             notes += [f"{name_of(source)}: {remark}" for remark in remarks]
             label = Path(source).stem if Path(source).stem not in records else where
@@ -118,7 +123,8 @@ def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[s
     there = [str(name) for name in data.data_vars]
     for name, unit in signals.items():
         if name not in there:
-            raise unknown_name(f"signal (needed of {where}; --map can name it)", name, there)
+            kind = f"signal (needed of {where}; --input, --output or --map can name its column)"
+            raise unknown_name(kind, name, there)
         given = str(data[name].attrs.get("units", "1"))
         if unit not in ("", given) and not measures(unit_of_symbol(given), unit):
             raise UnitError(f"{where}: {name} is in {given}, but {unit} is wanted: check the map")

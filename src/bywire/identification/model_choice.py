@@ -8,6 +8,7 @@ Information criteria are given beside it, with the likelihood of residuals that 
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -18,6 +19,7 @@ from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.identification.confidence import autoregression
 from bywire.identification.estimate import Estimate
+from bywire.identification.identifiability import MisfitWarning, misfit
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.unknown import Unknown
 
@@ -143,6 +145,8 @@ def choose(
             )
         )  # fmt: skip
     chosen = next(j for j in judged if j.excess <= j.excess_error)
+    if wrong := misfit(chosen.estimate):
+        warnings.warn(wrong, MisfitWarning, stacklevel=2)
     return Choice(tuple(judged), chosen, held_out)
 
 
@@ -179,7 +183,9 @@ def _fitted(candidate: Candidate, parts: Sequence[xr.Dataset], signal: str) -> E
         predicted, slopes = candidate.predict(whole, values)
         return (predicted - y) / size, slopes / size
 
-    return estimate(Problem(unknowns, evaluate))
+    with warnings.catch_warnings():  # most of the candidates are wrong: that is why they compete
+        warnings.simplefilter("ignore", MisfitWarning)
+        return estimate(Problem(unknowns, evaluate))
 
 
 def _left(

@@ -244,8 +244,9 @@ def _parts(trials: Sequence[Trial]) -> Iterator[Part]:
         for name, values in trial.measured.items():
             counted = values[trial.rows(name)]
             spread = float(np.std(counted)) if counted.size else 0.0
+            size = float(np.abs(counted).max()) if counted.size else 0.0
             yield Part(name, trial.label, counted.size, signals[name].unit, trial.noise[name],
-                       spread)  # fmt: skip
+                       spread, size)  # fmt: skip
 
 
 def _residuals(trial: Trial, unknowns: Sequence[Unknown], values: Array) -> tuple[Array, Array]:

@@ -7,6 +7,7 @@ dx = -J^+ (r' - r): three quarters of the error of the whole step, at second ord
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +16,11 @@ from bywire.bench.step_error import NO_ESTIMATE, of_difference
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, shown
 from bywire.identification.estimate import Estimate
+from bywire.identification.leftover import Part
 from bywire.identification.loss import Loss, influence
 from bywire.identification.problem import Problem
+
+_SMALL = 1e-6  # of an unknown's scale: less matters to nobody
 
 
 def with_step_share(
@@ -38,7 +42,8 @@ def with_step_share(
     Returns
     -------
     Estimate
-        With ``step_errors``; unknowns at a bound are taken to stay there.
+        With ``step_errors`` and what the step changes of each part; unknowns at a bound are taken
+        to stay there.
     tuple of str
         Unknowns whose error from the step exceeds the half width of their 95 % interval, or that
         half steps cannot be run.
@@ -62,7 +67,18 @@ def with_step_share(
     shift[free] = np.linalg.lstsq(rows, weights * difference)[0]
     scale = np.array([u.scale for u in best.unknowns])
     errors = of_difference(0.5) * np.abs(shift) * scale
-    return replace(best, step_errors=errors), tuple(_exceeding(best, errors))
+    known = replace(best, step_errors=errors, parts=tuple(_parts(best.parts, difference)))
+    return known, () if known.is_exact else tuple(_exceeding(best, errors))
+
+
+def _parts(parts: Iterable[Part], difference: Array) -> Iterator[Part]:
+    """Yield the parts of the residuals with the size of what the step changes of them."""
+    begin = 0
+    for part in parts:
+        rows = difference[begin : begin + part.count]
+        rms = float(np.sqrt(np.mean(rows**2))) if rows.size else 0.0
+        yield replace(part, numerical=rms * (part.noise or 1.0))
+        begin += part.count
 
 
 def _exceeding(best: Estimate, errors: Array) -> list[str]:
@@ -73,5 +89,5 @@ def _exceeding(best: Estimate, errors: Array) -> list[str]:
         f"{shown(float(f'{reach:.2g}'), difference_unit(u.unit))}: "
         "take a smaller step"
         for u, error, reach in zip(best.unknowns, errors, half, strict=True)
-        if error > reach
+        if error > max(reach, _SMALL * u.scale)
     ]

@@ -50,8 +50,8 @@ def read_bench(asked: Mapping[str, Any], place: Place) -> object:
 
 def bench(hint: str = texts.TEST_BENCH, *, is_required: bool = True) -> Field:
     """Return the field of a bench."""
-    return Field("bench", "Bench", "thing", hint, names("experiments"), _benches,
-                 is_required=is_required)  # fmt: skip
+    known = names("experiments", "generic_experiments")
+    return Field("bench", "Bench", "thing", hint, known, _benches, is_required=is_required)
 
 
 def bench_changes(fits: Fits | None) -> Field:
@@ -67,6 +67,11 @@ def case() -> Field:
 def mapping() -> Field:
     """Return the field of the file that says what columns mean."""
     return Field("mapping", "What the columns mean", "thing", texts.MAP, offered=_maps)
+
+
+def time() -> Field:
+    """Return the field of the column that holds the instants."""
+    return Field("time", "Time", hint=texts.TIME)
 
 
 def error_estimate() -> Field:

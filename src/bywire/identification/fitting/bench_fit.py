@@ -114,9 +114,9 @@ class BenchFit:
         held = self._held_out(bench, fit, options)
         uneven = any(resampled(record) for record in records.values())
         checks = checks_of(trials, fit, options, uneven)
-        doubtful = overestimated(
+        doubtful = {} if fit.is_exact else overestimated(
             list(records.values()), trials, fit.residuals, self.question.noise
-        )
+        )  # fmt: skip
         return Identified(
             estimates={"output error": fit},
             parameters=believable(fit),

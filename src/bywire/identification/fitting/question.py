@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +22,11 @@ from bywire.identification.output_error import Between
 Texts = Mapping[str, str] | Iterable[str]
 """what is said of each name; or the names alone"""
 
+BETWEEN = re.compile(r"\s*(?:\+-|\+/-|±)\s*")
+"""what stands between a value, or a column, and its standard deviation"""
+
+_NUMBER = re.compile(r"[-+]?\.?\d")  # how a noise begins
+
 Share = Annotated[float, Unit("1", 0.01), Field(ge=0, le=1, allow_inf_nan=False)]
 
 
@@ -35,10 +41,12 @@ class Question:
     bench
         A `Bench`, the path of a bench file, or an experiment's name.
     inputs
-        Stimulus of the model -> measured signal; by default all of the same name.
+        Stimulus of the model -> measured signal, or column such as ``"Demand [bar]"``; by default
+        all of the same name.
     outputs
-        Output of the model, measured under the same name -> standard deviation of its noise, such
-        as ``"0.02 bar"``; empty, or the names alone, for the record's own.
+        Output of the model -> standard deviation of its noise, such as ``"0.02 bar"``, its column,
+        such as ``"Pressure [psi]"``, or both, ``"Pressure [psi] +- 0.02 bar"``. Empty, or the names
+        alone, for a column of that name and the record's own noise.
     unknowns
         Parameter, ``stimulus.NAME`` or ``offset.SIGNAL`` -> range such as ``"0.1..1 ohm"``; empty,
         or the names alone, for none.
@@ -68,7 +76,13 @@ class Question:
     @property
     def noise(self) -> dict[str, str]:
         """Noise of each measured output as it is written; empty for the record's own."""
-        return _texts_of(self.outputs)
+        return {name: _column_and_noise(text)[1] for name, text in _texts_of(self.outputs).items()}
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Column of each output whose column is named, as it is written."""
+        texts = {name: _column_and_noise(text)[0] for name, text in _texts_of(self.outputs).items()}
+        return {name: column for name, column in texts.items() if column}
 
     @property
     def ranges(self) -> dict[str, str]:
@@ -96,6 +110,26 @@ def _texts_of(names: Texts) -> dict[str, str]:
     if isinstance(names, Mapping):
         return dict(names)
     return dict.fromkeys([names] if isinstance(names, str) else names, "")
+
+
+def _column_and_noise(text: str) -> tuple[str, str]:
+    """Return the column and the noise that a text names; both may be empty.
+
+    What begins with a digit and has no unit in brackets is a noise.
+
+    Examples
+    --------
+    >>> _column_and_noise("0.02 bar"), _column_and_noise("Druck [psi] +- 0.02 bar")
+    (('', '0.02 bar'), ('Druck [psi]', '0.02 bar'))
+    >>> _column_and_noise("2nd sensor [bar]")
+    ('2nd sensor [bar]', '')
+    """
+    text = text.strip()
+    *before, last = BETWEEN.split(text)
+    if before and _NUMBER.match(last):
+        return " +- ".join(before).strip(), last.strip()
+    is_noise = _NUMBER.match(text) and not text.endswith(("]", ")"))
+    return ("", text) if is_noise else (text, "")
 
 
 @dataclass(frozen=True)

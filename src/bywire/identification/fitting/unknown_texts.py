@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
@@ -16,10 +15,9 @@ from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of, without_noise
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, shown, split
-from bywire.identification.fitting.question import Question
+from bywire.identification.fitting.question import BETWEEN, Question
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 
-_BETWEEN = re.compile(r"\s*(?:\+-|\+/-|±)\s*")
 _OPEN = 1e-6  # of a range: how near an end comes to zero that is not admissible
 _EXAMPLES = {"range": (0.5, 2.0), "prior": (1.0, 0.1)}  # of the usual magnitude
 _STIMULUS, _OFFSET = "stimulus.", "offset."
@@ -130,7 +128,7 @@ def _with_texts(unknown: Unknown, within: str, prior: str, leaf: Leaf | None) ->
 
 
 def _prior(unknown: Unknown, text: str) -> tuple[float, float]:
-    mean, deviation = _pair(unknown, text, _BETWEEN.split(text), "prior", " +- ")
+    mean, deviation = _pair(unknown, text, BETWEEN.split(text), "prior", " +- ")
     if not deviation > 0.0:
         raise ParameterError(f"prior of {unknown.name}: {quoted(text)} wants a deviation > 0")
     return mean, deviation

@@ -9,7 +9,7 @@ from typing import Any
 from bywire.core import option_texts as texts
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.server.common_fields import bench, case, changes, mapping, names, parameters
+from bywire.server.common_fields import bench, case, changes, mapping, names, parameters, time
 from bywire.server.field import Field
 from bywire.server.task import Task
 
@@ -24,7 +24,7 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     )  # fmt: skip
     return identify(
         asked["method"], asked["measurements"], asked["parameters"], asked["set"],
-        question=question, mapping=asked["mapping"] or None,
+        question=question, mapping=asked["mapping"] or None, time=asked["time"],
         options=asked["options"], starts=asked["starts"], seed=asked["seed"],
         synthetic=asked["synthetic"], folder=out, progress=progress,
     )  # fmt: skip
@@ -37,6 +37,7 @@ TASK = Task(
         Field("measurements", "Measurements", "files", texts.MEASUREMENTS),
         Field("synthetic", "Simulated measurement", "whole", texts.SYNTHETIC),
         mapping(),
+        time(),
         bench(is_required=False),
         Field("inputs", "Inputs", "pairs", texts.INPUTS),
         Field("outputs", "Outputs", "names", texts.NOISY_OUTPUT),

@@ -1,0 +1,213 @@
+"""Columns as a user names them, ``Pressure [psi]``, beside or in place of a mapping file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import xarray as xr
+
+from bywire.core.callers import is_command_line
+from bywire.core.errors import FileError, InputError, ParameterError, UnitError, unknown_name
+from bywire.core.quantities import display_unit
+from bywire.core.units import parse
+from bywire.data.column_choice import (
+    MissingUnitsError,
+    NoClockError,
+    every_signal,
+    left_out_note,
+)
+from bywire.data.column_units import split_title
+from bywire.data.file_format import Progress
+from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
+from bywire.data.measurement import dataset_of, opened
+from bywire.data.room import room
+
+_ARGUMENTS = {"input": "inputs", "output": "outputs"}
+"""options of commands whose arguments in Python take a mapping"""
+
+_BRACKETS = "each with the unit of its own column in the brackets, or 1 for a pure number"
+
+
+@dataclass(frozen=True)
+class NamedColumns:
+    """What a user says of a file's columns beside, or in place of, a mapping file.
+
+    Parameters
+    ----------
+    signals
+        Name of the signal -> its column, with a unit in brackets where the file has none; or the
+        name of a signal of the mapping file.
+    time
+        Column of the instants, likewise; or a sample rate such as ``"1 kHz"``.
+    units
+        SI unit of every signal that matters, by name. A column of another name that has no unit
+        is left out. None where all columns matter.
+    driving
+        Name of the signal -> stimulus that it drives, of those that were given as inputs.
+    """
+
+    signals: Mapping[str, str] = field(default_factory=dict)
+    time: str = ""
+    units: Mapping[str, str] | None = None
+    driving: Mapping[str, str] = field(default_factory=dict)
+
+
+def read_named(
+    file: Path, meaning: MeasurementMapping, named: NamedColumns, progress: Progress
+) -> tuple[xr.Dataset, tuple[str, ...]]:
+    """Read a measurement file: the signals that a user names, and all others of it.
+
+    Parameters
+    ----------
+    file, meaning
+        The file, and what a mapping file says of it.
+    named
+        What the user says.
+    progress
+        Called with a label and the finished share.
+
+    Raises
+    ------
+    InputError
+        As of `bywire.read_measurement`.
+    """
+    with opened(file, meaning) as source, _shown_units(named):
+        meaning = _timed(meaning, named.time)
+        signals = dict(meaning.signals) or {
+            name: signal for name, signal in every_signal(file, source, meaning).items()
+            if named.units is None or name in named.units or source.columns[signal.column].unit
+        }  # fmt: skip
+        signals |= {n: _signal(meaning, n, column) for n, column in named.signals.items()}
+        whole = replace(meaning, signals=signals)
+        dataset, notes = dataset_of(file, source, whole, None, progress, room())
+        return dataset, notes if meaning.signals else (*notes, *left_out_note(source.left_out))
+
+
+def read_wanted(
+    file: Path, meaning: MeasurementMapping, wanted: Sequence[str], time: str, progress: Progress
+) -> tuple[xr.Dataset, tuple[str, ...]]:
+    """Read the signals that a user wants of a measurement file.
+
+    Parameters
+    ----------
+    file, meaning
+        The file, and what a mapping file says of it.
+    wanted
+        ``SIGNAL``, ``COLUMN``, ``COLUMN [unit]`` or ``SIGNAL=COLUMN [unit]``; all where empty.
+    time
+        As of `NamedColumns`.
+    progress
+        Called with a label and the finished share.
+
+    Raises
+    ------
+    InputError
+        As of `bywire.read_measurement`.
+    """
+    with opened(file, meaning) as source, _shown_units(None):
+        meaning = _timed(meaning, time)
+        known = {**meaning.signals, **dict.fromkeys(source.columns if not meaning.signals else ())}
+        named = dict(_named(text, known) for text in wanted)
+        is_mapped = bool(meaning.signals) and {*named} <= {*wanted}
+        if named and not is_mapped:
+            signals = {name: _signal(meaning, name, column) for name, column in named.items()}
+            meaning = replace(meaning, signals=signals)
+        return dataset_of(file, source, meaning, list(named) or None, progress, room())
+
+
+def renamed(data: xr.Dataset, named: NamedColumns) -> xr.Dataset:
+    """Return signals in memory under the names that a user gives them.
+
+    Raises
+    ------
+    UnknownNameError
+        When a signal is not there, with the nearest.
+    ParameterError
+        When instants are named, which signals in memory have already.
+    """
+    if named.time:
+        raise ParameterError("--time is for measurement files: leave it out")
+    for name, column in named.signals.items():
+        if column not in data:
+            raise unknown_name("signal", column, [str(each) for each in data.data_vars])
+        data = data.assign({name: data[column]})
+    return data
+
+
+def _named(text: str, known: Mapping[str, object]) -> tuple[str, str]:
+    """Return name and column of a signal that is wanted."""
+    if text in known:
+        return text, text
+    name, equals, column = (part.strip() for part in text.partition("="))
+    if equals and name and column:
+        return name, column
+    return split_title(text)[0], text
+
+
+def _signal(meaning: MeasurementMapping, name: str, column: str) -> SignalMapping:
+    known = meaning.signals.get(column)
+    return SignalMapping(name, column) if known is None else replace(known, name=name)
+
+
+def _timed(meaning: MeasurementMapping, time: str) -> MeasurementMapping:
+    """Return a mapping whose instants come from a column, or follow a sample rate."""
+    if not time:
+        return meaning
+    try:
+        rate = parse(time, "Hz", "--time") if time[0].isdigit() and " " in time else 0.0
+    except InputError:
+        rate = 0.0
+    return replace(meaning, clock=Clock(rate=rate) if rate > 0.0 else Clock(column=time))
+
+
+@contextmanager
+def _shown_units(named: NamedColumns | None) -> Iterator[None]:
+    """Tell what to type for columns that have no unit; None where signals are merely wanted."""
+    try:
+        yield
+    except MissingUnitsError as error:
+        typed = _options(error.signals, error.clock, named)
+        raise UnitError(f"{error.lacking}: type {typed}, {_BRACKETS}") from None
+    except NoClockError as error:
+        typed = _options(error.signals, "COLUMN", named)
+        raise FileError(f"{error}; or type {typed}, {_BRACKETS}") from None
+
+
+def _options(signals: Mapping[str, str], clock: str, named: NamedColumns | None) -> str:
+    """Return the options, or in Python the arguments, that give units to columns.
+
+    Parameters
+    ----------
+    signals
+        Name of the signal -> its column, of those without a unit.
+    clock
+        Column of the instants, where it has none.
+    named
+        What the user said; None where signals are merely wanted.
+    """
+    groups: dict[str, dict[str, str]] = {}
+    for name, column in signals.items():
+        unit = ((named.units or {}).get(name) if named else None) or ""
+        text = f"{split_title(column)[0]} [{display_unit(unit) or 'UNIT'}]"
+        driven = named.driving.get(name) if named else None
+        group = "signals" if named is None else "output" if driven is None else "input"
+        groups.setdefault(group, {})[driven or name] = text
+    if named is not None and named.units is not None and not {*signals} & {*named.units}:
+        any_column = "COLUMN [UNIT]"  # nothing is called as the model calls it
+        groups = {"input": {"STIMULUS": any_column}, "output": {"SIGNAL": any_column}}
+    of_command = is_command_line()
+    texts = []
+    for group, pairs in groups.items():
+        if group == "signals":
+            each = [t if t.startswith(f"{n} [") else f"{n}={t}" for n, t in pairs.items()]
+            texts.append(f'--signals "{", ".join(each)}"' if of_command else f"signals={each}")
+        elif of_command:
+            texts += [f'--{group} {name}="{text}"' for name, text in pairs.items()]
+        else:
+            texts.append(f"{_ARGUMENTS[group]}={pairs}")
+    if clock:
+        texts.append(f'--time "{clock} [s]"' if of_command else f"time='{clock} [s]'")
+    return (" " if of_command else ", ").join(texts)

@@ -1,0 +1,169 @@
+"""Columns named where a file is read, without a mapping file: replay, identify, convert, forms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Outcome, refused
+
+import bywire
+from bywire import read_measurement
+from bywire.api.replay_answer import Replay
+from bywire.core.errors import FileError, ParameterError, UnitError
+from bywire.server.place import Place
+from bywire.server.tasks import identify as identify_form
+from bywire.server.tasks import replay as replay_form
+from systems.loading import SPRING_AXIS, forgotten
+
+Bywire = Callable[..., Outcome]
+INCH, POUND_FORCE = 0.0254, 0.45359237 * 9.80665  # m, N: by definition
+BENCH = """
+experiment = "open-loop"
+[options]
+input = "F_set"
+output = "x"
+record = "1 ms"
+duration = "0.3 s"
+[stimulus]
+kind = "multisine"
+mean = 0
+amplitude = "60 N"
+f_base = "4 Hz"
+n = 12
+t_start = 0
+[set]
+F_c = 0
+k_c = "0.001 N/m"
+"""
+NAMED = ("--input", "F_set=Kraft [lbf]", "--output", "x=Weg [inch]", "--time", "Zeit [s]")
+
+
+@pytest.fixture
+def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Return a table in inches and pounds whose columns have no unit, beside its bench."""
+    with forgotten():
+        bywire.load_system(SPRING_AXIS)
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "axis.toml").write_text(BENCH)
+        bench = bywire.Bench(
+            "open-loop", overrides={"F_c": 0.0, "k_c": 1e-3, "k": 9e3},
+            options={"input": "F_set", "output": "x", "record": 1e-3, "duration": 0.3},
+            stimulus={"kind": "multisine", "mean": 0.0, "amplitude": 60.0, "f_base": 4.0, "n": 12,
+                      "t_start": 0.0},
+        )  # fmt: skip
+        recording = bywire.run(bench, estimate_error=False).recording
+        demand = bench.cases()[0].stimulus(recording["time"].values)["F_set"]
+        columns = (recording["time"].values, demand / POUND_FORCE, recording["x"].values / INCH,
+                   np.arange(demand.size))  # fmt: skip
+        rows = [",".join(f"{value:.17g}" for value in row) for row in zip(*columns, strict=True)]
+        table = tmp_path / "rig.csv"
+        table.write_text("\n".join(["Zeit,Kraft,Weg,Zaehler", *rows]) + "\n")
+        yield table
+
+
+def nrmse(replay: Replay) -> float:
+    """Return the one output's error over its range [%]."""
+    (fit,) = replay.fits
+    return next(figure.value for figure in fit.kpis if figure.name == "nrmse")
+
+
+def test_replay_takes_columns_by_their_names_and_units(bywire: Bywire, rig: Path) -> None:
+    done = bywire("replay", rig, "--bench", "axis.toml", *NAMED, "--set", "k=9 N/mm", "--json")
+    assert done.status == 0, done.err
+    assert done.object["segments"][0]["figures"]["nrmse"]["value"] < 1e-9  # %
+
+
+def test_identify_takes_columns_and_noise(bywire: Bywire, rig: Path) -> None:
+    named = [text.replace("[inch]", "[inch] +- 1 um") for text in NAMED]
+    done = bywire("identify", "output-error", rig, "--bench", "axis.toml", *named, "--unknown",
+                  "k", "--starts", 1, "--holdout", "other.csv", "--json")  # fmt: skip
+    refused(done, "other.csv")  # the held-out file is read as the other one is
+    (rig.parent / "other.csv").write_text(rig.read_text() + "0.3010,0,0,0\n")
+    done = bywire("identify", "output-error", rig, "--bench", "axis.toml", *named, "--unknown",
+                  "k", "--starts", 1, "--holdout", "other.csv", "--json")  # fmt: skip
+    assert done.object["parameters"]["k"] == pytest.approx(9e3, rel=1e-9)
+    assert "warning" not in done.err  # the record is the model's own
+    assert done.object["figures"]["x.noise"]["value"] == pytest.approx(1e-6)
+
+
+def test_convert_names_columns(bywire: Bywire, rig: Path) -> None:
+    done = bywire("convert", rig, "out.nc", "--signals", "x=Weg [inch], Kraft [lbf]", "--time",
+                  "Zeit [s]")  # fmt: skip
+    assert done.status == 0, done.err
+    table = np.loadtxt(rig, delimiter=",", skiprows=1)
+    found = read_measurement("out.nc")
+    np.testing.assert_allclose(found["x"], INCH * table[:, 2], rtol=1e-12)
+    np.testing.assert_allclose(found["Kraft"], POUND_FORCE * table[:, 1], rtol=1e-12)
+    fast = ("--signals", "x=Weg [mm]", "--time", "2 kHz")
+    assert bywire("convert", rig, "rate.nc", *fast).status == 0
+    assert float(read_measurement("rate.nc")["time"][-1]) == pytest.approx(0.15)
+
+
+@pytest.mark.parametrize(
+    ("words", "typed"),
+    [
+        (("replay", "titled.csv", "--bench", "axis.toml", "--input", "F_set=Kraft", "--output",
+          "x=Weg"), '--input F_set="Kraft [N]" --output x="Weg [mm]" --time "time [s]"'),
+        (("identify", "output-error", "titled.csv", "--bench", "axis.toml", "--input",
+          "F_set=Kraft", "--output", "x=Weg", "--unknown", "k"),
+         '--input F_set="Kraft [N]" --output x="Weg [mm]" --time "time [s]"'),
+        (("convert", "titled.csv", "out.csv", "--signals", "x=Weg, Kraft"),
+         '--signals "x=Weg [UNIT], Kraft [UNIT]" --time "time [s]"'),
+        (("identify", "seal-friction", "titled.csv", "--output", "F=Kraft", "--output", "x=Weg"),
+         '--output F="Kraft [N]" --output x="Weg [mm]" --time "time [s]"'),
+        (("replay", "timeless.csv", "--bench", "axis.toml", "--input", "F_set=Kraft", "--output",
+          "x=Weg"), '--input F_set="Kraft [N]" --output x="Weg [mm]" --time "COLUMN [s]"'),
+    ],
+    ids=["replay", "identify", "convert", "method", "no-time"],
+)  # fmt: skip
+def test_one_message_shows_what_to_type_for_all_columns_without_units(
+    bywire: Bywire, rig: Path, words: tuple[str, ...], typed: str
+) -> None:
+    (rig.parent / "titled.csv").write_text(rig.read_text().replace("Zeit", "time"))
+    (rig.parent / "timeless.csv").write_text(rig.read_text().replace("Zeit", "Lauf"))
+    refused(bywire(*words), f"type {typed}, each with the unit of its own column")
+
+
+def test_python_takes_the_same_words(rig: Path) -> None:
+    named = {"inputs": {"F_set": "Kraft [lbf]"}, "time": "Zeit [s]"}
+    found = bywire.replay(
+        rig, "axis.toml", {"k": "9 N/mm"}, outputs={"x": "Weg [inch]"}, **named
+    )  # fmt: skip
+    assert nrmse(found) < 1e-9
+    data = bywire.read_measurement(
+        rig, {"time": {"column": "Zeit", "unit": "s"},
+              "signals": {"F": {"column": "Kraft [lbf]"}, "s": {"column": "Weg [inch]"}}},
+    )  # fmt: skip
+    again = bywire.replay(
+        data, "axis.toml", {"k": "9 N/mm"}, inputs={"F_set": "F"}, outputs={"x": "s"}
+    )
+    assert nrmse(again) < 1e-9
+    with pytest.raises(UnitError, match=r"outputs=\{'x': 'Weg \[mm\]'\}"):
+        bywire.replay(rig, "axis.toml", outputs={"x": "Weg"}, **named)
+    (rig.parent / "units.csv").write_text(rig.read_text().replace("Kraft", "Kraft [N]"))
+    with pytest.raises(UnitError, match="the file says 'N' and the mapping 'kN'"):
+        bywire.replay("units.csv", "axis.toml", outputs={"x": "Weg [mm]"},
+                      inputs={"F_set": "Kraft [kN]"}, time="Zeit [s]")  # fmt: skip
+    with pytest.raises(ParameterError, match="x means two columns"):
+        bywire.replay(rig, "axis.toml", inputs={"F_set": "x"}, outputs={"x": "Weg [mm]"})
+    with pytest.raises(FileError, match="has no column 'Wege"):
+        bywire.replay(rig, "axis.toml", outputs={"x": "Wege [mm]"}, **named)
+
+
+def test_forms_take_the_same_words(rig: Path) -> None:
+    place = Place(rig.parent.resolve())
+    typed = {"bench": "axis.toml", "measurement": "rig.csv", "inputs": "F_set=Kraft [lbf]",
+             "outputs": "x=Weg [inch]", "time": "Zeit [s]", "set": "k=9 N/mm"}  # fmt: skip
+    asked = replay_form.TASK.read(typed, place)
+    found = replay_form.TASK.compute(asked, rig.parent / "out", None)
+    assert nrmse(found) < 1e-9
+    fitted = {**typed, "method": "output-error", "measurements": "rig.csv", "set": "",
+              "unknowns": "k", "starts": "1"}  # fmt: skip
+    del fitted["measurement"]
+    (rig.parent / "out").mkdir()
+    asked = identify_form.TASK.read(fitted, place)
+    found = identify_form.TASK.compute(asked, rig.parent / "out", None)
+    assert found.parameters["k"] == pytest.approx(9e3, rel=1e-9)
