@@ -114,7 +114,7 @@ def test_convert_names_columns(bywire: Bywire, rig: Path) -> None:
          '--signals "x=Weg [UNIT], Kraft [UNIT]" --time "time [s]"'),
         (("identify", "seal-friction", "titled.csv", "--output", "F=Kraft", "--output", "x=Weg"),
          '--output F="Kraft [N]" --output x="Weg [mm]" --time "time [s]"'),
-        (("replay", "rig.csv", "--bench", "axis.toml", "--input", "F_set=Kraft", "--output",
+        (("replay", "timeless.csv", "--bench", "axis.toml", "--input", "F_set=Kraft", "--output",
           "x=Weg"), '--input F_set="Kraft [N]" --output x="Weg [mm]" --time "COLUMN [s]"'),
     ],
     ids=["replay", "identify", "convert", "method", "no-time"],
@@ -123,6 +123,7 @@ def test_one_message_shows_what_to_type_for_all_columns_without_units(
     bywire: Bywire, rig: Path, words: tuple[str, ...], typed: str
 ) -> None:
     (rig.parent / "titled.csv").write_text(rig.read_text().replace("Zeit", "time"))
+    (rig.parent / "timeless.csv").write_text(rig.read_text().replace("Zeit", "Lauf"))
     refused(bywire(*words), f"type {typed}, each with the unit of its own column")
 
 

@@ -198,7 +198,9 @@ def choose(
 
 def _title_unit(source: Source, column: str) -> str:
     """Return the unit that stands in brackets behind the name of a column, if it is not its own."""
-    return "" if column in source.columns else split_title(column)[1]
+    columns = source.columns
+    is_name = column in columns or any(column == each.path for each in columns.values())
+    return "" if is_name else split_title(column)[1]
 
 
 def every_signal(

@@ -13,7 +13,12 @@ from bywire.core.callers import is_command_line
 from bywire.core.errors import FileError, InputError, ParameterError, UnitError, unknown_name
 from bywire.core.quantities import display_unit
 from bywire.core.units import parse
-from bywire.data.column_choice import MissingUnitsError, NoClockError, every_signal
+from bywire.data.column_choice import (
+    MissingUnitsError,
+    NoClockError,
+    every_signal,
+    left_out_note,
+)
 from bywire.data.column_units import split_title
 from bywire.data.file_format import Progress
 from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
@@ -77,7 +82,8 @@ def read_named(
         }  # fmt: skip
         signals |= {n: _signal(meaning, n, column) for n, column in named.signals.items()}
         whole = replace(meaning, signals=signals)
-        return dataset_of(file, source, whole, None, progress, room())
+        dataset, notes = dataset_of(file, source, whole, None, progress, room())
+        return dataset, notes if meaning.signals else (*notes, *left_out_note(source.left_out))
 
 
 def read_wanted(
