@@ -124,6 +124,7 @@ def ranks() -> dict[str, int]:
 NAMED = {
     "src/bywire/core/brake.py": "where our brakes stand, which the registry finds like anybody's",
     "src/bywire/core/sources.py": "rooms whose files shape models, of which it loads none",
+    "src/bywire/bench/computation.py": "rooms whose definitions count, of which it loads none",
     "src/bywire/api/new.py": "files that are copied and not run",
     "src/bywire/benchmark/commands.py": "a command in a process of its own",
 }

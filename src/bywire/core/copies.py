@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 import signal
 import sys
 import threading
@@ -16,6 +15,7 @@ from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.process import BaseProcess
+from multiprocessing.reduction import ForkingPickler
 from types import ModuleType
 from typing import Any
 
@@ -96,7 +96,7 @@ def processes(
         pool = ProcessPoolExecutor(
             count, get_context("fork") if is_copied else _Anew(), initializer=_begin,
             initargs=(prepare, *arguments) if is_copied else
-            (_prepare, pickle.dumps((prepare, arguments))),
+            (_prepare, bytes(ForkingPickler.dumps((prepare, arguments)))),
         )  # fmt: skip
     workers: list[BaseProcess] = []
     is_over = threading.Event()
@@ -203,7 +203,7 @@ def _begin(prepare: Callable[..., object], *arguments: Any) -> None:
 
 def _prepare(prepared: bytes) -> None:
     """Prepare a process that loads all anew: only now, when it ends with its parent."""
-    prepare, arguments = pickle.loads(prepared)
+    prepare, arguments = ForkingPickler.loads(prepared)
     prepare(*arguments)
 
 
