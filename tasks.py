@@ -46,7 +46,8 @@ HARD_BRAKING = (
     "--unknown motor.R_m --unknown motor.K_e --unknown caliper.K_pd --starts 4"
 )
 HYDRAULIC = (
-    "output-error --system examples/hydraulic_brake.py --set options.input=p_set "
+    "output-error --system examples/hydraulic_brake.py --parameters hydraulic-1 "
+    "--set options.input=p_set "
     "--set options.output=p_mc --set options.end=30bar --output p_mc=0.02bar "
 )
 STUDIES = {  # row of docs/trust.md -> what ``bywire identify`` is asked

@@ -89,6 +89,15 @@ def test_identify_takes_columns_and_noise(bywire: Bywire, rig: Path) -> None:
     assert done.object["figures"]["x.noise"]["value"] == pytest.approx(1e-6)
 
 
+def test_a_check_that_fails_says_what_to_try_next(bywire: Bywire, rig: Path) -> None:
+    """The spring is 10 % too stiff, and nothing but the damping is searched."""
+    done = bywire("identify", "output-error", rig, "--bench", "axis.toml", *NAMED, "--unknown", "d",
+                  "--starts", 1)  # fmt: skip
+    assert done.status == 1
+    assert "check failed: residual_over_noise" in done.err
+    assert "; next, look at x, of which most is left" in done.err
+
+
 def test_convert_names_columns(bywire: Bywire, rig: Path) -> None:
     done = bywire("convert", rig, "out.nc", "--signals", "x=Weg [inch], Kraft [lbf]", "--time",
                   "Zeit [s]")  # fmt: skip
