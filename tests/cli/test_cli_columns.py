@@ -12,6 +12,7 @@ from command_line import Outcome, refused
 import bywire
 from bywire import read_measurement
 from bywire.api.replay_answer import Replay
+from bywire.core import brake as registry
 from bywire.core.errors import FileError, ParameterError, UnitError
 from bywire.server.place import Place
 from bywire.server.tasks import identify as identify_form
@@ -45,6 +46,7 @@ NAMED = ("--input", "F_set=Kraft [lbf]", "--output", "x=Weg [inch]", "--time", "
 def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Return a table in inches and pounds whose columns have no unit, beside its bench."""
     with forgotten():
+        registry._loaded.clear()  # brakes of other tests offer their parameter sets, too
         bywire.load_system(SPRING_AXIS)
         monkeypatch.chdir(tmp_path)
         (tmp_path / "axis.toml").write_text(BENCH)
