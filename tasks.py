@@ -67,6 +67,11 @@ HARD_BRAKING = (
     "output-error --bench hard-braking --parameters dardanelli2010 --output p_mc --output i "
     "--unknown motor.R_m --unknown motor.K_e --unknown caliper.K_pd --starts 4"
 )
+HYDRAULIC = (
+    "output-error --system examples/hydraulic_brake.py --parameters hydraulic-1 "
+    "--set options.input=p_set "
+    "--set options.output=p_mc --set options.end=30bar --output p_mc=0.02bar "
+)
 STUDIES = {  # row of docs/trust.md -> what ``bywire identify`` is asked
     **{
         name: [name]
@@ -77,6 +82,14 @@ STUDIES = {  # row of docs/trust.md -> what ``bywire identify`` is asked
         )
     },
     "braking-dynamics": ["braking-dynamics", "--option", "plant=eq-22", "--option", "model=eq-22"],
+    "emb-friction-strokes": ["friction-strokes", "--system", "examples/emb_caliper"],
+    "hydraulic-ramp": [
+        *HYDRAULIC.split(), "--bench", "ramp", "--set", "options.slope=60bar/s", "--unknown",
+        "seal.f_n", "--unknown", "seal.F_pr",
+    ],
+    "hydraulic-step": [
+        *HYDRAULIC.split(), "--bench", "step", "--unknown", "seal.f_p", "--unknown", "seal.F_pr",
+    ],
     "output-error": HARD_BRAKING.split(),
     "output-error-ideal": [*HARD_BRAKING.split(), "--set", "adc.law=ideal"],
 }  # fmt: skip

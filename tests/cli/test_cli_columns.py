@@ -12,6 +12,7 @@ from command_line import Outcome, refused
 import bywire
 from bywire import read_measurement
 from bywire.api.replay_answer import Replay
+from bywire.core import brake as registry
 from bywire.core.errors import FileError, ParameterError, UnitError
 from bywire.server.place import Place
 from bywire.server.tasks import identify as identify_form
@@ -45,6 +46,7 @@ NAMED = ("--input", "F_set=Kraft [lbf]", "--output", "x=Weg [inch]", "--time", "
 def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Return a table in inches and pounds whose columns have no unit, beside its bench."""
     with forgotten():
+        registry._loaded.clear()  # brakes of other tests offer their parameter sets, too
         bywire.load_system(SPRING_AXIS)
         monkeypatch.chdir(tmp_path)
         (tmp_path / "axis.toml").write_text(BENCH)
@@ -87,6 +89,15 @@ def test_identify_takes_columns_and_noise(bywire: Bywire, rig: Path) -> None:
     assert done.object["parameters"]["k"] == pytest.approx(9e3, rel=1e-9)
     assert "warning" not in done.err  # the record is the model's own
     assert done.object["figures"]["x.noise"]["value"] == pytest.approx(1e-6)
+
+
+def test_a_check_that_fails_says_what_to_try_next(bywire: Bywire, rig: Path) -> None:
+    """The spring is 10 % too stiff, and nothing but the damping is searched."""
+    done = bywire("identify", "output-error", rig, "--bench", "axis.toml", *NAMED, "--unknown", "d",
+                  "--starts", 1)  # fmt: skip
+    assert done.status == 1
+    assert "check failed: residual_over_noise" in done.err
+    assert "; next, look at x, of which most is left" in done.err
 
 
 def test_convert_names_columns(bywire: Bywire, rig: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 from command_line import Outcome, refused
 
 from bywire.bench.bench import Bench
+from bywire.core import brake as registry
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.server import common_fields
 from bywire.server.place import Place
@@ -50,6 +51,7 @@ PUSH = Experiment("push", "spring-axis", "a push", Options, Options(), cases, ju
 def _forgotten() -> Iterator[None]:
     """Forget what a command loads."""
     with forgotten():
+        registry._loaded.clear()  # brakes of other tests offer their parameter sets, too
         yield
 
 

@@ -235,8 +235,8 @@ def require_states(model: Any) -> None:
     ModelError
         With the declaration, the name, and the nearest state.
     """
-    fields = getattr(model.State, "_fields", None)
-    for kind in ("frictions", "limits") if fields is not None else ():
+    fields: tuple[str, ...] = getattr(model.State, "_fields", ())
+    for kind in ("frictions", "limits") if fields else ():
         names = getattr(model, kind)
         if isinstance(names, property):
             continue
