@@ -15,7 +15,7 @@ from bywire.core import arguments
 from bywire.core.errors import BywireError, ModelError, ParameterError
 
 WRONG = ("garbage", None, 3, math.nan, ["a"], {"a": 1}, object(), True)
-UNCHECKED = {"fixed", "measure", "units_of"}  # they take names, or nothing that has a kind
+UNCHECKED = {"evaluate", "fixed", "measure", "units_of"}  # they take names, or what is like data
 
 
 def public() -> Iterator[tuple[str, Any]]:

@@ -12,7 +12,6 @@ import xarray as xr
 
 from bywire.bench.kpis.in_c import InC
 from bywire.bench.kpis.kpi import Kpi, Measure
-from bywire.core.arguments import checked
 from bywire.core.registry import Kind
 
 
@@ -107,7 +106,6 @@ def recorded(name: str, setting: Any, signals: Collection[str]) -> dict[str, str
     }
 
 
-@checked
 def evaluate(name: str, recording: xr.Dataset, setting: Any) -> dict[str, Kpi]:
     """Return all figures of a family by name.
 
