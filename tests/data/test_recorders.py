@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import resource
+import re
 import struct
+import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
 from measurement_files import file_of
 from scipy.io import savemat
 
+from bywire.core.child_process import environment, python_command
 from bywire.core.errors import FileError
 from bywire.data import limited_source
 from bywire.data.measurement import read_with_notes
@@ -265,24 +266,34 @@ def test_what_is_recognized_and_not_read_is_named_with_the_way_out(tmp_path, nam
         read_with_notes(path)
 
 
+UNDER_A_LIMIT = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_AS, (3 * 2**30,) * 2)  # below what a child would be allowed
+from bywire.core.errors import FileError
+from bywire.data import limited_source
+from bywire.data.measurement import read_with_notes
+print(read_with_notes(sys.argv[1])[0]["p_mc"].size)
+limited_source._close_all()
+limited_source.address_space = lambda: 2**27
+limited_source.MOST_MEMORY = 2**16
+try:
+    read_with_notes(sys.argv[1])
+except FileError as error:
+    print(error)
+"""
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of memory")
-def test_a_limit_of_address_space_is_no_obstacle_or_is_named_at_once(tmp_path, monkeypatch):
+def test_a_limit_of_address_space_is_no_obstacle_or_is_named_at_once(tmp_path):
+    """In a process of its own: this one may hold more than the limit already."""
     path = file_of(tmp_path, "netcdf")
-    monkeypatch.setattr(limited_source, "_idle", {})
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    started = time.monotonic()
-    try:
-        resource.setrlimit(resource.RLIMIT_AS, (3 * 2**30, before[1]))
-        assert read_with_notes(path)[0]["p_mc"].size == 400  # below what a child would be allowed
-        limited_source._close_all()
-        monkeypatch.setattr(limited_source, "address_space", lambda: 2**27)
-        monkeypatch.setattr(limited_source, "MOST_MEMORY", 2**16)
-        with pytest.raises(FileError, match=r"limited to 0\.125 GiB .ulimit -v.*raise that limit"):
-            read_with_notes(path)
-    finally:
-        limited_source._close_all()
-        resource.setrlimit(resource.RLIMIT_AS, before)
-    assert time.monotonic() - started < 30.0
+    command = python_command("-c", UNDER_A_LIMIT, str(path))
+    done = subprocess.run(
+        command, env=environment(), capture_output=True, text=True, timeout=30, check=False
+    )
+    size, message = done.stdout.splitlines()
+    assert size == "400"
+    assert re.search(r"limited to 0\.125 GiB .ulimit -v.*raise that limit", message)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of time")
