@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import Outcome, refused
+from scipy.io import savemat
 
 import bywire
 from bywire import read_measurement
@@ -136,6 +137,17 @@ def test_one_message_shows_what_to_type_for_all_columns_without_units(
     (rig.parent / "titled.csv").write_text(rig.read_text().replace("Zeit", "time"))
     (rig.parent / "timeless.csv").write_text(rig.read_text().replace("Zeit", "Lauf"))
     refused(bywire(*words), f"type {typed}, each with the unit of its own column")
+
+
+def test_columns_with_brackets_and_commas_in_their_names(bywire: Bywire, tmp_path: Path) -> None:
+    """Rows of Simulink's To File: what the message says works once units are filled in."""
+    savemat(tmp_path / "rows.mat", {"ans": np.vstack([np.arange(99.0), np.ones((2, 99))])})
+    words = ("convert", tmp_path / "rows.mat", tmp_path / "out.nc")
+    outcome = bywire(*words)
+    refused(outcome, "ans(2,:) [UNIT], ans(3,:) [UNIT]")
+    typed = outcome.err.split('--signals "')[1].split('"')[0].replace("UNIT", "bar")
+    assert bywire(*words, "--signals", typed).status == 0
+    assert float(read_measurement(tmp_path / "out.nc")["ans(3,:)"][0]) == 1e5
 
 
 def test_python_takes_the_same_words(rig: Path) -> None:

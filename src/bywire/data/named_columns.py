@@ -191,7 +191,7 @@ def _options(signals: Mapping[str, str], clock: str, named: NamedColumns | None)
     groups: dict[str, dict[str, str]] = {}
     for name, column in signals.items():
         unit = ((named.units or {}).get(name) if named else None) or ""
-        text = f"{split_title(column)[0]} [{display_unit(unit) or 'UNIT'}]"
+        text = f"{column} [{display_unit(unit) or 'UNIT'}]"
         driven = named.driving.get(name) if named else None
         group = "signals" if named is None else "output" if driven is None else "input"
         groups.setdefault(group, {})[driven or name] = text
