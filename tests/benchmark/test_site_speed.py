@@ -30,7 +30,7 @@ def test_a_clone_is_copied_and_made_twice_or_says_what_failed(tmp_path, monkeypa
     places = []
 
     def made(line, *, cwd, **_):
-        assert line[1:3] == ["-m", "sphinx"]
+        assert line[1:4] == ["-P", "-m", "sphinx"]
         assert (cwd / "docs" / "conf.py").is_file()
         assert not (cwd / "docs" / "_build").exists()
         places.append(cwd)

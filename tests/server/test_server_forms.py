@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -278,7 +279,7 @@ def test_a_campaign_goes_on_fault_by_fault_and_another_goes_elsewhere(visit, mon
         judged.append(failing.name)
         return judge(plan, failing, healthy)
 
-    monkeypatch.setattr(running.os, "cpu_count", lambda: 1)
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)  # one thread: faults one after the other
     monkeypatch.setattr(running, "judge_fault", ended)
     with pytest.raises(RunError, match="seeded"):
         computed(visit, task, asked, out)

@@ -56,12 +56,12 @@ def usual_set(name: str) -> str:
     ParameterError
         For an experiment of any brake where there are several sets to choose from.
     """
-    definition, is_generic, sets = EXPERIMENTS.get(name), name in _any_brake(), sets_of_loaded()
-    if is_generic and len(sets) == 1:
+    definition, sets = EXPERIMENTS.get(name), sets_of_loaded()
+    if len(sets) == 1 and name in _any_brake():
         return sets[0]
     if definition is not None:
         return main_set(definition.assembly, beside=type(definition.defaults))
-    if not is_generic:
+    if name not in _any_brake():
         raise EXPERIMENTS.unknown(name, GENERIC_EXPERIMENTS)
     known = ", ".join(sets or PARAMETER_SETS.all())
     former = "".join(

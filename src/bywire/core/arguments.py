@@ -6,13 +6,12 @@ import inspect
 import operator
 import os
 import reprlib
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache, wraps
 from numbers import Real
 from types import UnionType
 from typing import Any, TypeVar, get_args
-
-import numpy as np
 
 from bywire.core.errors import ParameterError, quoted
 
@@ -184,7 +183,14 @@ def _is_whole(value: object) -> bool:
     return not isinstance(value, bool)
 
 
+def _is_truth_value(value: object) -> bool:
+    numpy = sys.modules.get("numpy")  # where nobody has loaded it, no value is of its kind
+    return isinstance(value, bool if numpy is None else (bool, numpy.bool_))
+
+
 def _are_numbers(value: object) -> bool:
+    import numpy as np  # takes as long to load as all else that a brake is declared with
+
     try:
         array = np.asarray(value)
     except (TypeError, ValueError):
@@ -195,7 +201,7 @@ def _are_numbers(value: object) -> bool:
 _KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "int": ("a whole number", _is_whole),
     "float": ("a number", lambda v: isinstance(v, Real) and not isinstance(v, bool)),
-    "bool": ("True or False", lambda v: isinstance(v, (bool, np.bool_))),
+    "bool": ("True or False", _is_truth_value),
     "str": ("a text", lambda v: isinstance(v, str)),
     "Path": ("a path", lambda v: isinstance(v, os.PathLike)),
     "Mapping": ("a mapping of names to values", lambda v: isinstance(v, Mapping)),

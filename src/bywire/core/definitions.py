@@ -13,17 +13,19 @@ import functools
 import hashlib
 import linecache
 import sys
+from collections import ChainMap
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from enum import Enum
 from importlib import import_module
 from importlib.util import resolve_name
-from types import CodeType, FunctionType, MethodType, ModuleType
+from types import CodeType, FunctionType, MappingProxyType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
 
 _FORMLESS = {"ctx", "type_comment", "annotation", "returns", "type_params", "kind"}
 """fields of a syntax tree that compute nothing"""
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
 _MUTABLE = (dict, list, set)
 _SCALARS = (str, int, float, complex, bool, bytes, type(None), Enum)
 
@@ -49,8 +51,23 @@ def definitions_digest(
     """
     found = _Reached(tuple(rooms), named, with_equations)
     for root in roots:
-        found.visit(root)
+        _take(found.visit(root))
     return hashlib.sha256("\n".join(sorted(found.pieces)).encode()).hexdigest()
+
+
+_Steps = Iterator["_Steps"]
+"""what a definition reaches, one after the other"""
+
+
+def _take(steps: _Steps) -> None:
+    """Take steps, and those that each leads to, at any depth: chains may exceed Python's stack."""
+    stack = [steps]
+    while stack:
+        further = next(stack[-1], None)
+        if further is None:
+            stack.pop()
+        else:
+            stack.append(further)
 
 
 class _Reached:
@@ -62,52 +79,53 @@ class _Reached:
         self.pieces: set[str] = set()
         self._rooms, self._named, self._with_equations = rooms, named, with_equations
         self._seen: dict[int, Any] = {}  # alive, so that no address stands for two
+        self._seen_collections: set[tuple[str, str]] = set()
         self._sources: dict[str, _Source] = {}
 
-    def visit(self, value: Any, name: str = "") -> None:
+    def visit(self, value: Any, name: str = "") -> _Steps:
         """Take in an object; ``name``: what a definition calls it."""
         if isinstance(value, _SCALARS):
             self.pieces.add(f"{name} = {value!r}")
             if isinstance(value, str):
-                self._visit_named(value)
+                yield self._visit_named(value)
             return
         if id(value) in self._seen:
             return
         self._seen[id(value)] = value
         if isinstance(value, FunctionType):
-            self._visit_function(value)
+            yield self._visit_function(value)
         elif isinstance(value, type):
-            self._visit_class(value)
+            yield self._visit_class(value)
         elif isinstance(value, MethodType):
-            self.visit(value.__func__)
-            self.visit(value.__self__)
+            yield self.visit(value.__func__)
+            yield self.visit(value.__self__)
         elif isinstance(value, functools.partial):
-            self.visit((value.func, value.args, value.keywords))
+            yield self.visit((value.func, value.args, value.keywords))
         elif isinstance(value, Mapping):
             for key, each in value.items():
-                self.visit(key)
-                self.visit(each, str(key))
+                yield self.visit(key)
+                yield self.visit(each, str(key))
         elif isinstance(value, (tuple, list, set, frozenset)):
             for each in value:
-                self.visit(each, name)
+                yield self.visit(each, name)
         elif isinstance(value, np.ndarray):
             self.pieces.add(f"{name} = {hashlib.sha256(value.tobytes()).hexdigest()}")
         elif hasattr(value, "__wrapped__"):
-            self.visit(value.__wrapped__)
+            yield self.visit(value.__wrapped__)
         elif self._is_reached(type(value).__module__):
-            self.visit(type(value))
-            self.visit({k: v for k, v in _fields(value) if not k.startswith("__")})
+            yield self.visit(type(value))
+            yield self.visit({k: v for k, v in _fields(value) if not k.startswith("__")})
         else:
             self.pieces.add(f"{name}: {type(value).__name__}")
 
-    def _visit_named(self, text: str) -> None:
+    def _visit_named(self, text: str) -> _Steps:
         for each in self._named(text):
-            self.visit(each)
+            yield self.visit(each)
 
     def _is_reached(self, module: str | None) -> bool:
         return any(f"{module}.".startswith(f"{room}.") for room in self._rooms)
 
-    def _visit_function(self, function: FunctionType) -> None:
+    def _visit_function(self, function: FunctionType) -> _Steps:
         if not self._is_reached(function.__module__):
             self.pieces.add(function.__qualname__)
             return
@@ -120,62 +138,71 @@ class _Reached:
         for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
             content = _content(cell)
             if name != "__class__" and not isinstance(content, _MUTABLE):  # what runs put in there
-                self.visit(content, name)
+                yield self.visit(content, name)
         for node in nodes:
-            self._visit_node(node, function.__globals__)
+            yield self._visit_node(node, function.__globals__)
 
-    def _visit_class(self, kind: type) -> None:
+    def _visit_class(self, kind: type) -> _Steps:
         if not self._is_reached(kind.__module__):
             self.pieces.add(kind.__qualname__)
             return
         if _is_model(kind) and not self._with_equations:
             self.pieces.add(kind.__name__)
-            self.visit(getattr(kind, "rest", None))
+            yield self.visit(getattr(kind, "rest", None))
             return
         module = sys.modules.get(kind.__module__)
         names = {} if module is None else vars(module)
         node = self._source(names.get("__file__") or "", names).class_of(kind.__qualname__)
         if node is not None:
-            self._visit_node(node, names)
+            yield self._visit_node(node, names)
 
     def _source(self, file: str, names: Mapping[str, Any]) -> _Source:
         if file not in self._sources:
             self._sources[file] = _Source(file, names)
         return self._sources[file]
 
-    def _visit_node(self, node: ast.AST, names: Mapping[str, Any]) -> None:
+    def _visit_node(self, node: ast.AST, names: Mapping[str, Any]) -> _Steps:
         """Take in the text of a definition and what it names."""
         self.pieces.add(_form(node))
-        known = {**names, **dict(self._imported(node, names))}
+        imported = dict(self._imported(node, names))
+        known = ChainMap(imported, names)  # type: ignore[arg-type]
         for each in _computing(node):
             if isinstance(each, ast.Constant) and isinstance(each.value, str):
-                self._visit_named(each.value)
+                yield self._visit_named(each.value)
             if isinstance(each, ast.Attribute):
                 holder = _module_named(each.value, known)
                 if holder is not None and self._is_reached(holder.__name__):
-                    self._visit_global(each.attr, vars(holder))
+                    yield self._visit_global(each.attr, vars(holder))
             if isinstance(each, ast.Name):
-                self._visit_global(each.id, known)
+                yield self._visit_global(each.id, names, imported)
 
-    def _visit_global(self, name: str, names: Mapping[str, Any]) -> None:
-        value = names.get(name)
-        if name not in names or name.startswith("__"):
+    def _visit_global(
+        self, name: str, names: Mapping[str, Any], imported: Mapping[str, Any] = _NOTHING
+    ) -> _Steps:
+        known = imported if name in imported else names
+        value = known.get(name)
+        if name not in known or name.startswith("__"):
             return
         if isinstance(value, _MUTABLE):
-            self._visit_assigned(name, names)
+            yield self._visit_assigned(name, names)
         elif not isinstance(value, ModuleType):
-            self.visit(value, name)
+            yield self.visit(value, name)
         elif self._with_equations and self._is_reached(value.__name__):  # an element of a model
-            self.visit([each for each in vars(value).values() if isinstance(each, FunctionType)])
+            functions = [each for each in vars(value).values() if isinstance(each, FunctionType)]
+            yield self.visit(functions)
 
-    def _visit_assigned(self, name: str, names: Mapping[str, Any]) -> None:
+    def _visit_assigned(self, name: str, names: Mapping[str, Any]) -> _Steps:
         """Take in the text of a collection: runs may have changed what it holds since."""
-        source = self._source(names.get("__file__") or "", names)
+        file = names.get("__file__") or ""
+        if (file, name) in self._seen_collections:  # its text may name itself
+            return
+        self._seen_collections.add((file, name))
+        source = self._source(file, names)
         for node in source.assignments_of(name):
-            self._visit_node(node, names)
+            yield self._visit_node(node, names)
         for holder, known_as, original in self._imports(source.tree, names):
             if known_as == name:
-                self._visit_global(original, vars(holder))
+                yield self._visit_global(original, vars(holder))
 
     def _imported(self, node: ast.AST, names: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
         """Yield what a definition imports itself, from the rooms."""
@@ -217,22 +244,28 @@ def _content(cell: Any) -> Any:
 
 def _module_named(node: ast.AST, names: Mapping[str, Any]) -> ModuleType | None:
     """Return the module that an expression such as ``package.module`` names."""
-    if isinstance(node, ast.Name):
-        value = names.get(node.id)
-    elif isinstance(node, ast.Attribute):
-        value = getattr(_module_named(node.value, names), node.attr, None)
-    else:
-        value = None
+    below: list[str] = []
+    while isinstance(node, ast.Attribute):
+        below.append(node.attr)
+        node = node.value
+    value = names.get(node.id) if isinstance(node, ast.Name) else None
+    while below and isinstance(value, ModuleType):
+        value = getattr(value, below.pop(), None)
     return value if isinstance(value, ModuleType) else None
 
 
 def _computing(node: ast.AST) -> Iterator[ast.AST]:
     """Yield all of a tree that computes: no annotations and no docstrings."""
-    yield node
-    for name, value in ast.iter_fields(node):
-        for each in value if isinstance(value, list) else [value]:
-            if isinstance(each, ast.AST) and name not in _FORMLESS and not _is_silent(each):
-                yield from _computing(each)
+    waiting = [node]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        below = [
+            each for name, value in ast.iter_fields(node)
+            for each in (value if isinstance(value, list) else [value])
+            if isinstance(each, ast.AST) and name not in _FORMLESS and not _is_silent(each)
+        ]  # fmt: skip
+        waiting.extend(reversed(below))
 
 
 def _is_silent(node: ast.AST) -> bool:
@@ -242,22 +275,43 @@ def _is_silent(node: ast.AST) -> bool:
     return isinstance(node, (ast.Import, ast.ImportFrom, ast.Pass))
 
 
-def _form(value: Any) -> str:
+def _form(tree: ast.AST) -> str:
     """Return a syntax tree as text, of which every version of Python makes the same."""
-    if isinstance(value, list):
-        parts = (_form(each) for each in value if not _is_silent(each))
-        return f"[{','.join(parts)}]"
-    if isinstance(value, ast.JoinedStr):
-        return f"f({''.join(map(_form, value.values))})"  # its constants are split as one likes
-    if isinstance(value, ast.Constant):
-        return repr(value.value)
-    if not isinstance(value, ast.AST):
-        return repr(value)
-    fields = (
-        f"{name}={_form(each)}" for name, each in ast.iter_fields(value)
-        if name not in _FORMLESS and each is not None and each != []
-    )  # fmt: skip
-    return f"{type(value).__name__}({','.join(fields)})"
+    text: list[str] = []
+    waiting: list[Any] = [tree]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, _Sign):
+            text.append(value)
+        elif isinstance(value, list):
+            waiting.extend(reversed(_row("[", [[v] for v in value if not _is_silent(v)], "]")))
+        elif isinstance(value, ast.JoinedStr):  # its constants are split as one likes
+            waiting.extend(reversed([_Sign("f("), *value.values, _Sign(")")]))
+        elif isinstance(value, ast.Constant):
+            text.append(repr(value.value))
+        elif isinstance(value, ast.AST):
+            fields = [
+                [_Sign(f"{name}="), each] for name, each in ast.iter_fields(value)
+                if name not in _FORMLESS and each is not None and each != []
+            ]  # fmt: skip
+            waiting.extend(reversed(_row(f"{type(value).__name__}(", fields, ")")))
+        else:
+            text.append(repr(value))
+    return "".join(text)
+
+
+class _Sign(str):
+    """Text that goes into the form of a tree as it is."""
+
+    __slots__ = ()
+
+
+def _row(opened: str, parts: list[list[Any]], closed: str) -> list[Any]:
+    """Return parts with commas between them, within brackets."""
+    row: list[Any] = [_Sign(opened)]
+    for number, part in enumerate(parts):
+        row += [_Sign(","), *part] if number else part
+    return [*row, _Sign(closed)]
 
 
 class _Source:

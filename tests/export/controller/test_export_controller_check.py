@@ -17,6 +17,7 @@ from bywire.api.controller_check import ControllerCheck, figures_of
 from bywire.api.export_controller import export_controller
 from bywire.cli.app import app
 from bywire.core.errors import CompilerError
+from bywire.export.controller.target import targets
 from bywire.export.controller.target.targets import CROSS, INSTALL, TARGETS, missing_tools
 from bywire.export.controller.target.trial import TaskFigures, Trial
 
@@ -48,8 +49,8 @@ def test_processors_agree_in_every_bit_and_goals_are_met(structure: str, tmp_pat
 def test_what_is_missing_is_skipped_and_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    which = shutil.which
-    monkeypatch.setattr(shutil, "which", lambda name: None if name == CROSS else which("true"))
+    there = shutil.which("true")
+    monkeypatch.setattr(targets, "find_program", lambda name: None if name == CROSS else there)
     with pytest.warns(match=re.escape(f"{CROSS} not installed ({INSTALL})")):
         made = export_controller(bench_of(BRAKES[1]), tmp_path, vectors=5, check=True)
     assert made.check is not None

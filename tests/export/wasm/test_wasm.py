@@ -114,7 +114,7 @@ def test_what_does_not_fit_is_said(tmp_path_factory, task: Any, said: str) -> No
 def test_without_its_compiler_nothing_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module.importlib.util, "find_spec", lambda _: None)
+    monkeypatch.setattr(module, "bundled_compiler", lambda: None)
     with pytest.raises(CompilerError, match=r"pip install 'bywire\[compiler\]'"):
         export_wasm(BENCHES["motorcycle"], tmp_path / "out")
     assert not (tmp_path / "out").exists()
