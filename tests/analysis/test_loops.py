@@ -164,7 +164,8 @@ def test_both_directions_of_rotation_have_the_same_margins() -> None:
         margins(loop, par.replace({"flywheel.Omega_0": speed}), 200.0) for speed in (60.0, -60.0)
     )
     for one, other in zip(astuple(forward), astuple(backward), strict=True):
-        assert one == pytest.approx(other, rel=1e-6)
+        # NaN: no smaller gain makes it unstable, so that there is no frequency at which one does.
+        assert one == pytest.approx(other, rel=1e-6, nan_ok=True)
 
 
 def test_an_unstable_loop_has_no_margins_and_is_the_worst_case() -> None:
@@ -172,7 +173,7 @@ def test_an_unstable_loop_has_no_margins_and_is_the_worst_case() -> None:
     values = [60.0, 400.0]
     found = over(loop, par, 0.0, "control.position.f_n", values)
     assert [one.stable for one in found] == [True, False]
-    assert all(math.isnan(v) for v in astuple(found[1]) if not isinstance(v, bool))
+    assert all(math.isnan(v) for v in astuple(found[1]) if isinstance(v, float))
     assert all(at == 400.0 for _, at in worst(found, values).values())
 
 

@@ -60,7 +60,7 @@ def test_absolute_path_is_taken_as_it_is(bywire, bench, ride, tmp_path):
         ("time [s],lever [mm]\n0,9\n0.01,9\n", ["none of its columns 'lever'", "pedal [mm]"]),
         ("clock [s],pedal [mm]\n0,9\n0.01,9\n", ["does not say when", "'time [s]'"]),
         ("0,9\n0.01,9\n", ["none of its columns '1, 2'", "add a first row"]),
-        (b"\xff\xfe\x00\x01", ["line 1", "not UTF-8"]),
+        (b"time [s],pedal [m\xfc]\n0,1\n", ["line 1", "not UTF-8"]),
         (bytes(200), ["holds something else"]),
         (HEADER + '0,"9\n0.01,9\n', ["quotation marks"]),
         ("time [s],pedal [mm]," + "x" * 200_000, ["line 1", "field limit"]),

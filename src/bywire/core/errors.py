@@ -12,6 +12,7 @@
     │   └── StepError             steps and sample times that do not divide each other
     └── RunError                  exit status 3: the computation failed
         ├── SolverError           a trajectory that left the numbers or did not settle
+        ├── WorkLimitError        a run that takes more work than it may
         ├── CompilerError         a compiler that failed on a generated kernel
         └── DeviceError           a graphics processor that is missing, full or failed
 """

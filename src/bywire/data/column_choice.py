@@ -28,30 +28,22 @@ class MissingUnitsError(UnitError):
 
     Parameters
     ----------
-    file
-        Where they stand.
+    text
+        What is wrong, and what to do about it.
+    lacking
+        What is wrong alone.
     signals
         Name of the signal -> its column.
     clock
         Column of the instants, where it has none either.
     """
 
-    def __init__(self, file: Path, signals: Mapping[str, str], clock: str = "") -> None:
-        self.signals, self.clock = dict(signals), clock
-        columns = [*map(quoted, self.signals.values()), *([quoted(clock)] if clock else [])]
-        each = "it has" if self.signals else "the time has"
-        self.lacking = (
-            f"{file}, columns {', '.join(columns)}: they have no unit"
-            if len(columns) > 1
-            else f"{file}, column {columns[0]}: {each} no unit"
-        )
-        title, inside = f"{clock} [ms]", f'time = {{ column = "{clock}", unit = "ms" }}'
-        for name, column in self.signals.items():
-            title, inside = f"{column} [mm]", f"[signals.{name}] unit = 'mm'"
-        super().__init__(
-            f"{self.lacking}: write it behind the title, as '{title}', or in a mapping, as "
-            f"{inside}, or '1' for none"
-        )
+    def __init__(
+        self, text: str, lacking: str = "", signals: Mapping[str, str] | None = None,
+        clock: str = "",
+    ) -> None:  # fmt: skip
+        self.lacking, self.signals, self.clock = lacking, dict(signals or {}), clock
+        super().__init__(text)
 
 
 class NoClockError(FileError):
@@ -65,9 +57,27 @@ class NoClockError(FileError):
         Name of the signal -> its column, of those to be read that have no unit either.
     """
 
-    def __init__(self, text: str, signals: Mapping[str, str]) -> None:
-        self.text, self.signals = text, dict(signals)
+    def __init__(self, text: str, signals: Mapping[str, str] | None = None) -> None:
+        self.text, self.signals = text, dict(signals or {})
         super().__init__(text)
+
+
+def _missing_units(file: Path, signals: Mapping[str, str], clock: str = "") -> MissingUnitsError:
+    columns = [*map(quoted, signals.values()), *([quoted(clock)] if clock else [])]
+    each = "it has" if signals else "the time has"
+    lacking = (
+        f"{file}, columns {', '.join(columns)}: they have no unit"
+        if len(columns) > 1
+        else f"{file}, column {columns[0]}: {each} no unit"
+    )
+    title, inside = f"{clock} [ms]", f'time = {{ column = "{clock}", unit = "ms" }}'
+    for name, column in signals.items():
+        title, inside = f"{column} [mm]", f"[signals.{name}] unit = 'mm'"
+    text = (
+        f"{lacking}: write it behind the title, as '{title}', or in a mapping, as "
+        f"{inside}, or '1' for none"
+    )
+    return MissingUnitsError(text, lacking, signals, clock)
 
 
 @dataclass(frozen=True)
@@ -192,7 +202,7 @@ def choose(
     if timeless:
         raise NoClockError(timeless, lacking)
     if lacking or clock:
-        raise MissingUnitsError(file, lacking, clock)
+        raise _missing_units(file, lacking, clock)
     return chosen
 
 
@@ -227,12 +237,12 @@ def _chosen(
     try:
         clock = _clock(file, source, column, signal.clock or meaning.clock)
     except MissingUnitsError as error:
-        raise MissingUnitsError(file, lacking, error.clock) from None
+        raise _missing_units(file, lacking, error.clock) from None
     except NoClockError as error:
         raise NoClockError(error.text, lacking) from None
     where = f"{file}, column {quoted(column.name)}"
     if lacking:
-        raise MissingUnitsError(file, lacking)
+        raise _missing_units(file, lacking)
     symbol = si_symbol(_known_unit(unit, where))
     if signal.unit and column.unit and signal.scale is None:
         _require_same(signal, column, where)
@@ -299,7 +309,7 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
     unit = (given.unit if given is not None else "") or clock.unit
     where = f"{file}, column {quoted(clock.name)}"
     if not unit:
-        raise MissingUnitsError(file, {}, clock.name)
+        raise _missing_units(file, {}, clock.name)
     if not measures(_known_unit(unit, where), "s"):
         raise UnitError(f"{where}: {unit!r} is no unit of time: choose another column")
     if given is not None and given.unit and clock.unit:

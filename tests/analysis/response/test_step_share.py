@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import bywire
-from bywire.analysis.response.step_share import largest, with_step_errors
+from bywire.analysis.response.step_share import FIGURES, largest, with_step_errors
 from bywire.api import frequency_response as use_case
 from bywire.core.errors import RunError
 
@@ -49,7 +49,7 @@ def test_half_steps_that_do_not_run_are_said_to(monkeypatch: pytest.MonkeyPatch)
 
 def response(gain: list[float], phase: list[float], bandwidth: float) -> xr.Dataset:
     three, two = ("variant", "amplitude", "frequency"), ("variant", "amplitude")
-    figures = {name: (two, [[bandwidth]]) for name in ("bandwidth", "crossover", "phase_margin")}
+    figures = {name: (two, [[bandwidth]]) for name in FIGURES[2:]}
     return xr.Dataset({"gain": (three, [[gain]]), "phase": (three, [[phase]]), **figures})
 
 

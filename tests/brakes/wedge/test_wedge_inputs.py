@@ -77,8 +77,10 @@ def test_steep_angle_in_degrees_is_taken(monkeypatch, capsys):
 
 
 def warnings(name, options=None, **overrides):
+    """Return the warnings of a run but for those of estimates that were derived before."""
     changes = {key.replace("__", "."): value for key, value in overrides.items()}
-    return run_once(bywire.Bench(name, "roberts2003", changes, options or {})).warnings
+    run = run_once(bywire.Bench(name, "roberts2003", changes, options or {}))
+    return [text for text in run.warnings if " is derived (" not in text]
 
 
 def test_moment_out_of_reach_is_said_with_numbers():

@@ -102,8 +102,7 @@ def test_stiffness(results):
     "changes",
     [
         {"heart.K_S": 80e6, "heart.K_W": 20e6, "heart.g_1": 50e-6, "heart.g_12": 0.0},
-        {"heart.K_W": 60e6, "rig.sensor.K_F": 40e6, "screw.eta_f": 0.8, "screw.eta_b": 0.75,
-         "screw.law": "drive"},
+        {"heart.K_W": 60e6, "rig.sensor.K_F": 40e6, "screw.eta_f": 0.8, "screw.law": "drive"},
     ],
 )
 def test_other_stiffnesses(changes):
