@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from bywire.core.definitions import definitions_digest
 
 
 @pytest.fixture
-def digest_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def digest_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], str]:
     """Return the digest of function ``root`` in a module with a text."""
 
     def digest(text: str) -> str:
@@ -29,13 +30,13 @@ def digest_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     return digest
 
 
-def test_a_collection_may_name_itself(digest_of) -> None:
+def test_a_collection_may_name_itself(digest_of: Callable[[str], str]) -> None:
     text = 'TABLE = {"gain": 2.0}\nTABLE = {**TABLE, "offset": 1.0}\ndef root(): return TABLE\n'
     assert digest_of(text) == digest_of(f"# the same, with a comment\n{text}")
     assert digest_of(text) != digest_of(text.replace("2.0", "3.0"))
 
 
-def test_chains_of_definitions_may_exceed_the_stack(digest_of) -> None:
+def test_chains_of_definitions_may_exceed_the_stack(digest_of: Callable[[str], str]) -> None:
     count = 2 * sys.getrecursionlimit()
     chain = "".join(f"def f{k}(): return f{k + 1}()\n" for k in range(count))
     text = f"{chain}def f{count}(): return 2.0\nroot = f0\n"
@@ -43,13 +44,13 @@ def test_chains_of_definitions_may_exceed_the_stack(digest_of) -> None:
     assert digest_of(text) != digest_of(text.replace("2.0", "3.0"))
 
 
-def test_long_sums_may_exceed_the_stack(digest_of) -> None:
+def test_long_sums_may_exceed_the_stack(digest_of: Callable[[str], str]) -> None:
     text = f"def root(x): return {'x + ' * sys.getrecursionlimit()}2.0\n"
     assert digest_of(text) == digest_of(f"# the same, with a comment\n{text}")
     assert digest_of(text) != digest_of(text.replace("2.0", "3.0"))
 
 
-def test_what_a_function_imports_hides_no_other_name(digest_of) -> None:
+def test_what_a_function_imports_hides_no_other_name(digest_of: Callable[[str], str]) -> None:
     """A collection is made of names of its module, whichever function reaches it."""
     text = (
         "def scale(): return 2.0\nTABLE = {'gain': scale()}\n"

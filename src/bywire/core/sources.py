@@ -28,9 +28,12 @@ _HARMLESS = {
     for name in (
         "blas",
         "callers",
+        "child_process",
+        "clean_text",
         "engines",
         "errors",
         "interrupts",
+        "machine_memory",
         "sources",
         "unneeded",
         "version",
