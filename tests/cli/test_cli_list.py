@@ -17,9 +17,10 @@ from bywire.api.described_systems import (
 from bywire.api.overview import overview
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.errors import UnknownNameError
+from bywire.core.errors import FileError, UnknownNameError
 from bywire.core.model import ASSEMBLIES
 from bywire.identification.method import METHODS
+from bywire.simulation import kernel_cache
 from bywire.synthesis.study import STUDIES
 
 Bywire = Callable[..., Outcome]
@@ -205,3 +206,12 @@ def test_every_value_of_a_set_says_where_it_comes_from(bywire: Bywire) -> None:
     assert told["motor.K_e"] == "paper: Table 1"
     assert told["caliper.K_pd"].startswith("calibrated: estimated, 95 % interval ")
     assert "provenance" in bywire("list", "dardanelli2010-measured").out
+
+
+def test_a_list_is_made_where_nothing_can_be_kept(monkeypatch):
+    def refused():
+        raise FileError("a temporary folder cannot be made")
+
+    before = overview()
+    monkeypatch.setattr(kernel_cache, "usable_folder", refused)
+    assert overview().things == before.things

@@ -30,6 +30,7 @@ from bywire.core.child_process import (
     start_python,
 )
 from bywire.core.errors import CompilerError
+from bywire.core.scratch import process_folder
 from bywire.server.serving import opened
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.kernel_cache import usable_folder
@@ -215,6 +216,21 @@ def test_kernels_are_not_taken_from_the_working_folder(
     monkeypatch.setenv("XDG_CACHE_HOME", "cache")
     assert usable_folder().is_absolute()
     assert not usable_folder().is_relative_to(tmp_path)
+
+
+@posix
+def test_a_compiler_writes_elsewhere_where_home_takes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It keeps what it makes there, and else ends: a file in its place stands for such a disk."""
+    asked = python_command("-c", "import os; print(os.environ.get('ZIG_GLOBAL_CACHE_DIR', ''))")
+    for name in ("ZIG_GLOBAL_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert run_program(asked, 60.0).stdout.strip() == ""
+    for home in (os.devnull, "", "relative"):
+        monkeypatch.setenv("HOME", home)
+        assert run_program(asked, 60.0).stdout.strip() == str(process_folder() / "zig")
 
 
 def test_processes_are_started_in_one_place() -> None:

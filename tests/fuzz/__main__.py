@@ -31,6 +31,7 @@ from random import Random
 if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from bywire.api.run_study import run_study
 from bywire.data import limited_source
 from fuzz import failing, inputs, kills, layouts, options, plans, sound, study_kills
 from fuzz.judge import Verdict, judged, judged_alone
@@ -101,14 +102,16 @@ def study(rng: Random, folder: Path) -> Verdict:
 
 def life(rng: Random, folder: Path) -> Verdict:
     """Project a generated life."""
-    (folder / "life.toml").write_text(plans.life_text(rng), encoding="utf-8")
-    return judged(["life", str(folder / "life.toml")])
+    text, is_sound = plans.life_text(rng)
+    (folder / "life.toml").write_text(text, encoding="utf-8")
+    return replace(judged(["life", str(folder / "life.toml")]), is_sound=is_sound)
 
 
 def option(rng: Random, folder: Path) -> Verdict:
     """Run a command with a value that is too large, too small or not a number at all."""
     if not (folder / "measured.csv").exists():
         options.prepared(folder)
+        run_study(folder / "study.toml", folder / "studied", cases=4, workers=1)
     return judged(options.command_line(rng))
 
 

@@ -41,6 +41,7 @@ WRITERS = {
     "check": ["check", "adc", "--out", "{out}"],
 }  # fmt: skip
 _LONGEST = 120.0
+_CASES = 600  # of a study that goes on: several chunks
 _FORKED = 0.9  # of the commands
 _LATEST = {True: 1.5, False: 6.0}  # s after which they are ended: copies of this process are loaded
 
@@ -73,7 +74,9 @@ def case(
     env = {**os.environ, "TMPDIR": str(temporary), "PYTHONPATH": paths}
     names = rng.sample(["run", "ramp", "stribeck", "margins"], 2)
     second = rng.choice([names[1], *WRITERS]) if rng.random() < 0.5 else names[1]
-    if rng.random() < 0.7:
+    if second == "resume":
+        _begun(out)
+    elif rng.random() < 0.7:
         made = judged(_words(names[0], out))  # here, which is quicker
         assert made.status in (0, 1, 2), made.wrong
     before = _listing(out)
@@ -106,6 +109,14 @@ def case(
 
 def _words(name: str, out: Path) -> list[str]:
     return [word.format(out=out, folder=out.parent, name="drum") for word in WRITERS[name]]
+
+
+def _begun(out: Path) -> None:
+    """Have a folder hold a study of which some cases are still to be computed."""
+    made = judged([*_words("tolerances", out), "--cases", str(_CASES)])
+    assert made.status in (0, 1), made.wrong
+    for chunk in sorted((out / "chunks").iterdir())[1:]:
+        chunk.unlink()
 
 
 def _finished(process: Forked | subprocess.Popen[str]) -> None:

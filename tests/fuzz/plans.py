@@ -83,12 +83,12 @@ def study_text(rng: Random) -> tuple[str, bool]:
     return (_broken(rng, text), False) if rng.random() < inputs.DEFECTS else (text, True)
 
 
-def life_text(rng: Random) -> str:
-    """Return a life file of a few stops."""
+def life_text(rng: Random) -> tuple[str, bool]:
+    """Return a life file of a few stops, and whether it is one without a defect on purpose."""
     lines = [f'life = "{rng.choice(("wedge-pads",) * 9 + ("pads",))}"', "[vary]"]
     lines += _varied(rng, _LIFE_NAMES)
     lines += ["[projection]", "stops = 2", f"longest = {rng.choice((10, 100, 1000))}"]
     lines += [f'share = "{_width(rng)}"'] if rng.random() < 0.3 else []
     lines += [f"seed = {rng.randrange(9)}"] if rng.random() < 0.5 else []
     text = "\n".join(lines) + "\n"
-    return _broken(rng, text) if rng.random() < 0.8 else text
+    return (_broken(rng, text), False) if rng.random() < inputs.DEFECTS else (text, True)

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 from bywire.core.errors import FileError, ParameterError, UnknownNameError
+from bywire.server import service
 from bywire.server.address import HERE, NAMES
 from bywire.server.handler import Handler
 from bywire.server.place import safe_name
@@ -223,3 +224,13 @@ def test_a_client_that_is_gone_before_the_end_of_an_answer_is_no_error():
             raise OSError(errno.ENOTCONN, "Transport endpoint is not connected")
 
     Handler._linger(SimpleNamespace(connection=Gone()))
+
+
+def test_a_folder_on_a_read_only_disk_is_named(tmp_path, monkeypatch):
+    def refused(_):
+        raise OSError(errno.EROFS, "Read-only file system", str(tmp_path / ".bywire-x"))
+
+    monkeypatch.setattr(service, "scratch_folder", refused)
+    text = f"^{tmp_path}: Read-only file system: name a folder that you may write to with folder"
+    with pytest.raises(FileError, match=text), opened(folder=tmp_path, port=0):
+        pass

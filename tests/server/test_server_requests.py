@@ -129,6 +129,20 @@ def test_an_address_that_is_none_is_refused(visit, address):
     assert b"defect" not in said
 
 
+@pytest.mark.parametrize(
+    ("line", "status"),
+    [
+        *((line, 400) for line in ("GET", "GET /", "POST /", "GET / HTTP/a.b", "GET / / HTTP/1.1")),
+        *((f"GET / HTTP/{version}", 400) for version in ("0.9", "2.0", "-1.1", "9" * 5000)),
+        *((f"{method} / HTTP/1.1", 405) for method in ("get", "G\0T", "_reply", "GET:")),
+    ],
+)
+def test_a_first_line_that_is_none_is_refused_with_a_status(visit, line, status):
+    """Also where it names an old version of HTTP, whose answers have no status."""
+    said = said_to(visit.server.port, f"{line}\r\nHost: {HERE}\r\n\r\n".encode())
+    assert said.startswith(b"HTTP/1.1 %d " % status)
+
+
 @pytest.mark.parametrize("path", ["a" * 256, "a" * 252 + ".toml", "\xe4" * 200, "a/" * 4000])
 def test_a_name_that_no_system_takes_is_not_there(visit, path):
     assert (

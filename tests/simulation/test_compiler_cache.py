@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import stat
 import subprocess
 import sys
@@ -257,3 +258,27 @@ def test_a_full_disk_is_said_with_a_way_out(cache, monkeypatch):
     monkeypatch.setattr(compiler_module, "_compile", full)
     with pytest.raises(CompilerError, match=rf"{cache}.*No space left.*set BYWIRE_CACHE"):
         compile_library(SOURCE, PLAIN, system_compiler())
+
+
+@pytest.mark.parametrize("is_before", [True, False])
+def test_a_cache_deleted_while_it_is_used_costs_nothing(cache, monkeypatch, is_before):
+    """Kernels are then compiled where the process keeps its temporary files."""
+    compile_it, usable = compiler_module._compile, compiler_module.usable_folder
+
+    def in_a_deleted_one(*args: object) -> None:
+        if cache.exists():
+            shutil.rmtree(cache)
+        compile_it(*args)  # type: ignore[arg-type]
+
+    def deleted() -> Path:
+        folder = usable()
+        shutil.rmtree(folder)
+        return folder
+
+    if is_before:
+        monkeypatch.setattr(compiler_module, "usable_folder", deleted)
+    else:
+        monkeypatch.setattr(compiler_module, "_compile", in_a_deleted_one)
+    library = compile_library(SOURCE, PLAIN, system_compiler())
+    assert library.parent == scratch.process_folder()
+    assert twice(library) == 42.0

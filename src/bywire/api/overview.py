@@ -6,10 +6,11 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from bywire.core.brake import brakes
-from bywire.core.errors import unknown_name
+from bywire.core.errors import FileError, unknown_name
 from bywire.core.sources import source_state
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import Document, Section, TableBlock
@@ -117,18 +118,20 @@ def _things() -> tuple[Mapping[str, Any], list[str]]:
     from bywire.simulation.kernel_cache import keep_text, usable_folder
 
     names = hashlib.sha256(" ".join(brakes()).encode()).hexdigest()[:8]
-    index = usable_folder() / f"overview-{names}.json"
+    index: Path | None = None
     state = source_state().digest
     try:
+        index = usable_folder() / f"overview-{names}.json"
         kept = json.loads(index.read_text(encoding="utf-8"))
         if kept["state"] == state:
             return kept["things"], kept["doubts"]
-    except (OSError, ValueError, KeyError, TypeError):
-        pass  # none yet, or not ours
+    except (FileError, OSError, ValueError, KeyError, TypeError):
+        pass  # none yet, not ours, or no room for any
     from bywire.api.things import all_things, doubts
 
     things, texts = all_things(), doubts()
-    keep_text(index, json.dumps({"state": state, "things": things, "doubts": texts}))
+    if index is not None:
+        keep_text(index, json.dumps({"state": state, "things": things, "doubts": texts}))
     return things, texts
 
 

@@ -23,7 +23,7 @@ from bywire.core.child_process import leave_out_working_folder
 from bywire.core.errors import BywireError, ModelError, ParameterError
 from bywire.core.interrupts import interrupts_noted
 from bywire.core.machine_memory import address_space
-from bywire.core.unneeded import leave_out_dask
+from bywire.core.unneeded import leave_out_dask, silence_matplotlib
 
 FAILED = 3
 GARBAGE = 50_000
@@ -46,6 +46,7 @@ def process() -> None:
     atexit.register(leave)  # the first, and so the last that is called
     leave_out_working_folder()
     leave_out_dask()
+    silence_matplotlib()
     keep_one_thread()
     try:
         main()

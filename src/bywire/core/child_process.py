@@ -22,6 +22,8 @@ from contextlib import contextmanager
 from importlib.machinery import PathFinder
 from pathlib import Path
 
+from bywire.core.scratch import process_folder
+
 _LISTS = (
     "PATH",
     "LD_LIBRARY_PATH",
@@ -184,6 +186,28 @@ def start_python(
     )
 
 
+def _tool_folders() -> dict[str, str]:
+    """Return variables that lead the extra's compiler to a folder that it can write to.
+
+    It keeps what it makes in the user's cache folder, and ends where there is none, or where that
+    is on a read-only disk.
+    """
+    home = os.environ.get("HOME", "")
+    above = os.environ.get("XDG_CACHE_HOME") or (os.path.join(home, ".cache") if home else "")
+    if "ZIG_GLOBAL_CACHE_DIR" in os.environ or sys.platform == "win32" or _is_writable(above):
+        return {}
+    folder = str(process_folder() / "zig")
+    return {"ZIG_GLOBAL_CACHE_DIR": folder, "ZIG_LOCAL_CACHE_DIR": folder}
+
+
+def _is_writable(folder: str) -> bool:
+    """Return whether a folder can be written to, or be made in one that can."""
+    if not os.path.isabs(folder):
+        return False
+    there = next(each for each in Path(folder, "zig", "x").parents if each.exists())
+    return there.is_dir() and os.access(there, os.W_OK | os.X_OK)
+
+
 def run_program(command: Sequence[str], seconds: float) -> subprocess.CompletedProcess[str]:
     """Run a program to its end, outside of the working folder: its paths must be absolute.
 
@@ -197,7 +221,7 @@ def run_program(command: Sequence[str], seconds: float) -> subprocess.CompletedP
     return subprocess.run(
         command,
         cwd=_ELSEWHERE,
-        env=environment(),
+        env={**environment(), **_tool_folders()},
         timeout=seconds,
         stdin=subprocess.DEVNULL,
         capture_output=True,

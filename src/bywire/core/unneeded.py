@@ -1,7 +1,8 @@
-"""A library that another imports although nobody here uses it."""
+"""What libraries do although nobody here needs it."""
 
 from __future__ import annotations
 
+import logging
 import sys
 from typing import Any
 
@@ -22,3 +23,8 @@ def allow_dask() -> None:
     """Have dask again: something that may want it is about to be loaded."""
     if _NAME in _modules and _modules[_NAME] is None:
         del _modules[_NAME]
+
+
+def silence_matplotlib() -> None:
+    """Have matplotlib not tell that it keeps its fonts elsewhere where home is read-only."""
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)

@@ -45,6 +45,15 @@ class Handler(BaseHTTPRequestHandler):
     timeout = 60.0  # s without a byte
     service: Service
 
+    def parse_request(self) -> bool:
+        """Read a first line and headers; a line without a version of HTTP is refused."""
+        if not super().parse_request():
+            return False
+        if self.request_version == "HTTP/0.9":
+            self.send_error(HTTPStatus.HTTP_VERSION_NOT_SUPPORTED)
+            return False
+        return True
+
     def do_GET(self) -> None:
         """Answer, whatever the method."""
         reply = self._reply()
@@ -162,8 +171,13 @@ class Handler(BaseHTTPRequestHandler):
     def send_error(
         self, code: int, message: str | None = None, explain: str | None = None
     ) -> None:
-        """Say what of a request HTTP itself does not understand."""
+        """Say what of a request HTTP itself does not understand, always with a status line."""
         self.close_connection = True
+        self.request_version = self.protocol_version
+        if code == HTTPStatus.NOT_IMPLEMENTED:
+            code, message = 405, f"{quoted(self.command)} is not answered: use {', '.join(METHODS)}"
+        elif code == HTTPStatus.HTTP_VERSION_NOT_SUPPORTED:
+            code, message = 400, "this version of HTTP is not spoken: ask by HTTP/1.1"
         status = HTTPStatus(code)
         body = refusal_page(code, message or status.phrase).encode()
         self.send_response(code)

@@ -86,10 +86,10 @@ def opened(
                 path = f"/bench?of={quote(bench, safe='')}&" if bench else "/?"
                 number = server.server_address[1]
                 yield Opened(server, service, f"http://{HERE}:{number}{path}token={service.token}")
-        except PermissionError as error:
+        except OSError as error:
             raise FileError(
-                f"{error.filename}: {error.strerror}: name a folder that you may write to with "
-                "--folder"
+                f"{place.root}: {error.strerror or error}: name a folder that you may write to "
+                "with --folder, and make room there"
             ) from None
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from bywire.core.child_process import find_program, module_command, run_program
 from bywire.core.errors import CompilerError
-from bywire.core.scratch import scratch_folder
+from bywire.core.scratch import process_folder, scratch_folder
 from bywire.simulation.kernel_cache import digest_of, is_intact, load, sha256, usable_folder
 
 # Kernels compare and select all the time: without these, maxima become branches. A compiler that
@@ -198,19 +198,41 @@ def compile_library(
     if is_intact(library, entry):
         return library
     try:
-        with scratch_folder(folder) as scratch:
-            text, built, fresh = scratch / "kernel.c", scratch / "kernel.so", scratch / "digest"
-            text.write_text(source)
-            _compile(compiler, flags, text, built)
-            fresh.write_text(sha256(built))
-            os.replace(built, library)
-            os.replace(fresh, digest_of(library))
+        if _compiled_into(library, source, flags, compiler):
+            return library
+        folder = process_folder()
+        library = folder / f"{key}.so"
+        _compiled_into(library, source, flags, compiler)
     except OSError as error:
         raise CompilerError(
             f"a compiled kernel cannot be written to {folder} ({error.strerror}): make room there, "
             "or set BYWIRE_CACHE to another folder"
         ) from None
     return library
+
+
+def _compiled_into(
+    library: Path, source: str, flags: tuple[str, ...], compiler: Compiler
+) -> bool:
+    """Write a library with its digest; return False if somebody deleted its folder meanwhile."""
+    try:
+        with scratch_folder(library.parent) as scratch:
+            text, built, fresh = scratch / "kernel.c", scratch / "kernel.so", scratch / "digest"
+            try:
+                text.write_text(source)
+                _compile(compiler, flags, text, built)
+                fresh.write_text(sha256(built))
+                os.replace(built, library)
+                os.replace(fresh, digest_of(library))
+            except (OSError, CompilerError):
+                if scratch.is_dir():
+                    raise
+                return False
+    except FileNotFoundError:
+        if library.parent.is_dir():
+            raise
+        return False
+    return True
 
 
 @cache
