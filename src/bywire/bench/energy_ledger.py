@@ -120,8 +120,9 @@ def deliveries(
     made = []
     for name, role in losses.items():
         values = recording.variables[name].values
-        before = 0.0 if role.returns else np.maximum.accumulate(values, axis=-1)
-        most = _plain(np.max(before - values, axis=-1))
+        # What may return a while counts at the end, of which rows of ends alone tell the same.
+        fallen = -values[..., -1:] if role.returns else np.maximum.accumulate(values, -1) - values
+        most = _plain(np.max(fallen, axis=-1))
         made.append(Delivery(name, role.label, role.book, _positive(most), turnovers[role.book]))
     return made
 
