@@ -63,6 +63,7 @@ class _Reached:
         self._rooms, self._named, self._with_equations = rooms, named, with_equations
         self._seen: dict[int, Any] = {}  # alive, so that no address stands for two
         self._sources: dict[str, _Source] = {}
+        self._collections: set[tuple[str, str]] = set()  # file and name
 
     def visit(self, value: Any, name: str = "") -> None:
         """Take in an object; ``name``: what a definition calls it."""
@@ -170,7 +171,11 @@ class _Reached:
 
     def _visit_assigned(self, name: str, names: Mapping[str, Any]) -> None:
         """Take in the text of a collection: runs may have changed what it holds since."""
-        source = self._source(names.get("__file__") or "", names)
+        file = names.get("__file__") or ""
+        if (file, name) in self._collections:  # its own text may name it
+            return
+        self._collections.add((file, name))
+        source = self._source(file, names)
         for node in source.assignments_of(name):
             self._visit_node(node, names)
         for holder, known_as, original in self._imports(source.tree, names):
