@@ -122,7 +122,7 @@ def estimated(bench: bywire.Bench) -> list[Result]:
 
 
 def test_an_estimate_that_takes_too_much_work_is_abandoned_with_a_note(monkeypatch):
-    """Half the step is twice the work; twice the step, half of it, still tells the error."""
+    """Half the step is twice the work. The others bound the error, but show no order."""
     bench = bywire.Bench("hard-braking", SET, options={"duration": 0.1, "settle": 0.1})
     usual = estimated(bench)
     for module in (running, ensemble, step_error):
@@ -131,7 +131,8 @@ def test_an_estimate_that_takes_too_much_work_is_abandoned_with_a_note(monkeypat
         assert whole.warnings == []
         (warning,) = abandoned.warnings
         assert warning.startswith(HALF)
-        assert 0.0 < abandoned.kpi("rise_time").error <= whole.kpi("rise_time").error
+        assert not abandoned.kpi("rise_time").converges
+        assert 0.0 < whole.kpi("rise_time").error <= abandoned.kpi("rise_time").error < 1e-4
 
 
 def test_work_is_counted_in_substeps_the_same_alone_and_side_by_side():
