@@ -65,7 +65,7 @@ def test_a_parameter_that_a_choice_switches_off_is_refused(tmp_path: Path) -> No
         ("hard-braking", "dardanelli2010", {"vapor.water": 0.02}),  # of a figure
         ("hard-braking", "dardanelli2010", {"fluid.V_air": 0.0}),  # what the set has
         ("pedal-tracking", "dardanelli2010", {"pedal.k_spring": 5e3}),  # of the rider's demand
-        ("stribeck", "dardanelli2010", {"seal.c": 4.0}),  # of an experiment without runs
+        ("seal-stribeck", "dardanelli2010", {"seal.c": 4.0}),  # of an experiment without runs
         ("rear-lift", "sport600", {"vehicle.road.first.D": 1.1}),
         ("straight-stop", "sport600", {"ecu.rules.slip_keep": 0.4, "ecu.abs": "rules"}),
     ],

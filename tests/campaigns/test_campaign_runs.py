@@ -210,7 +210,8 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
         ('signal = "p_pd"\nbelow', 'signal = ["p_pd"]\nbelow', "unknown signal of criterion"),
         ('present =', 'leave_out = ["*"]\npresent =', "leaves no fault"),
         ('delay = "5 ms"', 'value = 3', "bridge.open-phase takes no value"),
-        ("battery = 1", "battery = 1" + "0" * 400, "0 to 1e12 is wanted"),
+        ("battery = 1", "battery = 1" + "0" * 400, "battery = a number of 300 digits or more"),
+        ("battery = 1", "battery = 1e13", "0 to 1e12 is wanted"),
         (SMALL, 'bench = "bandwidths"', "makes one run without faults, but 'bandwidths' makes"),
     ],
 )  # fmt: skip

@@ -12,12 +12,24 @@ COMMANDS = {
     "run": ("run", "{bench}", "--no-error-estimate"),
     "page": ("page", "{bench}", "--out", "{out}/page.html"),
     "compare": ("compare", "{bench}", "{bench}", "--set", "parameters={parameters}"),
+    "study": ("study", "run", "{out}/study.toml", "--out", "{out}/study", "--workers", "1"),
     "wasm": ("export", "wasm", "{bench}", "--out", "{out}/wasm"),
     "fmu": ("export", "fmu", "{bench}", "--out", "{out}/unit"),
     "controller": ("export", "controller", "{bench}", "--out", "{out}/ecu", "--vectors", "8"),
 }
-QUICK = {("page", "pedal_tracking"), ("wasm", "hot_motor"), ("controller", "corner_wet_stop")}
-"""what is tried each time: tables among the parameters, faults from the start, an ECU of two"""
+STUDY = """
+bench = "{bench}"
+[vary]
+"motor.R_m" = "+-1 %"
+[design]
+kind = "grid"
+levels = 2
+"""
+QUICK = {
+    *(("page", "pedal_tracking"), ("study", "open_loop_chirp"), ("wasm", "hot_motor")),
+    ("controller", "corner_wet_stop"),
+}
+"""what is tried each time: tables, a collection whose text names it, faults, an ECU of two"""
 
 
 @pytest.mark.parametrize(
@@ -35,6 +47,7 @@ def test_a_command_takes_a_shipped_bench(bywire, tmp_path: Path, command: str, f
     text = file.read_text(encoding="utf-8")
     chosen = next(line for line in text.splitlines() if line.startswith("parameters"))
     given = {"bench": file, "out": tmp_path, "parameters": chosen.split('"')[1]}
+    (tmp_path / "study.toml").write_text(STUDY.format(bench=file))
     outcome = bywire(*(word.format(**given) for word in COMMANDS[command]))
     assert "defect of bywire" not in outcome.err
     if outcome.status == 2:

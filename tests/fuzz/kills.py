@@ -27,7 +27,7 @@ WRITERS = {
     "linearize": ["linearize", "motorcycle-plant", "--out", "{out}"],
     "new": ["new", "{name}"],
     "stability": ["study", "stability", "--out", "{out}"],
-    "design": ["design", "current", "--out", "{out}"],
+    "design": ["design", "current", "--require", "bandwidth >= 10 Hz", "--out", "{out}"],
     "life": ["life", "wedge-pads", "--set", "wear.mechanism=none", "--out", "{out}"],
     "faults": ["faults", "{folder}/campaign.toml", "--out", "{out}"],
     "tolerances": ["study", "run", "{folder}/study.toml", "--out", "{out}"],

@@ -49,6 +49,12 @@ COMMANDS: dict[str, list[str]] = {
     "export wasm": [*BRAKING, "--out", "wasm"],
 }
 """a line of each that is right, or for some ends early"""
+_CRITERION = """[[criteria]]
+name = "released"
+signal = "p_mc"
+below = "1 bar"
+lasting = "5 ms"
+"""
 _KEYS = ("options.duration", "options.settle", "simulation.step", "simulation.record", "motor.R_m",
          "simulation.seed", "ecu.T_s", "options.p_to", "p_mc", "p_set", "nrmse", "bandwidth",
          "i_max")  # fmt: skip
@@ -94,7 +100,8 @@ def prepared(folder: Path) -> Path:
     write_measurement(data, folder / "measured.csv", overwrite=True)
     head = 'bench = "hard-braking"\n[set]\n"options.duration" = "30 ms"\n'
     (folder / "study.toml").write_text(f'{head}[vary]\n"motor.R_m" = "+-5 %"\n')
-    (folder / "campaign.toml").write_text(f'{head}[campaign]\nonly = ["pressure.stuck"]\n')
+    only = '[campaign]\nonly = ["pressure.stuck"]\n'
+    (folder / "campaign.toml").write_text(head + only + _CRITERION)
     (folder / "life.toml").write_text('life = "none"\n')
     return folder
 

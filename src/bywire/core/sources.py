@@ -34,6 +34,7 @@ _HARMLESS = {
         "errors",
         "interrupts",
         "machine_memory",
+        "scratch",
         "sources",
         "unneeded",
         "version",

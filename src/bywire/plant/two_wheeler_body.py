@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, NamedTuple
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from bywire.core import ops
@@ -251,8 +251,8 @@ def watch(t: Array, x: State, par: Parameters) -> list[str]:
     At the pitch :math:`\arctan(l_f/h)` the center of gravity is above the front contact. Beyond,
     gravity pitches the body further, whatever the brakes do.
     """
-    limit = np.degrees(np.arctan2(par.l_f, par.h))
-    pitch = np.degrees(x.phi)
-    most = f" (pitch up to {highest(pitch):.3g} deg, limit {highest(limit):.3g} deg)"
+    limit = math.degrees(math.atan2(par.l_f, par.h))
+    pitch = x.phi * (180.0 / math.pi)
+    most = f" (pitch up to {highest(pitch):.3g} deg, limit {limit:.3g} deg)"
     text = "the rider goes over the handlebar: the center of gravity passes the front wheel"
-    return first(t, np.greater(pitch, limit), text, f"{most}, and what follows is no longer a stop")
+    return first(t, pitch > limit, text, f"{most}, and what follows is no longer a stop")

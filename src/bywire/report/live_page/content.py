@@ -286,8 +286,8 @@ def _read_as(symbol: str) -> dict[str, Any]:
         unit: scale for unit, scale in _SHIFTED.items()
         if symbol == "K" and _value(f"0 {unit}", symbol) is not None
     }  # fmt: skip
-    known = "" if symbol == "1" else f"{symbol.replace('delta_degC', 'K')}*"
-    is_turning = _value(f"1 {known}rad", symbol) is None
+    known = "" if symbol == "1" else f"*{symbol.replace('delta_degC', 'K')}"
+    is_turning = _value(f"1 rad{known}", symbol) is None
     return ({"shifted": shifted} if shifted else {}) | ({"turns": True} if is_turning else {})
 
 
