@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from random import Random
 
+from bywire.bench.bench import Bench
+from bywire.bench.effects import switches_of
 from bywire.bench.experiment import EXPERIMENTS
-from bywire.core.catalog import parameters
+from bywire.core.catalog import PARAMETER_SETS, parameters
 from bywire.core.leaf import Leaf
 from bywire.core.parameters import leaf_fields
 from bywire.core.units import convert
@@ -90,12 +93,27 @@ def _moved(rng: Random, leaf: Leaf, value: float) -> float:
     return moved if _admits(leaf, 0.999 * moved) and _admits(leaf, 1.001 * moved) else value
 
 
+@cache
+def switched_off(name: str) -> frozenset[str]:
+    """Return the numbers of a set that its choices switch off: changing one is refused."""
+    known = PARAMETER_SETS.find(name)
+    for label, experiment in EXPERIMENTS.all().items():
+        if experiment.assembly != known.assembly:
+            continue
+        if cases := Bench(label, name).cases():
+            names = leaf_fields(type(known.parameters()))
+            return frozenset(key for key in names if switches_of(key, cases))
+    return frozenset()
+
+
 def changes(rng: Random, name: str) -> Entries:
     """Return admissible changes of one to four parameters of a set."""
     par = parameters(name)
     leaves = leaf_fields(type(par))
     numbers = {
-        key: v for key, v in par.flat().items() if isinstance(v, float) and v and key in leaves
+        key: v
+        for key, v in par.flat().items()
+        if isinstance(v, float) and v and key in leaves and key not in switched_off(name)
     }
     entries = {}
     for key in rng.sample(sorted(numbers), rng.randrange(1, 5)):
