@@ -255,9 +255,7 @@ def test_a_bench_file_of_any_brake_and_its_text(tmp_path: Any) -> None:
         ("stribeck", "seal-stribeck", {"pressures": "10 bar"}),
     ],
 )
-def test_an_earlier_name_means_one_experiment_or_is_refused(
-    name, own, option, monkeypatch
-) -> None:
+def test_an_earlier_name_means_one_experiment_or_is_refused(name, own, option, monkeypatch) -> None:
     stimulus = {**STEP, "end": "1 A"} if name == "open-loop" else {}
     known = bywire.Bench(name, "dardanelli2010", options=option, stimulus=stimulus)
     assert known.definition is EXPERIMENTS.find(own)
