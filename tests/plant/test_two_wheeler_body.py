@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -72,6 +73,17 @@ def test_a_rider_who_goes_over_the_handlebar_is_told_of() -> None:
     (text,) = warned(over + 0.1)
     assert "goes over the handlebar" in text
     assert "at t = 0.1 s (pitch up to 53.8 deg, limit 48.1 deg)" in text
+
+
+def test_many_cases_with_heights_of_their_own_are_asked_at_once() -> None:
+    """As studies do: one row of a case is enough, and each case has its own limit."""
+    t = np.array([0.0, 0.1])
+    pitch = np.full((2, 2), math.atan(PAR.l_f / PAR.h) - 0.01)
+    many = body.State(pitch, pitch, pitch, pitch, pitch)
+    same = SimpleNamespace(l_f=PAR.l_f, h=np.array([[PAR.h], [PAR.h]]))
+    higher = SimpleNamespace(l_f=PAR.l_f, h=np.array([[PAR.h], [1.1 * PAR.h]]))
+    assert body.watch(t, many, same) == []
+    assert len(body.watch(t, many, higher)) == 1
 
 
 def test_a_stop_names_the_rider_thrown_and_the_lift_limit_that_did_not_follow() -> None:

@@ -88,7 +88,7 @@ class LoopMargins(EqualWhereUndefined):
 
 
 NO_LOOP = "no loop: the loop gain is 0 at all frequencies"
-"""what is said of gains of 0, or a shut valve"""
+"""sentence on a loop whose gains are 0, or whose valve is shut"""
 UNSTABLE = LoopMargins(
     gain=math.nan, phase=math.nan, crossover=math.nan, delay=math.nan, disk=math.nan,
     sensitivity=math.nan, complementary=math.nan, bandwidth=math.nan, stable=False,

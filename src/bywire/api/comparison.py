@@ -99,7 +99,7 @@ class Comparison(Answer):
         verdicts = verdicts if any(each.verdicts for each in self.runs) else []
         sources = [f"{each.label}: {each.source}" for each in self.runs]
         changed = self._changed()
-        changes = [Listing(changed, "Changed besides:")] if changed else []
+        changes = [Listing(changed, "Also changed:")] if changed else []
         return Document(
             "Comparison of " + ", ".join(each.label for each in self.runs),
             f"{len(self.runs)} runs; values in the order in which they were given",

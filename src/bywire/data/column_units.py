@@ -58,13 +58,6 @@ def measures(unit: Scale, symbol: str) -> bool:
     return unit.powers == unit_of_symbol(symbol).powers
 
 
-def converted(values: NDArray[np.float64], unit: Scale, symbol: str) -> NDArray[np.float64]:
-    """Return values in an SI unit."""
-    numbers = np.array(values, dtype=np.float64)
-    convert_in_place(numbers, unit, symbol)
-    return numbers
-
-
 def convert_in_place(values: NDArray[np.float64], unit: Scale, symbol: str) -> None:
     """Turn values into an SI unit where they lie, for arrays of which there is no room for two."""
     slope = unit.factor / unit_of_symbol(symbol).factor

@@ -19,6 +19,7 @@ BodyInertia = Annotated[float, Unit("kg*m**2", 35.0), Field(ge=0, allow_inf_nan=
 Sine = Annotated[float, Signal("1", "sine of the slope", 0.05)]
 Cosine = Annotated[float, Signal("1", "cosine of the slope", 1.0)]
 Drag = Annotated[float, Signal("W", "air drag", role=Role("sink", "air drag", book="vehicle"))]
+_DEGREES = 180.0 / math.pi
 _LEAST_FACTOR = 1e-9  # below, the load lies at one of its ends
 
 
@@ -251,8 +252,8 @@ def watch(t: Array, x: State, par: Parameters) -> list[str]:
     At the pitch :math:`\arctan(l_f/h)` the center of gravity is above the front contact. Beyond,
     gravity pitches the body further, whatever the brakes do.
     """
-    limit = math.degrees(math.atan2(par.l_f, par.h))
-    pitch = x.phi * (180.0 / math.pi)
-    most = f" (pitch up to {highest(pitch):.3g} deg, limit {limit:.3g} deg)"
+    limit = _DEGREES * ops.arctan(par.l_f / par.h)
+    pitch = _DEGREES * x.phi
+    most = f" (pitch up to {highest(pitch):.3g} deg, limit {highest(limit):.3g} deg)"
     text = "the rider goes over the handlebar: the center of gravity passes the front wheel"
     return first(t, pitch > limit, text, f"{most}, and what follows is no longer a stop")

@@ -38,7 +38,7 @@ REACH = 1e-9
 points are solved to 1e-10 of these, so that nobody can say on which side of a nearer corner they
 are; and what is smooth changes by as little over such a distance"""
 _FINER = 1.0 / 4.0  # what is smooth differs by a quarter at a quarter of the distance
-_LASTING = 0.4  # of a difference: what is left of it nearby where it is none of smooth equations
+_LASTING = 0.4  # share of a difference that remains nearby, from which a corner explains it
 _SAME = 1e-6  # of an entry of a Jacobian: what differs by no more is compared no further
 _SMALL = 1e-8  # of the largest entry in its row, each by a usual magnitude: the same
 _EQUAL = 1e-5  # of a response: models that differ by no more are one
