@@ -34,7 +34,8 @@ BY_FILE = ["--dist", "loadfile", "--no-loadscope-reorder"]
 # Rewritten assertions, which tell their values, cost as much as a hundred tests: what fails is run
 # once more with them.
 CHECKS = {
-    "format and lint": ["ruff", "check", "."],
+    "format": ["ruff", "format", "--check", "."],
+    "lint": ["ruff", "check", "."],
     "layers": ["lint-imports"],
     "tests": [*PYTEST, *BY_FILE, "--assert=plain", "-m", "not trust"],
 }
@@ -47,20 +48,36 @@ TRUST = {"trust": [*PYTEST, "--dist", "worksteal", "-m", "trust"]}
 # their ends, interrupts, comparisons of results, identities that are kept, text of the system.
 # Its recipe takes less than two minutes with the installation; all tests take five.
 NEWEST_TESTS = [
-    f"tests/{name}" for name in (
-        "repository/test_imports.py", "core/test_core_copies.py", "core/test_core_scratch.py",
-        "core/test_heard_warnings.py", "core/test_undefined.py", "cli/test_cli_interrupt.py",
-        "cli/test_cli_study_runs.py", "studies/test_who_computes.py", "studies/test_running.py",
-        "server/test_server_jobs.py", "data/test_measurement_formats.py",
-        "bench/test_computation.py", "bench/kpis/test_kpis_of_cases.py",
-        "identification/test_trust.py", "report/test_report_side_by_side.py",
-        "campaigns/test_campaign_runs.py", "synthesis/test_design_floors.py",
-        "contracts/test_gates_can_fail.py", "benchmark/test_suite.py",
-        "simulation/test_run_outcomes.py", "analysis/test_margins.py", "life/test_life_file.py",
-        "plant/test_adhesion.py", "vehicle", "reproduction/test_item.py",
+    f"tests/{name}"
+    for name in (
+        "repository/test_imports.py",
+        "core/test_core_copies.py",
+        "core/test_core_scratch.py",
+        "core/test_heard_warnings.py",
+        "core/test_undefined.py",
+        "cli/test_cli_interrupt.py",
+        "cli/test_cli_study_runs.py",
+        "studies/test_who_computes.py",
+        "studies/test_running.py",
+        "server/test_server_jobs.py",
+        "data/test_measurement_formats.py",
+        "bench/test_computation.py",
+        "bench/kpis/test_kpis_of_cases.py",
+        "identification/test_trust.py",
+        "report/test_report_side_by_side.py",
+        "campaigns/test_campaign_runs.py",
+        "synthesis/test_design_floors.py",
+        "contracts/test_gates_can_fail.py",
+        "benchmark/test_suite.py",
+        "simulation/test_run_outcomes.py",
+        "analysis/test_margins.py",
+        "life/test_life_file.py",
+        "plant/test_adhesion.py",
+        "vehicle",
+        "reproduction/test_item.py",
         "api/test_api_run_report.py",
     )
-]  # fmt: skip
+]
 NEWEST = {"a few tests on the newest Python": [*PYTEST, *BY_FILE, "--assert=plain", *NEWEST_TESTS]}
 
 HARD_BRAKING = (
@@ -76,23 +93,44 @@ STUDIES = {  # row of docs/trust.md -> what ``bywire identify`` is asked
     **{
         name: [name]
         for name in (
-            "cogging", "current-loop", "drive-current-loop", "force-calibration", "friction-model",
-            "friction-ramp", "motor-winding", "run-down", "screw-efficiency", "seal-friction",
+            "cogging",
+            "current-loop",
+            "drive-current-loop",
+            "force-calibration",
+            "friction-model",
+            "friction-ramp",
+            "motor-winding",
+            "run-down",
+            "screw-efficiency",
+            "seal-friction",
             "stiffness",
         )
     },
     "braking-dynamics": ["braking-dynamics", "--option", "plant=eq-22", "--option", "model=eq-22"],
     "emb-friction-strokes": ["friction-strokes", "--system", "examples/emb_caliper"],
     "hydraulic-ramp": [
-        *HYDRAULIC.split(), "--bench", "ramp", "--set", "options.slope=60bar/s", "--unknown",
-        "seal.f_n", "--unknown", "seal.F_pr",
+        *HYDRAULIC.split(),
+        "--bench",
+        "ramp",
+        "--set",
+        "options.slope=60bar/s",
+        "--unknown",
+        "seal.f_n",
+        "--unknown",
+        "seal.F_pr",
     ],
     "hydraulic-step": [
-        *HYDRAULIC.split(), "--bench", "step", "--unknown", "seal.f_p", "--unknown", "seal.F_pr",
+        *HYDRAULIC.split(),
+        "--bench",
+        "step",
+        "--unknown",
+        "seal.f_p",
+        "--unknown",
+        "seal.F_pr",
     ],
     "output-error": HARD_BRAKING.split(),
     "output-error-ideal": [*HARD_BRAKING.split(), "--set", "adc.law=ideal"],
-}  # fmt: skip
+}
 
 
 def main() -> int:
@@ -139,8 +177,11 @@ def newest() -> int:
     os.environ.setdefault("BYWIRE_CC_QUICK", "1")
     found = newest_python()
     if found is None:
-        print(f"== no Python newer than {sys.version.split()[0]} that is tested is installed: "
-              "its tests are skipped", flush=True)  # fmt: skip
+        print(
+            f"== no Python newer than {sys.version.split()[0]} that is tested is installed: "
+            "its tests are skipped",
+            flush=True,
+        )
         return 0
     version, python = found
     print(f"== Python {version}", flush=True)
@@ -195,9 +236,7 @@ def trust() -> int:
 def docs() -> int:
     """Make the site; whatever Sphinx warns of is an error."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    return run(
-        PYTHON, "-m", "sphinx", "-q", "-W", "-n", "-b", "html", "docs", "docs/_build"
-    )
+    return run(PYTHON, "-m", "sphinx", "-q", "-W", "-n", "-b", "html", "docs", "docs/_build")
 
 
 def every(checks: dict[str, list[str]], place: Path = VENV) -> int:
@@ -218,16 +257,39 @@ def every(checks: dict[str, list[str]], place: Path = VENV) -> int:
 def lock() -> int:
     """Write the lock files anew from pyproject.toml."""
     install("test")
-    common = ["uv", "pip", "compile", "pyproject.toml", "--universal", "--python-version", "3.11",
-              "--generate-hashes", "--no-header", "--quiet", "--no-emit-index-url",
-              "--no-annotate", "--extra", "compiler", "--extra", "build",
-              "--extra", "studies"]  # fmt: skip
+    common = [
+        "uv",
+        "pip",
+        "compile",
+        "pyproject.toml",
+        "--universal",
+        "--python-version",
+        "3.11",
+        "--generate-hashes",
+        "--no-header",
+        "--quiet",
+        "--no-emit-index-url",
+        "--no-annotate",
+        "--extra",
+        "compiler",
+        "--extra",
+        "build",
+        "--extra",
+        "studies",
+    ]
     return (
         run(*common, "-o", "requirements.lock")
         or run(*common, "--extra", "dev", "--extra", "benchmark", "-o", "requirements-dev.lock")
-        or run(*common, "--extra", "docs", "-c", "requirements-dev.lock",
-               "-o", "requirements-docs.lock")
-    )  # fmt: skip
+        or run(
+            *common,
+            "--extra",
+            "docs",
+            "-c",
+            "requirements-dev.lock",
+            "-o",
+            "requirements-docs.lock",
+        )
+    )
 
 
 def install(recipe: str, place: Path = VENV, python: str = sys.executable) -> None:

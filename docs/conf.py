@@ -16,16 +16,22 @@ project = "bywire"
 author = copyright = "the bywire developers"
 version = release = __version__
 extensions = [
-    "myst_parser",            # pages in Markdown
-    "sphinx.ext.autodoc", "numpydoc", "sphinx.ext.viewcode", # docstrings and sources
-    "sphinx_gallery.gen_gallery", # the examples, run
-    "site_pages.extension",   # pages made from the code
-]  # fmt: skip
+    "myst_parser",  # pages in Markdown
+    "sphinx.ext.autodoc",
+    "numpydoc",
+    "sphinx.ext.viewcode",  # docstrings and sources
+    "sphinx_gallery.gen_gallery",  # the examples, run
+    "site_pages.extension",  # pages made from the code
+]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = [
-    "_build", "trust", "_generated/gallery-figures", "_generated/extra",
-    "_generated/gallery/*.ipynb", "_generated/gallery/*.py",
-]  # fmt: skip
+    "_build",
+    "trust",
+    "_generated/gallery-figures",
+    "_generated/extra",
+    "_generated/gallery/*.ipynb",
+    "_generated/gallery/*.py",
+]
 
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3

@@ -40,8 +40,9 @@ def page() -> str:
         lines += ["| " + " | ".join(row) + " |" for row in cells]
         apart = dict.fromkeys(
             f"- `{row.fault}`, {row.what}: {row.because}."
-            for row, v in zip(rows, values, strict=True) if not row.agrees(v)
-        )  # fmt: skip
+            for row, v in zip(rows, values, strict=True)
+            if not row.agrees(v)
+        )
         lines += ["", "Why some do not agree:", "", *apart, ""] if apart else [""]
         notes = [f"- `{row.fault}`, {row.what}: {row.note}." for row in rows if row.note]
         lines += ["What explains others:", "", *notes, ""] if notes else []

@@ -34,11 +34,34 @@ from bywire.report.wording import amount, range_text, unit_text
 
 HERE = Path(__file__).parent
 NOTE = "<!-- Written by docs/make_notation.py; change the code that it lists, not this page. -->"
-GREEK = ("alpha", "beta", "gamma", "delta", "epsilon", "eta", "theta", "mu", "nu", "psi", "rho",
-         "sigma", "tau", "omega", "zeta")  # fmt: skip
+GREEK = (
+    "alpha",
+    "beta",
+    "gamma",
+    "delta",
+    "epsilon",
+    "eta",
+    "theta",
+    "mu",
+    "nu",
+    "psi",
+    "rho",
+    "sigma",
+    "tau",
+    "omega",
+    "zeta",
+)
 # Heads of names whose symbol in the literature is another one.
-SYMBOLS = {"omega": r"\Omega", "duty": "D", "torque": "T", "voltage": "v", "force": "F",
-           "current": "i", "friction": "T_{fr}", "Re": r"\mathrm{Re}"}  # fmt: skip
+SYMBOLS = {
+    "omega": r"\Omega",
+    "duty": "D",
+    "torque": "T",
+    "voltage": "v",
+    "force": "F",
+    "current": "i",
+    "friction": "T_{fr}",
+    "Re": r"\mathrm{Re}",
+}
 DERIVED = ("Factors", "Balance", "InputRate")  # tuples of derivatives: same names, other units
 
 
@@ -147,11 +170,16 @@ def merged(tuples: Iterable[tuple[str, Any]]) -> list[tuple[str, ...]]:
 def notation() -> str:
     """Return the page of symbols."""
     lines = [
-        "# Notation", "", NOTE, "",
+        "# Notation",
+        "",
+        NOTE,
+        "",
         "Symbol, name in code, unit and meaning. Inside, all numbers are in SI and radians;",
-        "bench files may use any unit of the same kind. A name without a symbol is a word.", "",
-        "Signs: [sign-conventions.md](sign-conventions.md).", "",
-    ]  # fmt: skip
+        "bench files may use any unit of the same kind. A name without a symbol is a word.",
+        "",
+        "Signs: [sign-conventions.md](sign-conventions.md).",
+        "",
+    ]
     for model in models():
         known = [e for e in PARAMETER_SETS.all().values() if e.assembly == model.name]
         if known:
@@ -172,10 +200,15 @@ def notation() -> str:
 def bench_reference() -> str:
     """Return the page of experiments, stimuli and key figures."""
     lines = [
-        "# Experiments, stimuli, key figures", "", NOTE, "",
-        "What a bench file can name. How to write one: [bench-files.md](bench-files.md).", "",
-        "## Experiments", "",
-    ]  # fmt: skip
+        "# Experiments, stimuli, key figures",
+        "",
+        NOTE,
+        "",
+        "What a bench file can name. How to write one: [bench-files.md](bench-files.md).",
+        "",
+        "## Experiments",
+        "",
+    ]
     titles = ("", "option", "", "default", "range or choices", "meaning")
     for e in EXPERIMENTS.all().values():
         driven = ", takes a `[stimulus]`" if e.driven_unit else ""
@@ -186,11 +219,13 @@ def bench_reference() -> str:
         figures = (f"`{name}`{bracketed(unit)}" for name, unit in e.kpis.items())
         lines += [f"Key figures: {', '.join(figures)}.", ""]
     lines += [
-        "## Experiments of any brake", "",
+        "## Experiments of any brake",
+        "",
         "Given by names of signals. `input`, `output` and the like stand for the unit of the "
         "signal that the option of that name names; levels are by default multiples of its "
-        "nominal magnitude.", "",
-    ]  # fmt: skip
+        "nominal magnitude.",
+        "",
+    ]
     for g in GENERIC_EXPERIMENTS.all().values():
         summary = g.summary[0].upper() + g.summary[1:]
         lines += [f"### {g.name}, of any brake", "", f"{summary}.", ""]
@@ -198,18 +233,29 @@ def bench_reference() -> str:
         lines += table(("", "option", "unit", "", "range or choices", "meaning"), rows)
     lines += ["## Loops", "", "What `linearize`, `frequency-response` and `margins` know.", ""]
     rows = (
-        (f"`{loop.name}`", loop.summary, loop.assembly,
-         f"{loop.at.name} [{unit_text(loop.at.unit)}]",
-         ", ".join(f"`{name}`" for name in loop.inputs), f"`{loop.output}`", f"`{loop.cut}`")
+        (
+            f"`{loop.name}`",
+            loop.summary,
+            loop.assembly,
+            f"{loop.at.name} [{unit_text(loop.at.unit)}]",
+            ", ".join(f"`{name}`" for name in loop.inputs),
+            f"`{loop.output}`",
+            f"`{loop.cut}`",
+        )
         for loop in LOOPS.all().values()
-    )  # fmt: skip
+    )
     lines += table(("loop", "meaning", "of", "at", "from", "to", "cut at"), rows)
     lines += ["## Plants", "", "What `linearize` knows besides loops.", ""]
     rows = (
-        (f"`{plant.name}`", plant.summary, plant.assembly,
-         ", ".join(f"{q.name} [{unit_text(q.unit)}]" for q in plant.at), f"{plant.band:g} Hz")
+        (
+            f"`{plant.name}`",
+            plant.summary,
+            plant.assembly,
+            ", ".join(f"{q.name} [{unit_text(q.unit)}]" for q in plant.at),
+            f"{plant.band:g} Hz",
+        )
         for plant in PLANTS.all().values()
-    )  # fmt: skip
+    )
     lines += table(("plant", "meaning", "of", "at one of", "judged up to"), rows)
     lines += ["## Stimuli", "", "`level`: the unit of what the experiment drives.", ""]
     for s in STIMULI.all().values():
@@ -220,8 +266,9 @@ def bench_reference() -> str:
     titles = ("name", "meaning", "family")
     known = (
         (f"`{m.name}`", m.definition, family.name)
-        for family in FAMILIES.all().values() for m in family.measures.values()
-    )  # fmt: skip
+        for family in FAMILIES.all().values()
+        for m in family.measures.values()
+    )
     lines += table(titles, known)
     return "\n".join(lines)
 

@@ -24,9 +24,15 @@ does not hold is left standing, and explained below the table.
 
 """
 HEADING = (
-    "method", "parameter", "experiments", "bias [standard errors]", "bias [%]",
-    "intervals that hold", "claimed / real scatter", "holds",
-)  # fmt: skip
+    "method",
+    "parameter",
+    "experiments",
+    "bias [standard errors]",
+    "bias [%]",
+    "intervals that hold",
+    "claimed / real scatter",
+    "holds",
+)
 
 
 def condensed(study: dict[str, Any], label: str) -> dict[str, Any]:
@@ -49,10 +55,15 @@ def lines(study: dict[str, Any]) -> list[str]:
     for name, row in study["recovered"].items():
         bias = f"{100.0 * row['bias'] / row['truth']:+.2g}" if row["truth"] else "-"
         cells = (
-            study["label"], name, row["count"], f"{row['bias_in_errors']:+.1f}", bias,
-            f"{100 * row['coverage']:.1f} %", f"{row['claimed'] / row['scatter']:.2f}",
+            study["label"],
+            name,
+            row["count"],
+            f"{row['bias_in_errors']:+.1f}",
+            bias,
+            f"{100 * row['coverage']:.1f} %",
+            f"{row['claimed'] / row['scatter']:.2f}",
             "yes" if row["holds"] else "no",
-        )  # fmt: skip
+        )
         rows.append("| " + " | ".join(map(str, cells)) + " |")
     return rows
 

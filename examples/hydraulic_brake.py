@@ -119,9 +119,7 @@ class HydraulicBrake(Assembly[Parameters, Memory]):
     rack = Part(rack, output={"x": "travel"})
     seal = Part(cup_seal)
     E_friction = Integral("J", "loss of gears and seal", role=Role("sink", "dry friction"))
-    chamber = Part(
-        master_cylinder, par="master_cylinder", state={"p": "p_mc"}, loss="E_damping"
-    )  # fmt: skip
+    chamber = Part(master_cylinder, par="master_cylinder", state={"p": "p_mc"}, loss="E_damping")
     stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
     line = Part(pipeline, par="pipeline", output=("q", "Re"), loss="E_pipeline")
     pads = Part(caliper, par="caliper", state={"p": "p_pd"})
@@ -191,9 +189,11 @@ def held(par, p):
     theta = (cylinder.x_rest + stroke) / travel_per_angle(par)
     i = p * cylinder.A_mc * travel_per_angle(par) / par.motor.K_e
     state = HydraulicBrake.state(
-        motor=dc_motor.State(i), shaft=shaft.State(theta, 0.0),
-        chamber=master_cylinder.State(p), pads=caliper.State(p),
-    )  # fmt: skip
+        motor=dc_motor.State(i),
+        shaft=shaft.State(theta, 0.0),
+        chamber=master_cylinder.State(p),
+        pads=caliper.State(p),
+    )
     v = par.motor.R_m * i
     return state, Memory(v, v, 0.0)
 
@@ -276,7 +276,11 @@ _NUMBERS = {
     "control.T_s": chosen(1e-3, "1 kHz"),
 }
 SET = CitedSet(
-    "hydraulic-1", "hydraulic-brake", "our own layout", "a hydraulic brake laid out by hand",
-    Parameters, _NUMBERS,
-)  # fmt: skip
+    "hydraulic-1",
+    "hydraulic-brake",
+    "our own layout",
+    "a hydraulic brake laid out by hand",
+    Parameters,
+    _NUMBERS,
+)
 BRAKE = Brake("hydraulic", "motor, planetary gear, rack, master cylinder, caliper", __name__)

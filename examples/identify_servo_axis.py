@@ -35,7 +35,7 @@ from bywire.identification import (
     output_error,
     parameters_of,
     trial,
-)  # fmt: skip
+)
 
 Volt = Annotated[float, Unit("V")]
 
@@ -153,8 +153,11 @@ def apart(first, other):
     """Return the unknowns of which two estimates differ by 3.5 standard deviations and 0.1 %."""
     names = [n for n in NAMES if n in first.names and n in other.names]
     reach = [np.hypot(*(e.deviations[e.names.index(n)] for e in (first, other))) for n in names]
-    return [n for n, r in zip(names, reach, strict=True)
-            if abs(first[n] - other[n]) > max(3.5 * r, 1e-3 * abs(other[n]))]  # fmt: skip
+    return [
+        n
+        for n, r in zip(names, reach, strict=True)
+        if abs(first[n] - other[n]) > max(3.5 * r, 1e-3 * abs(other[n]))
+    ]
 
 
 if __name__ == "__main__":

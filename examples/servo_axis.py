@@ -110,9 +110,16 @@ class ServoAxis(Assembly[Parameters, Memory]):
 
 PAR = Parameters(
     motor=dc_motor.Parameters(R_m=0.35, L_m=1e-4, K_e=0.0304),
-    shaft=shaft.Parameters(J=2e-4, d=1e-5), T_forward=0.03, T_backward=0.015, count=6e-4,
-    k_angle=25.0, k_p=0.15, k_i=3.0, v_max=6.0, T_s=1e-3,
-)  # fmt: skip
+    shaft=shaft.Parameters(J=2e-4, d=1e-5),
+    T_forward=0.03,
+    T_backward=0.015,
+    count=6e-4,
+    k_angle=25.0,
+    k_p=0.15,
+    k_i=3.0,
+    v_max=6.0,
+    T_s=1e-3,
+)
 SERVO_1 = CitedSet("servo-1", "servo-axis", "", "a small axis", Parameters, PAR.flat())
 BRAKE = Brake("servo-axis", "a motor that turns an inertia against dry friction", __name__)
 TARGET = 3.0  # for one second; then back to zero for another one
@@ -122,9 +129,13 @@ def move(par):
     """Return the trajectory there and back."""
     state, memory = ServoAxis().rest(par)
     run = bywire.Run(
-        ServoAxis(), par, state, memory, duration=2.0,
+        ServoAxis(),
+        par,
+        state,
+        memory,
+        duration=2.0,
         stimulus=lambda t: np.where(t < 1.0, TARGET, 0.0)[:, None],
-    )  # fmt: skip
+    )
     return bywire.simulate(run)
 
 

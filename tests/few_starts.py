@@ -17,7 +17,6 @@ def coarse(gain: LinearModel, closed: LinearModel, points: int) -> LoopFigures:
     return LoopFigures(gain, closed, points // 2)
 
 
-
 @contextmanager
 def few_starts(*, is_coarse: bool = True) -> Iterator[None]:
     """Have gains searched from one start besides the given one, in fewer steps, by fewer points."""

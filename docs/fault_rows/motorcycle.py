@@ -50,94 +50,205 @@ RIGID = "our line is rigid, as the paper's: nothing but the pads gives way"
 def _seal() -> list[Row]:
     return [
         Row("seal.swollen 1.9", "left without power", 3.0, "bar", ends(RELEASES)),
-        Row("seal.swollen 3", "share of time stuck, from 6 to 37 bar", 87.0, "%",
-            figure("share_stuck", "seal.swollen", 3.0, factor=100.0)),
-        Row("seal.swollen 3", "off the demand then", 1.7, "bar",
-            lambda: abs(figure("steady_state_error", "seal.swollen", 3.0, factor=1e-5)())),
+        Row(
+            "seal.swollen 3",
+            "share of time stuck, from 6 to 37 bar",
+            87.0,
+            "%",
+            figure("share_stuck", "seal.swollen", 3.0, factor=100.0),
+        ),
+        Row(
+            "seal.swollen 3",
+            "off the demand then",
+            1.7,
+            "bar",
+            lambda: abs(figure("steady_state_error", "seal.swollen", 3.0, factor=1e-5)()),
+        ),
         Row("seal.swollen 3", "held without power", 37.0, "bar", ends(HOLDS)),
-    ]  # fmt: skip
+    ]
 
 
 def _supply() -> list[Row]:
     weak = "supply.under-voltage"
     return [
-        Row("battery.lost", "below 5 bar after", 520.0, "ms", passes(one("battery.lost"), 5.0),
-            daily=True),
+        Row(
+            "battery.lost",
+            "below 5 bar after",
+            520.0,
+            "ms",
+            passes(one("battery.lost"), 5.0),
+            daily=True,
+        ),
         Row("battery.lost", "left", 1.37, "bar", ends(one("battery.lost")), daily=True),
-        Row("battery.shorted", "below 5 bar after", 1250.0, "ms",
-            passes(one("battery.shorted"), 5.0)),
+        Row(
+            "battery.shorted",
+            "below 5 bar after",
+            1250.0,
+            "ms",
+            passes(one("battery.shorted"), 5.0),
+        ),
         Row("battery.shorted", "left", 1.84, "bar", ends(one("battery.shorted"))),
-        Row(weak + " 6 V", "rise from 6 to 37 bar", 87.0, "ms",
-            figure("rise_time", weak, factor=1e3)),
+        Row(
+            weak + " 6 V",
+            "rise from 6 to 37 bar",
+            87.0,
+            "ms",
+            figure("rise_time", weak, factor=1e3),
+        ),
         Row(weak + " 6 V", "rises slower by", 40.0, "%", ratio("rise_time", weak)),
         Row(weak + " 6 V", "overshoot", 12.0, "%", figure("overshoot", weak)),
         Row(weak + " 6 V", "duty saturated", 7.0, "%", figure("share_sat_duty", weak, factor=100)),
-        Row("bridge.open-phase", "below 5 bar after", 520.0, "ms",
-            passes(one("bridge.open-phase"), 5.0)),
+        Row(
+            "bridge.open-phase",
+            "below 5 bar after",
+            520.0,
+            "ms",
+            passes(one("bridge.open-phase"), 5.0),
+        ),
         Row("bridge.open-phase", "left", 1.37, "bar", ends(one("bridge.open-phase"))),
-        *(row for duty, after, current in ((0.5, 42.0, 17.0), (1.0, 21.0, 32.0))
-          for fault in (one("bridge.stuck", duty),) for row in (
-              Row(f"bridge.stuck {duty:g}", "over 45 bar after", after, "ms", passes(fault, 45.0)),
-              Row(f"bridge.stuck {duty:g}", "stays", (52.0, 54.0), "bar", ends(fault)),
-              Row(f"bridge.stuck {duty:g}", "current", current, "A", ends(fault, "i", 1.0)))),
-    ]  # fmt: skip
+        *(
+            row
+            for duty, after, current in ((0.5, 42.0, 17.0), (1.0, 21.0, 32.0))
+            for fault in (one("bridge.stuck", duty),)
+            for row in (
+                Row(
+                    f"bridge.stuck {duty:g}", "over 45 bar after", after, "ms", passes(fault, 45.0)
+                ),
+                Row(f"bridge.stuck {duty:g}", "stays", (52.0, 54.0), "bar", ends(fault)),
+                Row(f"bridge.stuck {duty:g}", "current", current, "A", ends(fault, "i", 1.0)),
+            )
+        ),
+    ]
 
 
 def _motor_and_sensors() -> list[Row]:
     return [
         Row("motor.hot 2", "rises slower by", 8.0, "%", ratio("rise_time", "motor.hot")),
-        Row("motor.hot 2", "error", 0.34, "bar",
-            figure("steady_state_error", "motor.hot", factor=1e-5)),
+        Row(
+            "motor.hot 2",
+            "error",
+            0.34,
+            "bar",
+            figure("steady_state_error", "motor.hot", factor=1e-5),
+        ),
         Row("motor.hot 2", "overshoot", 6.1, "%", figure("overshoot", "motor.hot")),
         Row("motor.hot 2", "held pressure", 37.0, "bar", ends(one("motor.hot"))),
-        Row("motor.demagnetized 0.7", "current over the healthy one", 1.43, "1", current_ratio,
+        Row(
+            "motor.demagnetized 0.7",
+            "current over the healthy one",
+            1.43,
+            "1",
+            current_ratio,
             "the ECU does not know it, and its dither is weaker, too: the piston sticks all the "
-            "time, where friction takes its part of the current. Known to the ECU it is 1.42"),
+            "time, where friction takes its part of the current. Known to the ECU it is 1.42",
+        ),
         Row("current.stuck 0", "peak", 45.5, "bar", most(one("current.stuck", "0 A"))),
         Row("current.stuck 0", "peak within", 36.0, "ms", peak_time),
         Row("current.stuck 0", "then back to", 37.0, "bar", ends(one("current.stuck", "0 A"))),
         Row("current.gain 0.5", "peak", 39.4, "bar", most(one("current.gain", 0.5))),
         Row("current.gain 0.5", "then back to", 37.0, "bar", ends(one("current.gain", 0.5))),
-        *(Row(f"pressure.offset {offset}", "stays", stays, "bar",
-              ends(one("pressure.offset", f"{offset} bar")), daily=offset == 2)
-          for offset, stays in ((2, 35.1), (-2, 39.1), (5, 32.1))),
-        Row("pressure.drift -1 bar/s", "after 2.5 s", 39.5, "bar",
-            ends(one("pressure.drift", "-1 bar/s"))),
-        *(row for level, after in ((20, 34.0), (0, 31.0))
-          for fault in (one("pressure.stuck", f"{level} bar"),) for row in (
-              Row(f"pressure.stuck {level} bar", "over 45 bar after", after, "ms",
-                  passes(fault, 45.0)),
-              Row(f"pressure.stuck {level} bar", "stays", 52.0, "bar", ends(fault)))),
-        Row("pressure.stuck 50 bar", "below 5 bar after", 96.0, "ms",
-            passes(one("pressure.stuck", "50 bar"), 5.0)),
-        Row("pressure.stuck 50 bar", "current", -21.0, "A",
-            ends(one("pressure.stuck", "50 bar"), "i", 1.0)),
-    ]  # fmt: skip
+        *(
+            Row(
+                f"pressure.offset {offset}",
+                "stays",
+                stays,
+                "bar",
+                ends(one("pressure.offset", f"{offset} bar")),
+                daily=offset == 2,
+            )
+            for offset, stays in ((2, 35.1), (-2, 39.1), (5, 32.1))
+        ),
+        Row(
+            "pressure.drift -1 bar/s",
+            "after 2.5 s",
+            39.5,
+            "bar",
+            ends(one("pressure.drift", "-1 bar/s")),
+        ),
+        *(
+            row
+            for level, after in ((20, 34.0), (0, 31.0))
+            for fault in (one("pressure.stuck", f"{level} bar"),)
+            for row in (
+                Row(
+                    f"pressure.stuck {level} bar",
+                    "over 45 bar after",
+                    after,
+                    "ms",
+                    passes(fault, 45.0),
+                ),
+                Row(f"pressure.stuck {level} bar", "stays", 52.0, "bar", ends(fault)),
+            )
+        ),
+        Row(
+            "pressure.stuck 50 bar",
+            "below 5 bar after",
+            96.0,
+            "ms",
+            passes(one("pressure.stuck", "50 bar"), 5.0),
+        ),
+        Row(
+            "pressure.stuck 50 bar",
+            "current",
+            -21.0,
+            "A",
+            ends(one("pressure.stuck", "50 bar"), "i", 1.0),
+        ),
+    ]
 
 
 def _controller() -> list[Row]:
     return [
         Row("ecu.dropped 2", "stays", 36.7, "bar", ends(one("ecu.dropped", 2), rows=1000)),
-        Row("ecu.dropped 5", "stays", 36.2, "bar", ends(one("ecu.dropped", 5), rows=1000),
+        Row(
+            "ecu.dropped 5",
+            "stays",
+            36.2,
+            "bar",
+            ends(one("ecu.dropped", 5), rows=1000),
             "with every fifth tick alone our controller takes its differences over five sample "
             "times for those of one: its derivative part grows fivefold, and demands of +-20 A "
-            "follow one another"),
+            "follow one another",
+        ),
         Row("bridge.late 5", "peak", 38.5, "bar", most(one("bridge.late", 5))),
-        Row("bridge.late 5", "ripple of the current, its deviation", 7.0, "A",
+        Row(
+            "bridge.late 5",
+            "ripple of the current, its deviation",
+            7.0,
+            "A",
             lambda: float(recording(one("bridge.late", 5))["i"].values[-1000:].std()),
-            LATE),
-        Row("bridge.late 5", "the same, its integral part 17 % less", None, "A",
-            late_with_less, note="its own swinging is gone then, see above"),
-        Row("ecu.frozen", "least of seven phases", min(FROZEN), "bar", lambda: min(frozen()),
-            PHASE),
+            LATE,
+        ),
+        Row(
+            "bridge.late 5",
+            "the same, its integral part 17 % less",
+            None,
+            "A",
+            late_with_less,
+            note="its own swinging is gone then, see above",
+        ),
+        Row(
+            "ecu.frozen", "least of seven phases", min(FROZEN), "bar", lambda: min(frozen()), PHASE
+        ),
         Row("ecu.frozen", "most of seven phases", max(FROZEN), "bar", lambda: max(frozen())),
-        Row("ecu.frozen", "most that any of the seven is off, dither 0.75 ms ahead", None, "bar",
-            lambda: max(abs(ours - theirs)
-                        for ours, theirs in zip(frozen(AHEAD), FROZEN, strict=True))),
-        Row("p_set.lost", "stays: our choice is the last demand", 37.0, "bar",
-            ends(one("p_set.lost"))),
+        Row(
+            "ecu.frozen",
+            "most that any of the seven is off, dither 0.75 ms ahead",
+            None,
+            "bar",
+            lambda: max(
+                abs(ours - theirs) for ours, theirs in zip(frozen(AHEAD), FROZEN, strict=True)
+            ),
+        ),
+        Row(
+            "p_set.lost",
+            "stays: our choice is the last demand",
+            37.0,
+            "bar",
+            ends(one("p_set.lost")),
+        ),
         Row("gear.jammed", "stays as it was", 37.0, "bar", ends(one("gear.jammed"))),
-    ]  # fmt: skip
+    ]
 
 
 def _fluid() -> list[Row]:
@@ -148,24 +259,59 @@ def _fluid() -> list[Row]:
         Row("fluid.air 0.0088 ml", "the same without", 8.53, "mm", lambda: travel(())),
         Row("fluid.air-in-line 1.28 ml", "stays", 0.6, "bar", ends(AIR, options=APPLY)),
         Row("fluid.air-in-line 1.28 ml", "current", 19.8, "A", ends(AIR, "i", 1.0, options=APPLY)),
-        Row("fluid.air-in-line 0.123 ml", "still reached", 37.0, "bar",
-            ends(one("fluid.air-in-line", "0.123 ml", FROM_START), options=APPLY)),
+        Row(
+            "fluid.air-in-line 0.123 ml",
+            "still reached",
+            37.0,
+            "bar",
+            ends(one("fluid.air-in-line", "0.123 ml", FROM_START), options=APPLY),
+        ),
         Row(f"{LEAK} 1e-14", "stays", 37.09, "bar", ends(slow)),
         Row(f"{LEAK} 1e-14", "piston creeps", 0.41, "mm/s", lambda: creep(recording(slow))),
-        *(Row(f"{fault} {g}", "below 5 bar after", after, "ms",
-              passes(one(fault, f"{g} {CONDUCTANCE}"), 5.0))
-          for fault in (LEAK, CUP) for g, after in (("1e-13", 1970.0), ("1e-12", 200.0))),
+        *(
+            Row(
+                f"{fault} {g}",
+                "below 5 bar after",
+                after,
+                "ms",
+                passes(one(fault, f"{g} {CONDUCTANCE}"), 5.0),
+            )
+            for fault in (LEAK, CUP)
+            for g, after in (("1e-13", 1970.0), ("1e-12", 200.0))
+        ),
         Row("caliper.heated 5 ml", "rigid line", 0.43, "bar/K", lambda: expansion(5e-6, 6.0)),
-        Row("caliper.heated 5 ml", "drag pressure after 30 K", (7.0, 13.0), "bar",
-            lambda: 30.0 * expansion(5e-6, 6.0)),
-        Row("caliper.heated 5 ml", "a line that gives way", 0.24, "bar/K",
-            lambda: expansion(5e-6, 6.0), RIGID),
-        Row("caliper.heated 64 ml", "all fluid, a line that gives way", 3.1, "bar/K",
-            lambda: expansion(64e-6, 1.0), RIGID),
-        Row("caliper.knocked-back 0.3 mm", "piston's travel more", 1.0, "mm",
-            lambda: travel(one("caliper.knocked-back", "0.3 mm", FROM_START)) - travel(())),
+        Row(
+            "caliper.heated 5 ml",
+            "drag pressure after 30 K",
+            (7.0, 13.0),
+            "bar",
+            lambda: 30.0 * expansion(5e-6, 6.0),
+        ),
+        Row(
+            "caliper.heated 5 ml",
+            "a line that gives way",
+            0.24,
+            "bar/K",
+            lambda: expansion(5e-6, 6.0),
+            RIGID,
+        ),
+        Row(
+            "caliper.heated 64 ml",
+            "all fluid, a line that gives way",
+            3.1,
+            "bar/K",
+            lambda: expansion(64e-6, 1.0),
+            RIGID,
+        ),
+        Row(
+            "caliper.knocked-back 0.3 mm",
+            "piston's travel more",
+            1.0,
+            "mm",
+            lambda: travel(one("caliper.knocked-back", "0.3 mm", FROM_START)) - travel(()),
+        ),
         Row("piston.stuck 60 N", "left on the pads without power", None, "bar", ends(STUCK)),
-    ]  # fmt: skip
+    ]
 
 
 ROWS = (*_supply(), *_motor_and_sensors(), *_controller(), *_seal(), *_fluid())

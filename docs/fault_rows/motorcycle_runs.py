@@ -66,8 +66,13 @@ def passes(faults: Faults, level: float) -> Callable[[], float]:
     return computed
 
 
-def ends(faults: Faults, signal: str = "p_pd", factor: float = 1e-5, rows: int = 100,
-         options: tuple[tuple[str, str], ...] = HOLD) -> Callable[[], float]:  # fmt: skip
+def ends(
+    faults: Faults,
+    signal: str = "p_pd",
+    factor: float = 1e-5,
+    rows: int = 100,
+    options: tuple[tuple[str, str], ...] = HOLD,
+) -> Callable[[], float]:
     """Return the mean of a signal over the last rows, 1 ms each."""
     return lambda: factor * float(recording(faults, options)[signal].values[-rows:].mean())
 
@@ -127,8 +132,10 @@ def creep(found: xr.Dataset) -> float:
 
 def current_ratio() -> float:
     """Return the current of weak magnets over that of good ones."""
-    weak, good = (float(recording(faults)["i"][-1000:].mean())
-                  for faults in (one("motor.demagnetized", 0.7), ()))  # fmt: skip
+    weak, good = (
+        float(recording(faults)["i"][-1000:].mean())
+        for faults in (one("motor.demagnetized", 0.7), ())
+    )
     return weak / good
 
 
@@ -145,10 +152,20 @@ def expansion(volume: float, duration: float) -> float:
     """Return the pressure per kelvin of a warming volume [m3] behind a blocked port [bar/K]."""
     par, rate = Bench("hard-braking", SET).par, 5.0
     case = case_from_rest(
-        "run", par, "current-source", 0.0, lambda t: {"i_set": 0.0 * t}, duration,
-        {"caliper.fluid_heat": "warming", "caliper.T_rate": rate, "caliper.V_hot": volume,
-         "port.law": "dead-stroke", "port.G_port": 0.0},
-    )  # fmt: skip
+        "run",
+        par,
+        "current-source",
+        0.0,
+        lambda t: {"i_set": 0.0 * t},
+        duration,
+        {
+            "caliper.fluid_heat": "warming",
+            "caliper.T_rate": rate,
+            "caliper.V_hot": volume,
+            "port.law": "dead-stroke",
+            "port.G_port": 0.0,
+        },
+    )
     own = as_run(case, 2e-5)
     found = record(own, simulate(own), 0.0, 0.0, {})
     return float(bars(found)[-1]) / (rate * duration)

@@ -19,10 +19,17 @@ SET = "roberts2003"
 FROM_START = -9.0
 ONSET = 0.3
 BARE = (
-    ("bearing.C_0", 0.0), ("bearing.C_2", 0.0), ("bearing.T_nu", 0.0), ("screw.eta_f", 1.0),
-    ("screw.eta_b", 1.0), ("wedge_friction.mu_int", 0.0), ("wedge_friction.mu_R", 0.0),
-    ("motor_1.T_cog", 0.0), ("motor_2.T_cog", 0.0), ("flywheel.runout", 0.0),
-)  # fmt: skip
+    ("bearing.C_0", 0.0),
+    ("bearing.C_2", 0.0),
+    ("bearing.T_nu", 0.0),
+    ("screw.eta_f", 1.0),
+    ("screw.eta_b", 1.0),
+    ("wedge_friction.mu_int", 0.0),
+    ("wedge_friction.mu_R", 0.0),
+    ("motor_1.T_cog", 0.0),
+    ("motor_2.T_cog", 0.0),
+    ("flywheel.runout", 0.0),
+)
 HIGH = (("M_high", 950.0), ("M_low", 950.0))
 LOW = (("M_high", 200.0), ("M_low", 200.0))
 Pairs = tuple[tuple[str, Any], ...]
@@ -35,8 +42,14 @@ def friction(mu_B: float) -> Pairs:
 
 
 @cache
-def result(experiment: str, changes: Pairs = (), fault: str = "", value: Any = None,
-           onset: float = ONSET, options: Pairs = ()) -> Result:  # fmt: skip
+def result(
+    experiment: str,
+    changes: Pairs = (),
+    fault: str = "",
+    value: Any = None,
+    onset: float = ONSET,
+    options: Pairs = (),
+) -> Result:
     """Return an experiment with at most one fault."""
     given = {} if value is None else {"value": value}
     faults = [{"fault": fault, "onset": onset, **given}] if fault else []
@@ -93,18 +106,19 @@ def fight() -> float:
     error = 3e-3  # rad
     away = roller_screw.slope(par().screw) * error * 1e6
     forces = [
-        float(np.minimum(*(rows_of(name, 0.4, "moment-pulses", (), *fault)[:100]
-                           for name in ("f_1", "f_2"))).mean())
+        float(
+            np.minimum(
+                *(rows_of(name, 0.4, "moment-pulses", (), *fault)[:100] for name in ("f_1", "f_2"))
+            ).mean()
+        )
         for fault in ((), ("encoder_1.offset", error))
-    ]  # fmt: skip
+    ]
     return abs(forces[1] - forces[0]) / away
 
 
 def ripple(fault: str = "") -> Callable[[], float]:
     """Return the moment peak to peak where the screws stand, without power [N m]."""
-    return lambda: float(
-        np.ptp(rows_of("M_B", 1.0, "power-off-hold", (), fault, onset=FROM_START))
-    )
+    return lambda: float(np.ptp(rows_of("M_B", 1.0, "power-off-hold", (), fault, onset=FROM_START)))
 
 
 def crossing(known: bool) -> Callable[[], float]:
@@ -112,8 +126,9 @@ def crossing(known: bool) -> Callable[[], float]:
 
     def computed() -> float:
         far = ((("caliper.clearance", 0.3e-3),),) if known else ((), "caliper.gap-grown", 1.5)
-        times = [figure("contact_time", "moment-ramp", *given, onset=FROM_START)()
-                 for given in ((), far)]  # fmt: skip
+        times = [
+            figure("contact_time", "moment-ramp", *given, onset=FROM_START)() for given in ((), far)
+        ]
         return 1e3 * (times[1] - times[0])
 
     return computed
@@ -123,9 +138,16 @@ def mean_moment(fault: str, value: Any) -> Callable[[], float]:
     """Return by how much the moment of a hold changes with a fault [N m]."""
     options = (("t_hold", 1.0),)
     return lambda: float(
-        np.diff([result("moment-ramp", (), *given, options=options).recordings["run"]["M_B"]
-                 .sel(time=slice(0.6, 0.9)).values.mean() for given in ((), (fault, value))])[0]
-    )  # fmt: skip
+        np.diff(
+            [
+                result("moment-ramp", (), *given, options=options)
+                .recordings["run"]["M_B"]
+                .sel(time=slice(0.6, 0.9))
+                .values.mean()
+                for given in ((), (fault, value))
+            ]
+        )[0]
+    )
 
 
 def at_stop(*args: Any, **given: Any) -> Callable[[], float]:
@@ -162,74 +184,190 @@ CREEP = (
 def _motors() -> list[Row]:
     hold = "power-off-hold"
     return [
-        *(Row("power.stuck 1", f"kept of 500 N m at mu_B {mu_B:g}", kept, "N m",
-              figure("moment_end", hold, (("wedge.mu_B", mu_B),)))
-          for mu_B, kept in ((0.35, 482.0), (0.45, 474.0), (0.5, 471.0), (0.2, 329.0))),
+        *(
+            Row(
+                "power.stuck 1",
+                f"kept of 500 N m at mu_B {mu_B:g}",
+                kept,
+                "N m",
+                figure("moment_end", hold, (("wedge.mu_B", mu_B),)),
+            )
+            for mu_B, kept in ((0.35, 482.0), (0.45, 474.0), (0.5, 471.0), (0.2, 329.0))
+        ),
         Row("power.stuck 1", "drift", 0.0, "m", figure("drift", hold)),
-        Row("power.stuck 1", "without friction, at mu_B 0.45: comes to the end stop", 1.0, "1",
-            at_stop(hold, friction(0.45) + BARE)),
-        Row("drive_1.stuck 0", "force from which the dead motor turns", 545.0, "N", back_driving,
-            daily=True),
+        Row(
+            "power.stuck 1",
+            "without friction, at mu_B 0.45: comes to the end stop",
+            1.0,
+            "1",
+            at_stop(hold, friction(0.45) + BARE),
+        ),
+        Row(
+            "drive_1.stuck 0",
+            "force from which the dead motor turns",
+            545.0,
+            "N",
+            back_driving,
+            daily=True,
+        ),
         Row("drive_1.stuck 0", "most of the other, 20 A", 4084.0, "N", strongest, daily=True),
         Row("drive_1.stuck 0", "950 N m at mu_B 0.2 take", 3115.0, "N", needed(0.2), daily=True),
-        Row("drive_1.stuck 0", "reserve, less its own bearing", (0.0, 10.0), "%",
+        Row(
+            "drive_1.stuck 0",
+            "reserve, less its own bearing",
+            (0.0, 10.0),
+            "%",
             lambda: 100.0 * (strongest(bearing=True) / (needed(0.2)() + back_driving()) - 1.0),
-            daily=True),
-        *(Row(f"drive_{k}.stuck 0", "held of 950 N m at mu_B 0.2", None, "N m",
-              held("M_B", "moment-ramp", friction(0.2), f"drive_{k}.stuck", 0.0, options=HIGH))
-          for k in (1, 2)),
-        Row("screw_1.jammed", "wedge moves at most", (0.0, 40.0), "um", moved,
+            daily=True,
+        ),
+        *(
+            Row(
+                f"drive_{k}.stuck 0",
+                "held of 950 N m at mu_B 0.2",
+                None,
+                "N m",
+                held("M_B", "moment-ramp", friction(0.2), f"drive_{k}.stuck", 0.0, options=HIGH),
+            )
+            for k in (1, 2)
+        ),
+        Row(
+            "screw_1.jammed",
+            "wedge moves at most",
+            (0.0, 40.0),
+            "um",
+            moved,
             "26 um of it are free-play, and 27 um the spring of 24 N/um by which the wedge stood "
-            "on the jammed screw with 647 N, and is let go"),
-        Row("motor_1.shorted", "moment held of 200 N m", None, "N m",
-            held("M_B", "moment-ramp", (), "motor_1.shorted", options=LOW)),
-    ]  # fmt: skip
+            "on the jammed screw with 647 N, and is let go",
+        ),
+        Row(
+            "motor_1.shorted",
+            "moment held of 200 N m",
+            None,
+            "N m",
+            held("M_B", "moment-ramp", (), "motor_1.shorted", options=LOW),
+        ),
+    ]
 
 
 def _sensors() -> list[Row]:
     return [
         Row("encoder_1.offset", "force fight: tens of N per um", (10.0, 99.0), "N/um", fight),
-        Row("moment.offset 50 N m", "moment changes by", -50.0, "N m",
-            mean_moment("moment.offset", 50.0)),
-        Row("moment.stuck 0", "winds in, current", 20.0, "A",
-            lambda: float(np.abs(rows_of("i_1", 0.0, *WOUND)).max())),
-        Row("moment.stuck 0", "winds in: comes to the end stop", 1.0, "1",
-            at_stop(*WOUND)),
-    ]  # fmt: skip
+        Row(
+            "moment.offset 50 N m",
+            "moment changes by",
+            -50.0,
+            "N m",
+            mean_moment("moment.offset", 50.0),
+        ),
+        Row(
+            "moment.stuck 0",
+            "winds in, current",
+            20.0,
+            "A",
+            lambda: float(np.abs(rows_of("i_1", 0.0, *WOUND)).max()),
+        ),
+        Row("moment.stuck 0", "winds in: comes to the end stop", 1.0, "1", at_stop(*WOUND)),
+    ]
 
 
 def _mechanics() -> list[Row]:
     strong = friction(0.6)
     return [
-        Row("wedge.friction", "force of the motors, 950 N m at mu_B 0.6", -1495.0, "N",
-            held("F_M", "moment-ramp", strong, options=HIGH)),
-        Row("caliper.pad-lost", "moment at any travel", 0.0, "N m",
-            lambda: float(np.abs(rows_of("M_B", 0.0, *LOST, onset=FROM_START)).max())),
-        Row("caliper.pad-lost", "comes to the end stop", 1.0, "1",
-            at_stop(*LOST, onset=FROM_START)),
-        Row("heart.worn 5", "preload without power", 0.0, "N",
-            figure("preload_end", *WORN, onset=FROM_START)),
-        Row("heart.worn 5", "the same of a healthy brake", 454.0, "N",
-            figure("preload_end", "power-off-hold")),
-        Row("heart.worn 5", "moment kept", 482.0, "N m",
-            figure("moment_end", *WORN, onset=FROM_START)),
-        Row("wedge.spring-broken", "rate of the spring, by default", 0.0, "N/m",
-            lambda: float(par().wedge.k_return)),
-        Row("wedge_friction.worn 5", "kept of 500 N m without power", None, "N m",
-            figure("moment_end", "power-off-hold", (), "wedge_friction.worn", onset=FROM_START)),
-        Row("caliper.gap-grown", "0.1 mm more, known to the ECU", 7.2, "ms per 0.1 mm",
-            crossing(known=True)),
-        Row("caliper.gap-grown", "0.1 mm more, unknown", None, "ms per 0.1 mm",
-            crossing(known=False), note=CREEP),
-        Row("flywheel.run-out", "ripple of the healthy brake, moment control", 28.0, "N m",
-            figure("hold_ripple", "moment-pulses"), CONTROLLED),
-        Row("flywheel.run-out 5", "ripple, moment control", 140.0, "N m",
+        Row(
+            "wedge.friction",
+            "force of the motors, 950 N m at mu_B 0.6",
+            -1495.0,
+            "N",
+            held("F_M", "moment-ramp", strong, options=HIGH),
+        ),
+        Row(
+            "caliper.pad-lost",
+            "moment at any travel",
+            0.0,
+            "N m",
+            lambda: float(np.abs(rows_of("M_B", 0.0, *LOST, onset=FROM_START)).max()),
+        ),
+        Row(
+            "caliper.pad-lost", "comes to the end stop", 1.0, "1", at_stop(*LOST, onset=FROM_START)
+        ),
+        Row(
+            "heart.worn 5",
+            "preload without power",
+            0.0,
+            "N",
+            figure("preload_end", *WORN, onset=FROM_START),
+        ),
+        Row(
+            "heart.worn 5",
+            "the same of a healthy brake",
+            454.0,
+            "N",
+            figure("preload_end", "power-off-hold"),
+        ),
+        Row(
+            "heart.worn 5",
+            "moment kept",
+            482.0,
+            "N m",
+            figure("moment_end", *WORN, onset=FROM_START),
+        ),
+        Row(
+            "wedge.spring-broken",
+            "rate of the spring, by default",
+            0.0,
+            "N/m",
+            lambda: float(par().wedge.k_return),
+        ),
+        Row(
+            "wedge_friction.worn 5",
+            "kept of 500 N m without power",
+            None,
+            "N m",
+            figure("moment_end", "power-off-hold", (), "wedge_friction.worn", onset=FROM_START),
+        ),
+        Row(
+            "caliper.gap-grown",
+            "0.1 mm more, known to the ECU",
+            7.2,
+            "ms per 0.1 mm",
+            crossing(known=True),
+        ),
+        Row(
+            "caliper.gap-grown",
+            "0.1 mm more, unknown",
+            None,
+            "ms per 0.1 mm",
+            crossing(known=False),
+            note=CREEP,
+        ),
+        Row(
+            "flywheel.run-out",
+            "ripple of the healthy brake, moment control",
+            28.0,
+            "N m",
+            figure("hold_ripple", "moment-pulses"),
+            CONTROLLED,
+        ),
+        Row(
+            "flywheel.run-out 5",
+            "ripple, moment control",
+            140.0,
+            "N m",
             figure("hold_ripple", "moment-pulses", (), "flywheel.run-out", onset=FROM_START),
-            FIVEFOLD),
-        *(Row(f"flywheel.run-out{times}", "ripple, screws stand without power", None, "N m",
-              ripple(fault), note=STANDING)
-          for times, fault in (("", ""), (" 5", "flywheel.run-out"))),
-    ]  # fmt: skip
+            FIVEFOLD,
+        ),
+        *(
+            Row(
+                f"flywheel.run-out{times}",
+                "ripple, screws stand without power",
+                None,
+                "N m",
+                ripple(fault),
+                note=STANDING,
+            )
+            for times, fault in (("", ""), (" 5", "flywheel.run-out"))
+        ),
+    ]
 
 
 ROWS = (*_motors(), *_sensors(), *_mechanics())

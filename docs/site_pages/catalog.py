@@ -62,11 +62,14 @@ TOPICS = {
         },
     ),
     "stimuli": Topic(
-        "Stimuli", "What a bench drives an experiment with.",
+        "Stimuli",
+        "What a bench drives an experiment with.",
         {"stimulus": lambda: STIMULI.all()},
     ),
     "key-figures": Topic(
-        "Key figures", "How each is computed.", {"KPI": lambda: definitions()},
+        "Key figures",
+        "How each is computed.",
+        {"KPI": lambda: definitions()},
     ),
     "loops": Topic(
         "Loops and plants",
@@ -74,17 +77,21 @@ TOPICS = {
         {"loop": lambda: LOOPS.all(), "plant": lambda: PLANTS.all()},
     ),
     "methods": Topic(
-        "Methods of identification", "What `identify` takes.",
+        "Methods of identification",
+        "What `identify` takes.",
         {"method": lambda: METHODS.all(), "method of any bench": lambda: BENCH_METHODS.all()},
     ),
     "studies": Topic(
-        "Studies and lives", "What `study size` and `life` take.",
+        "Studies and lives",
+        "What `study size` and `life` take.",
         {"study": lambda: STUDIES.all(), "life": lambda: LIVES.all()},
     ),
     "campaigns": Topic(
-        "Campaigns of faults", "What `faults` takes.", {"campaign": lambda: CAMPAIGNS.all()},
+        "Campaigns of faults",
+        "What `faults` takes.",
+        {"campaign": lambda: CAMPAIGNS.all()},
     ),
-}  # fmt: skip
+}
 
 
 def page(name: str) -> str:
@@ -102,10 +109,12 @@ def page(name: str) -> str:
 def faults_page() -> str:
     """Return the page of all faults, a line each: most differ by their signal alone."""
     lines = [
-        "# Faults", "",
+        "# Faults",
+        "",
         "What `[[faults]]` of a bench file and `--fault` take; `bywire list NAME` says all about "
-        "one.", "",
-    ]  # fmt: skip
+        "one.",
+        "",
+    ]
     rows = ([f"`{name}`", plain(summary)] for name, summary in fault_summaries().items())
     return "\n".join([*lines, *table_lines(["fault", "what happens"], rows)])
 

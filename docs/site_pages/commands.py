@@ -26,11 +26,13 @@ def _leaves(words: str, command: Any) -> Iterator[tuple[str, Any]]:
 def page() -> str:
     """Return the page of commands."""
     lines = [
-        "# Commands", "",
+        "# Commands",
+        "",
         "Each is a call of a public function of the same name, with the same checks and warnings; "
         "`bywire COMMAND --help` says the same. With `--system PATH` a brake of one's own takes "
-        "part in all.", "",
-    ]  # fmt: skip
+        "part in all.",
+        "",
+    ]
     for words, command in commands().items():
         context = command.make_context(words, [], resilient_parsing=True)
         usage = re.sub(r"\s+", " ", command.get_usage(context).removeprefix("Usage: "))

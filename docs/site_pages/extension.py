@@ -36,8 +36,9 @@ _MOVED = {
 # A script, a style sheet, a picture or a frame that a browser would ask another host for.
 _ELSEWHERE = re.compile(
     r"<(?:script|img|iframe|link(?![^>]*rel=\"(?:canonical|search|author)\"))[^>]*"
-    r"(?:src|href)=\"(?:https?:)?//[^\"]*", re.IGNORECASE,
-)  # fmt: skip
+    r"(?:src|href)=\"(?:https?:)?//[^\"]*",
+    re.IGNORECASE,
+)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

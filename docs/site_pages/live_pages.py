@@ -11,13 +11,15 @@ ROOT = Path(__file__).parents[2]
 BENCHES = {
     "hard-braking": (
         "A step of the brake pressure, the motorcycle brake",
-        "hard-braking", ("seal.T_pr", "ecu.dither.gain", "ecu.pressure.k_p", "motor.R_m"),
+        "hard-braking",
+        ("seal.T_pr", "ecu.dither.gain", "ecu.pressure.k_p", "motor.R_m"),
     ),
     "moment-pulses": (
         "Pulses of the brake moment, the wedge brake",
-        "moment-pulses", ("wedge.mu_B", "control.moment.f_c"),
+        "moment-pulses",
+        ("wedge.mu_B", "control.moment.f_c"),
     ),
-}  # fmt: skip
+}
 
 
 def write(folder: Path) -> None:
@@ -30,17 +32,27 @@ def write(folder: Path) -> None:
 def page() -> str:
     """Return the page in which they stand."""
     lines = [
-        "---", "html_theme.sidebar_secondary.remove: true", "---", "", "# Live benches", "",
+        "---",
+        "html_theme.sidebar_secondary.remove: true",
+        "---",
+        "",
+        "# Live benches",
+        "",
         "The brake's own kernel, compiled to WebAssembly, runs in this page: move a slider, and "
         "all that a run shows follows. Nothing is sent anywhere. How to make such a file of a "
-        "bench of your own: [](../page.md).", "",
-    ]  # fmt: skip
+        "bench of your own: [](../page.md).",
+        "",
+    ]
     for name, (title, *_) in BENCHES.items():
         lines += [
-            f"## {plain(title)}", "", f"<a href=\"../live/{name}.html\">Open it alone</a>", "",
+            f"## {plain(title)}",
+            "",
+            f'<a href="../live/{name}.html">Open it alone</a>',
+            "",
             "```{raw} html",
             f'<iframe class="bench" src="../live/{name}.html" title="{title}" loading="lazy">'
             "</iframe>",
-            "```", "",
-        ]  # fmt: skip
+            "```",
+            "",
+        ]
     return "\n".join(lines)

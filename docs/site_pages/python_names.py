@@ -32,9 +32,13 @@ def homes() -> dict[str, str]:
 def page() -> str:
     """Return the page of the package's functions and classes, as reStructuredText."""
     lines = [
-        "Python", "======", "", "``import bywire`` loads nothing; each name is loaded on its first "
-        "use. Every function that is a command, too, takes the same and says the same.", "",
-    ]  # fmt: skip
+        "Python",
+        "======",
+        "",
+        "``import bywire`` loads nothing; each name is loaded on its first "
+        "use. Every function that is a command, too, takes the same and says the same.",
+        "",
+    ]
     functions = {n: f for n, f in public().items() if inspect.isfunction(f)}
     for title, names in (("Functions", functions), ("Classes", public().keys() - functions)):
         lines += [title, "-" * len(title), ""]
@@ -60,12 +64,20 @@ def authoring_page() -> str:
 
 def errors_page() -> str:
     """Return the page of errors, as reStructuredText."""
-    return "\n".join([
-        "Errors", "======", "",
-        "A command that fails says one line and exits with the status below: 1 where something "
-        "that was required does not hold, 130 where it was interrupted.", "",
-        ".. automodule:: bywire.core.errors", "   :members:", "   :show-inheritance:", "",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            "Errors",
+            "======",
+            "",
+            "A command that fails says one line and exits with the status below: 1 where something "
+            "that was required does not hold, 130 where it was interrupted.",
+            "",
+            ".. automodule:: bywire.core.errors",
+            "   :members:",
+            "   :show-inheritance:",
+            "",
+        ]
+    )
 
 
 def _entry(face: str, name: str, thing: Any) -> list[str]:

@@ -14,10 +14,12 @@ _LINK = re.compile(r"\[([^\]]*)\]\((?!https?:|#)[^)]*\)")
 def benches_page() -> str:
     """Return the page of all bench and study files, each as it stands."""
     lines = [
-        "# Bench and study files", "",
+        "# Bench and study files",
+        "",
         "They stand in `benches/` and `studies/` of the repository. Every key: "
-        "[](../bench-files.md), [](../studies.md).", "",
-    ]  # fmt: skip
+        "[](../bench-files.md), [](../studies.md).",
+        "",
+    ]
     for folder in ("benches", "studies"):
         for path in sorted((ROOT / folder).glob("*.toml")):
             text = path.read_text(encoding="utf-8").rstrip()

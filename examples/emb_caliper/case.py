@@ -41,9 +41,16 @@ def case_from_rest(
     """
     driven = par.replace({"drive": drive})
     return Case(
-        label, EmbCaliper(), driven, state_at(F, driven), memory_at(F, driven), stimulus, duration,
-        start=lambda par: (state_at(F, par), memory_at(F, par)), **timing,
-    )  # fmt: skip
+        label,
+        EmbCaliper(),
+        driven,
+        state_at(F, driven),
+        memory_at(F, driven),
+        stimulus,
+        duration,
+        start=lambda par: (state_at(F, par), memory_at(F, par)),
+        **timing,
+    )
 
 
 def step_at_zero(name: str, before: float, after: float) -> Callable[[Array], Mapping[str, Array]]:

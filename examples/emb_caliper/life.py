@@ -52,9 +52,12 @@ def follows(
 
 
 def effects(
-    figures: Mapping[str, Array], stops: Mapping[str, Array], z: Any, par: Any,
+    figures: Mapping[str, Array],
+    stops: Mapping[str, Array],
+    z: Any,
+    par: Any,
     wear: WearParameters,
-) -> Effects:  # fmt: skip
+) -> Effects:
     """Return what each stop wears, and how long the brake took to clamp."""
     work = np.full(figures["dead_time"].shape, wear.W_stop)
     before, after = warm_stops.temperatures(work, stops["pause"], stops["T_air"], wear.disc)

@@ -50,11 +50,36 @@ class EmbCaliper(Assembly[Par, ecu.Memory]):
     P_el = Shown("W", "electrical power from battery or source", 100.0)
 
     records: ClassVar[tuple[str, ...]] = (
-        "F_cl", "F_ref", "F_meas", "x", "theta", "omega", "omega_ref", "i", "i_ref", "duty",
-        "voltage", "torque", "T_fr", "F_stop", "stuck", "parked", "sat_speed", "sat_current",
-        "sat_duty", "P_el", "E_source", "E_supply", "E_copper", "E_viscous", "E_friction",
-        "E_caliper", "E_stop", "E_stored", "t_stuck",
-    )  # fmt: skip
+        "F_cl",
+        "F_ref",
+        "F_meas",
+        "x",
+        "theta",
+        "omega",
+        "omega_ref",
+        "i",
+        "i_ref",
+        "duty",
+        "voltage",
+        "torque",
+        "T_fr",
+        "F_stop",
+        "stuck",
+        "parked",
+        "sat_speed",
+        "sat_current",
+        "sat_duty",
+        "P_el",
+        "E_source",
+        "E_supply",
+        "E_copper",
+        "E_viscous",
+        "E_friction",
+        "E_caliper",
+        "E_stop",
+        "E_stored",
+        "t_stuck",
+    )
 
     def wire(self, w: Self) -> None:
         """Say what every part feels: electrics, motion from the rotor out, loads back to it."""

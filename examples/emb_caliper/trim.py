@@ -59,6 +59,13 @@ def memory_at(F: float, par: Par) -> Memory:
         duty = v / (par.supply.V_bat - par.supply.R_bat * duty * i)
     fed = i if par.ecu.load == "fed-forward" else 0.0
     return zeros(Memory)._replace(
-        F_meas=F, theta_meas=state_at(F, par).theta, F_ref=F, i_ref=i, duty=duty, v_source=v,
-        parked=float(par.ecu.F_on > F), speed_integral=i - fed, current_integral=duty,
-    )  # fmt: skip
+        F_meas=F,
+        theta_meas=state_at(F, par).theta,
+        F_ref=F,
+        i_ref=i,
+        duty=duty,
+        v_source=v,
+        parked=float(par.ecu.F_on > F),
+        speed_integral=i - fed,
+        current_integral=duty,
+    )

@@ -30,8 +30,9 @@ BAR, AT = 1e5, 20e5
 loop, par = LOOPS.find("pressure"), bywire.parameters("dardanelli2010")
 point = loop.point(loop.smooth(par), AT)
 current = point.par.replace({"drive.mode": "current"})
-whole = closed_loop(point.model, current, point.state, point.memory,
-                    inputs=("i_set",), outputs=("p_mc",))  # fmt: skip
+whole = closed_loop(
+    point.model, current, point.state, point.memory, inputs=("i_set",), outputs=("p_mc",)
+)
 kept = whole.effective()
 A, B = whole.A[np.ix_(kept, kept)], whole.B[kept]
 scale = np.linalg.norm(B, axis=1) + np.abs(A).max(axis=1) * 1e-6  # states of like size
@@ -63,11 +64,15 @@ omega = 2.0 * math.pi * np.geomspace(0.1, 490.0, 2000)
 
 pid = loop.closed(par, AT)
 t = np.arange(0.0, 0.4, T)
-steps = {"LQG": control.step_response(closed, t).outputs,
-         "PID of the catalog": control.step_response(pid.state_space(), t).outputs}  # fmt: skip
+steps = {
+    "LQG": control.step_response(closed, t).outputs,
+    "PID of the catalog": control.step_response(pid.state_space(), t).outputs,
+}
 rise = {name: float(t[np.argmax(y >= 0.9)]) for name, y in steps.items()}
-print(f"phase margin {margin:.0f} degree at {crossover / 2 / math.pi:.1f} Hz, "
-      f"{margin_states:.0f} degree with all states")  # fmt: skip
+print(
+    f"phase margin {margin:.0f} degree at {crossover / 2 / math.pi:.1f} Hz, "
+    f"{margin_states:.0f} degree with all states"
+)
 print(", ".join(f"{name}: 90 % after {1e3 * value:.0f} ms" for name, value in rise.items()))
 
 if out:

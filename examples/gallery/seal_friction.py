@@ -34,9 +34,12 @@ friction = result.estimates["seal friction"]
 print(friction)
 loop_0, loop_f, between = (
     result.figures[name][0]
-    for name in ("loop_half_width_at_0", "loop_half_width_over_pressure",
-                 "pressure_between_directions")
-)  # fmt: skip
+    for name in (
+        "loop_half_width_at_0",
+        "loop_half_width_over_pressure",
+        "pressure_between_directions",
+    )
+)
 print(f"loop: {loop_0:.2f} N + {1e5 * loop_f:.2f} N/bar; pressure differs {between / 1e5:.3f} bar")
 
 line = result.curves[0].data

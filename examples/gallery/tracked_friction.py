@@ -25,9 +25,11 @@ random = np.random.default_rng(1)
 runs = []
 for mu_B in FADING:
     bench = bywire.Bench(
-        "moment-pulses", "roberts2003", overrides={"wedge.mu_B": float(mu_B)},
+        "moment-pulses",
+        "roberts2003",
+        overrides={"wedge.mu_B": float(mu_B)},
         options={"t_hold": 0.5, "pulses": 1},
-    )  # fmt: skip
+    )
     runs.append(bywire.run(bench).recording[["y_M", "F_N", "Omega"]].drop_vars("time"))
 record = xr.concat(runs, "time")
 record = record.assign_coords(time=1e-3 * np.arange(record.sizes["time"]))

@@ -22,58 +22,74 @@ Items = Mapping[str, dict[str, Any]]
 TABLE2 = {"K": 10.1, "zero": 160.0, "pole1": 0.866, "pole2": 9.75, "pole3": 4.7e4}
 REQUIRED = {
     *(f"table2.{key}{suffix}" for key in TABLE2 for suffix in ("", "@table1")),
-    "table1.x_mc", "table1.Re",
+    "table1.x_mc",
+    "table1.Re",
     *(f"table3.{key}" for key in ("k_brk_p", "f_cfr_p", "c", "mu_T", "f_cfr_n", "k_brk_n")),
     *(
         f"table4.{region}.{key}"
         for region in ("low", "medium", "high")
         for key in ("K", "zero", "T1", "T2", "T_L")
     ),
-    "fig3.bandwidth", "fig3.bandwidth.free", "fig3.overshoot", "fig3.rise_time",
+    "fig3.bandwidth",
+    "fig3.bandwidth.free",
+    "fig3.overshoot",
+    "fig3.rise_time",
     "fig4.top_tick",
     *(
         f"fig5.{key}{suffix}"
         for key in (
-            "p_max", "p_max.dither", "loop_area_ratio", "removed_above", "jumps", "share_stuck"
+            "p_max",
+            "p_max.dither",
+            "loop_area_ratio",
+            "removed_above",
+            "jumps",
+            "share_stuck",
         )
         for suffix in ("", "@table1")
     ),
     *(f"dither.{wave}.thd" for wave in ("sine", "square", "triangle")),
-    *(
-        f"table3.identified.{key}" for key in ("k_brk_p", "f_cfr_p", "c", "f_cfr_n", "k_brk_n")
-    ),
+    *(f"table3.identified.{key}" for key in ("k_brk_p", "f_cfr_p", "c", "f_cfr_n", "k_brk_n")),
     *(
         f"table4.{region}.identified.{key}"
         for region in ("low", "medium", "high")
         for key in ("K", "zero", "T1", "T2", "T_L")
     ),
-    "fig6.peak", "fig6.change", "fig6.change.theoretical",
+    "fig6.peak",
+    "fig6.change",
+    "fig6.change.theoretical",
     *(
         f"fig7.{key}{suffix}"
         for key in ("overshoot", "steady_state_error", "rise_time", "bandwidth")
         for suffix in ("", "@table1")
     ),
-    "fig7.phase_margin", "fig7.phase_margin.pi", "fig7.crossover", "fig7b.lag",
-}  # fmt: skip
+    "fig7.phase_margin",
+    "fig7.phase_margin.pi",
+    "fig7.crossover",
+    "fig7b.lag",
+}
 DISAGREEMENTS = {
     *(f"table2.{key}@table1" for key in TABLE2),  # Table 1 in (15) is not Table 2
     "fig3.bandwidth.free@table1",  # a rotor that light
     "laminar.coefficient",  # 32 against 8
     "eq19.A_dit",  # eta_g left out
     "gear.returned.paper",  # the gear gains energy
-    "table4.medium.K", "table4.medium.K@table1",  # dithered gain
+    "table4.medium.K",
+    "table4.medium.K@table1",  # dithered gain
     "table4.air",  # order of the slow pair
     "fig4.top_tick",  # breakaway at 40 bar
     "section3.mu",  # mu_F against mu_T
-    "fig5.loop_area_ratio", "fig5.removed_above",  # "totally removed"
-    "fig7.bandwidth", "fig7.bandwidth@table1",  # 10 Hz
-    "table4.medium.corner", "table4.medium.corner@table1",  # slower than identified
+    "fig5.loop_area_ratio",
+    "fig5.removed_above",  # "totally removed"
+    "fig7.bandwidth",
+    "fig7.bandwidth@table1",  # 10 Hz
+    "table4.medium.corner",
+    "table4.medium.corner@table1",  # slower than identified
     *(  # the paper's two steps on our brake
         f"table4.{region}.identified.{key}"
         for region in ("low", "medium", "high")
         for key in ("K", "zero", "T2", "T_L")
     ),
-}  # fmt: skip
+}
 BY_CONSTRUCTION = re.compile(
     r"(table2|calibrated|table3)\.\w+|table4\.\w+\.T[12]|fig3\.bandwidth|fig7\.(crossover|phase_margin)"
 )
@@ -257,8 +273,9 @@ def test_identified_values_come_back_and_tell_what_is_disagreed_on(items: Items)
     for region in ("low", "medium", "high"):
         step, own = items[f"table4.{region}.K"], items[f"table4.{region}.identified.K"]
         assert own["computed"] == pytest.approx(step["computed"], rel=0.03), region
-        zero, pole = (items[f"table4.{region}.identified.{key}"]["computed"] for key in
-                      ("zero", "T_L"))  # fmt: skip
+        zero, pole = (
+            items[f"table4.{region}.identified.{key}"]["computed"] for key in ("zero", "T_L")
+        )
         assert zero > pole  # the other order than Table 4's
         assert items[f"table4.{region}.eq21.T1"]["computed"] == pytest.approx(pole, rel=0.15)
     assert items["fig6.misfit.identified"]["computed"] < 0.1

@@ -21,32 +21,88 @@ from undrawn import drawn_once, undrawn
 Items = Mapping[str, dict[str, Any]]
 TAN_ALPHA = math.tan(math.radians(20.0))
 REQUIRED = {
-    *(f"fig5.{key}" for key in (
-        "limit", "friction", "friction.low_frequency", "linear.gain", "linear.phase", "wedge",
-    )),
-    *(f"fig6.{key}" for key in (
-        "limit", "kink", "friction", "efficiency.load", "efficiency.drive", "linear.gain",
-        "linear.phase", "wedge", "onset.0.25", "onset.0.5", "onset.1",
-    )),
-    *(f"fig7.{key}" for key in (
-        "hold_moment", "pulse_moment", "ripple_order", "ripple_without_runout", "power_peak_time",
-        "hold_power", "standby", "contact_time", "time_to_90", "brake_power", "energy_left",
-    )),
+    *(
+        f"fig5.{key}"
+        for key in (
+            "limit",
+            "friction",
+            "friction.low_frequency",
+            "linear.gain",
+            "linear.phase",
+            "wedge",
+        )
+    ),
+    *(
+        f"fig6.{key}"
+        for key in (
+            "limit",
+            "kink",
+            "friction",
+            "efficiency.load",
+            "efficiency.drive",
+            "linear.gain",
+            "linear.phase",
+            "wedge",
+            "onset.0.25",
+            "onset.0.5",
+            "onset.1",
+        )
+    ),
+    *(
+        f"fig7.{key}"
+        for key in (
+            "hold_moment",
+            "pulse_moment",
+            "ripple_order",
+            "ripple_without_runout",
+            "power_peak_time",
+            "hold_power",
+            "standby",
+            "contact_time",
+            "time_to_90",
+            "brake_power",
+            "energy_left",
+        )
+    ),
     *(f"fig8.{key}" for key in ("low_moment", "final_moment", "ramp_slope", "ramp_error")),
-    *(f"fig9.{key}" for key in (
-        "peak_moment", "power", "rate_limited", "limits_dominate", "friction_dominates",
-        "no_initial_peak", "lowest_power", "power_reduces", "tail_shift", "disc_share",
-    )),
+    *(
+        f"fig9.{key}"
+        for key in (
+            "peak_moment",
+            "power",
+            "rate_limited",
+            "limits_dominate",
+            "friction_dominates",
+            "no_initial_peak",
+            "lowest_power",
+            "power_reduces",
+            "tail_shift",
+            "disc_share",
+        )
+    ),
     *(f"efficiency.{key}" for key in ("driving", "recovered", "raw", "back_driven")),
     *(f"stiffness.{key}" for key in ("K_S", "K_W", "free_play", "compression", "tension")),
     *(f"force_fight.{key}" for key in ("equal", "step", "ramp", "sine", "speed")),
     *(f"hold.{key}" for key in ("neutral", "drift", "standing", "together")),
-    *(f"stability.{key}" for key in (
-        "C.mu20", "C.mu35", "C.mu60", "F_M.neutral", "runaway", "runaway.friction", "unstable",
-        "unstable.frictionless", "pole.neutral", "pole.above", "pole.below", "contact_changes",
-        "contact_changes.free_play",
-    )),
-}  # fmt: skip
+    *(
+        f"stability.{key}"
+        for key in (
+            "C.mu20",
+            "C.mu35",
+            "C.mu60",
+            "F_M.neutral",
+            "runaway",
+            "runaway.friction",
+            "unstable",
+            "unstable.frictionless",
+            "pole.neutral",
+            "pole.above",
+            "pole.below",
+            "contact_changes",
+            "contact_changes.free_play",
+        )
+    ),
+}
 DISAGREEMENTS = {
     "stability.runaway.friction",  # the paper leaves friction out
     "fig9.lowest_power",  # the length of the pulse is not printed

@@ -52,9 +52,19 @@ def oscillator(damping: float, period: float = 0.0) -> LinearModel:
     """Return a mass on a spring of 10 rad/s."""
     A = np.array([[0.0, 1.0], [-100.0, -2.0 * 10.0 * damping]])
     own = LinearModel(
-        "oscillator", A, np.eye(2)[:, 1:], np.eye(2)[:1], np.zeros((1, 1)), ("x", "v"), ("F",),
-        ("x",), ("m", "m/s"), ("N",), ("m",), np.zeros(2),
-    )  # fmt: skip
+        "oscillator",
+        A,
+        np.eye(2)[:, 1:],
+        np.eye(2)[:1],
+        np.zeros((1, 1)),
+        ("x", "v"),
+        ("F",),
+        ("x",),
+        ("m", "m/s"),
+        ("N",),
+        ("m",),
+        np.zeros(2),
+    )
     return own.sampled(period) if period else own
 
 
@@ -78,9 +88,14 @@ def test_integrators_that_a_loop_does_not_move_are_no_instability() -> None:
         A = np.zeros((3, 3))
         A[:2, :2] = own.A
         return replace(
-            own, A=A, B=np.zeros((3, 1)), C=np.ones((1, 3)), states=("x", "v", "phi"),
-            state_units=("m", "m/s", "rad"), rate=np.zeros(3),
-        ).sampled(0.01)  # fmt: skip
+            own,
+            A=A,
+            B=np.zeros((3, 1)),
+            C=np.ones((1, 3)),
+            states=("x", "v", "phi"),
+            state_units=("m", "m/s", "rad"),
+            rate=np.zeros(3),
+        ).sampled(0.01)
 
     assert locus_of(resting, "damping", "1", [0.1, 0.2]).stable.all()
 

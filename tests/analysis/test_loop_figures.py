@@ -15,16 +15,27 @@ from bywire.analysis.margins import UNSTABLE, margins_of
 def model(A: list[list[float]], B: list[float], C: list[float], period: float = 0.0) -> LinearModel:
     n = len(A)
     return LinearModel(
-        "loop", np.array(A), np.array(B)[:, None], np.array([C]), np.zeros((1, 1)),
-        tuple(f"x_{k}" for k in range(n)), ("u",), ("y",), ("1",) * n, ("1",), ("1",),
-        np.zeros(n), period,
-    )  # fmt: skip
+        "loop",
+        np.array(A),
+        np.array(B)[:, None],
+        np.array([C]),
+        np.zeros((1, 1)),
+        tuple(f"x_{k}" for k in range(n)),
+        ("u",),
+        ("y",),
+        ("1",) * n,
+        ("1",),
+        ("1",),
+        np.zeros(n),
+        period,
+    )
 
 
 def lags(K: float, back: float = 0.0) -> LinearModel:
     """Return K/(1 + s)^3, fed back with a gain."""
-    return model([[-1.0, 0.0, -back * K], [1.0, -1.0, 0.0], [0.0, 1.0, -1.0]],
-                 [K, 0.0, 0.0], [0.0, 0.0, 1.0])  # fmt: skip
+    return model(
+        [[-1.0, 0.0, -back * K], [1.0, -1.0, 0.0], [0.0, 1.0, -1.0]], [K, 0.0, 0.0], [0.0, 0.0, 1.0]
+    )
 
 
 class Bounded(LinearModel):

@@ -33,9 +33,12 @@ def test_nonlinear_response_is_the_linear_one_without_its_causes(name: str) -> N
     low, high = loop.band
     frequencies = (max(low, 2.0), math.sqrt(max(low, 2.0) * high), high)
     found = agreement(
-        replace(loop, causes={}), loop.smooth(par), loop.at.default, frequencies,
+        replace(loop, causes={}),
+        loop.smooth(par),
+        loop.at.default,
+        frequencies,
         (loop.amplitudes[0], loop.amplitudes[0]),
-    )  # fmt: skip
+    )
     assert found.holds
     assert np.abs(found.gain[""]).max() < 0.01
     assert np.abs(found.phase[""]).max() < 0.1
@@ -50,8 +53,9 @@ def test_without_causes_a_run_is_the_linear_model_of_its_own_scheme() -> None:
     np.testing.assert_allclose(found.phase[""], found.step_phase, rtol=0.0, atol=1e-9)
     assert abs(found.step_gain[1]) > 1e-6
     exact = loop.closed(par, 0.0).response(np.array(f))
-    coarse, fine = (np.abs(loop.closed(par, 0.0, h).response(np.array(f)) / exact - 1.0)
-                    for h in (20e-6, 10e-6))  # fmt: skip
+    coarse, fine = (
+        np.abs(loop.closed(par, 0.0, h).response(np.array(f)) / exact - 1.0) for h in (20e-6, 10e-6)
+    )
     np.testing.assert_allclose(coarse / fine, 4.0, rtol=0.02)
     with pytest.raises(StepError, match="does not divide the sample time of 200 us"):
         loop.closed(par, 0.0, 30e-6)

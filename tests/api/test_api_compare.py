@@ -27,9 +27,13 @@ def results():
     base = bywire.run("hard-braking", {**QUICK, "requirements.overshoot": "<= 15 %"})
     warm = bywire.run(
         "hard-braking",
-        {**QUICK, "motor.R_m": "0.5 ohm", "requirements.overshoot": "<= 15 %",
-         "requirements.peak_current": "<= 10 A"},
-    )  # fmt: skip
+        {
+            **QUICK,
+            "motor.R_m": "0.5 ohm",
+            "requirements.overshoot": "<= 15 %",
+            "requirements.peak_current": "<= 10 A",
+        },
+    )
     return base, warm
 
 
@@ -132,8 +136,9 @@ def test_a_verdict_that_the_step_leaves_open_stays_open(folders, tmp_path):
 def test_folder_results_and_benches_give_the_same(results, folders):
     from_folder = bywire.compare(*folders).as_object()
     in_memory = bywire.compare(*results).as_object()
-    bench = bywire.Bench("hard-braking", "dardanelli2010",
-                         options={"duration": "40 ms", "settle": "10 ms"})  # fmt: skip
+    bench = bywire.Bench(
+        "hard-braking", "dardanelli2010", options={"duration": "40 ms", "settle": "10 ms"}
+    )
     run_now = bywire.compare(bench, bench.with_overrides({"motor.R_m": "0.5 ohm"})).as_object()
     assert from_folder["settings"] == in_memory["settings"] == run_now["settings"]
     assert from_folder["kpis"] == in_memory["kpis"] == run_now["kpis"]
@@ -164,8 +169,11 @@ def test_curves_lie_in_the_brakes_panels_with_what_differs_in_the_legend(folders
 def test_one_page_and_one_record(folders, tmp_path):
     bywire.compare(*folders).write(tmp_path / "out")
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
-        "report.html", "overlay.png", "difference.png", "compare.json",
-    }  # fmt: skip
+        "report.html",
+        "overlay.png",
+        "difference.png",
+        "compare.json",
+    }
     record = json.loads((tmp_path / "out" / "compare.json").read_text(encoding="utf-8"))
     assert [each["label"] for each in record["runs"]] == ["base", "warm"]
 
@@ -218,14 +226,21 @@ def test_changes_of_what_was_run_before_are_refused(folders):
         ("{", "cannot be read"),
         ("[]", "holds no JSON object"),
         ('{"status": "passed"}', "is damaged"),
-        ('{"status": "passed", "bench": "x", "kpis": {}, "requirements": [], "files": []}',
-         "names no recording"),
-        ('{"status": "passed", "bench": "x", "kpis": {}, "requirements": [], '
-         '"files": ["gone/run.nc"]}', "run.nc is missing"),
-        ('{"status": "interrupted", "bench": "x", "kpis": {}, "requirements": [], "files": []}',
-         "is not finished"),
+        (
+            '{"status": "passed", "bench": "x", "kpis": {}, "requirements": [], "files": []}',
+            "names no recording",
+        ),
+        (
+            '{"status": "passed", "bench": "x", "kpis": {}, "requirements": [], '
+            '"files": ["gone/run.nc"]}',
+            "run.nc is missing",
+        ),
+        (
+            '{"status": "interrupted", "bench": "x", "kpis": {}, "requirements": [], "files": []}',
+            "is not finished",
+        ),
     ],
-)  # fmt: skip
+)
 def test_folders_that_are_unfinished_or_damaged(folders, tmp_path, content, message):
     broken = tmp_path / "broken"
     broken.mkdir()

@@ -100,8 +100,11 @@ def test_a_recording_is_replayed_from_memory(tmp_path: Path) -> None:
     assert float(np.abs(difference).max()) < 1e-6
     assert found.tables()["How well it fits"]["nrmse"].to_list()[0] < 2.0
     assert {path.name for path in found.write(tmp_path)} == {
-        "replay.nc", "x.png", "report.html", "replay.json",
-    }  # fmt: skip
+        "replay.nc",
+        "x.png",
+        "report.html",
+        "replay.json",
+    }
     with pytest.raises(bywire.BywireError, match=r"nrmse <= 5 %"):
         bywire.replay(recording, bench, tolerances=["nrmse"])
 

@@ -17,9 +17,7 @@ OVER = "motor.R_m=0.25 ohm:0.5 ohm:6"
 
 @pytest.fixture(scope="module")
 def found():
-    return bywire.run(
-        "hard-braking", {**QUICK, "requirements.peak_current": "<= 18 A"}, over=OVER
-    )
+    return bywire.run("hard-braking", {**QUICK, "requirements.peak_current": "<= 18 A"}, over=OVER)
 
 
 def test_every_value_is_run_and_judged(found):

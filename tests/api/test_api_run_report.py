@@ -15,7 +15,12 @@ def test_what_was_changed_and_the_verdict_come_first_and_figures_before_tables()
     )
     titles = [section.title for section in result.document().page]
     assert titles == [
-        "Outcome", "Figures", "Key figures", "Energy", "Schematic", "How it was made",
+        "Outcome",
+        "Figures",
+        "Key figures",
+        "Energy",
+        "Schematic",
+        "How it was made",
     ]
     required, changed = [block.table for block in result.document().page[0].blocks[:2]]
     assert [row[0].text for row in required.rows] == ["overshoot"]

@@ -21,8 +21,9 @@ VALUES = (0.25, 0.35, 0.5)
 
 @pytest.fixture(scope="module")
 def bench():
-    return bywire.Bench("hard-braking", "dardanelli2010", options=OPTIONS,
-                        requirements={"peak_current": "<= 18 A"})  # fmt: skip
+    return bywire.Bench(
+        "hard-braking", "dardanelli2010", options=OPTIONS, requirements={"peak_current": "<= 18 A"}
+    )
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +63,7 @@ def test_options_vary_and_the_start_follows(bench):
 
 
 def test_an_experiment_of_several_runs():
-    bench = bywire.Bench("friction-ramp", "dardanelli2010",
-                         options={"i_max": 0.2, "slope": 2.0})  # fmt: skip
+    bench = bywire.Bench("friction-ramp", "dardanelli2010", options={"i_max": 0.2, "slope": 2.0})
     found = bywire.simulate_ensemble(bench, {"seal.T_pr": [0.002, 0.004]})
     for value, result in zip((0.002, 0.004), found.results, strict=True):
         alone = run(bench.with_overrides({"seal.T_pr": value}))
@@ -158,7 +158,9 @@ def test_a_varied_bench_is_the_one_that_is_made_anew(bench):
     varied = bench.varied(changes, {"p_to": 20e5}, seed=7)
     anew = replace(bench, overrides=changes, options={**OPTIONS, "p_to": 20e5}, seed=7)
     assert (varied.par, varied.chosen_options, varied.system) == (
-        anew.par, anew.chosen_options, anew.system
+        anew.par,
+        anew.chosen_options,
+        anew.system,
     )
     assert varied == replace(varied)  # every check again
     assert run(varied).kpis == run(anew).kpis

@@ -33,15 +33,31 @@ PAIRS = [
 FIRST = dict(reversed(PAIRS))  # of every experiment, the first parameter set that fits it
 LINES = 'experiment = "{}"\nparameters = "{}"\n'
 FEWER = {  # of experiments of many runs, which tests of their brakes run as they are
-    "static-force": 'mu_B = "0.2, 0.6"', "friction-sweep": 'mu_B = "0.2, 0.6"',
-    "position-step": 'amplitudes = "0.5 rad"', "repeated-stops": "stops = 2",
-    "bandwidths": 'f_n = "3 Hz, 40 Hz"', "slope-hold": 't_release = "5 s"\nduration = "7 s"',
-}  # fmt: skip
+    "static-force": 'mu_B = "0.2, 0.6"',
+    "friction-sweep": 'mu_B = "0.2, 0.6"',
+    "position-step": 'amplitudes = "0.5 rad"',
+    "repeated-stops": "stops = 2",
+    "bandwidths": 'f_n = "3 Hz, 40 Hz"',
+    "slope-hold": 't_release = "5 s"\nduration = "7 s"',
+}
 LARGE = (
-    "bandwidths", "corner-panic", "corner-stop", "disc-stop", "force-cycle", "friction-ramp",
-    "friction-sweep", "moment-pulse-950", "position-step", "rear-drag", "rear-lift",
-    "repeated-stops", "slope-hold", "slow-stop", "static-force", "stiffness",
-)  # fmt: skip
+    "bandwidths",
+    "corner-panic",
+    "corner-stop",
+    "disc-stop",
+    "force-cycle",
+    "friction-ramp",
+    "friction-sweep",
+    "moment-pulse-950",
+    "position-step",
+    "rear-drag",
+    "rear-lift",
+    "repeated-stops",
+    "slope-hold",
+    "slow-stop",
+    "static-force",
+    "stiffness",
+)
 """kernels in lanes that no other test needs, and long runs; other experiments of the same models
 have their figures computed in the same way, and all that are computed by families are left"""
 WARNED = {name: ["retracted stop"] for name in ("pressure-release", "rear-drag")}
@@ -138,8 +154,11 @@ def test_figures_of_many_cases_are_those_of_their_recordings(results, name):
         assert figures.kpis(k) == alone[k].kpis
         assert list(figures.warnings[k]) == recorded.warnings
         assert [*recorded.bench.outdated, *recorded.warnings] == alone[k].warnings
-        assert all("lanes" in each.attrs["engine"] for each in recorded.recordings.values()
-                   if "engine" in each.attrs)  # fmt: skip
+        assert all(
+            "lanes" in each.attrs["engine"]
+            for each in recorded.recordings.values()
+            if "engine" in each.attrs
+        )
 
 
 @pytest.mark.trust
@@ -202,19 +221,44 @@ def test_names_are_those_of_their_files():
 def test_every_stimulus_drives_the_open_loop(kind, source, unit):
     values = {
         "step": {"start": 0, "end": f"1 {unit}", "t_step": 0.01},
-        "ramp": {"start": 0, "end": f"1 {unit}", "slope": f"50 {unit}/s", "t_start": 0,
-                 "t_hold": 0, "after": "return"},
-        "sine": {"mean": f"1 {unit}", "amplitude": f"1 {unit}", "f": "100 Hz", "t_start": 0,
-                 "phase": 0},
-        "chirp": {"mean": f"1 {unit}", "amplitude": f"1 {unit}", "f_start": "1 Hz",
-                  "f_end": "100 Hz", "t_sweep": "40 ms", "sweep": "linear", "t_start": 0},
-        "multisine": {"mean": f"1 {unit}", "amplitude": f"0.1 {unit}", "f_base": "10 Hz", "n": 5,
-                      "t_start": 0},
+        "ramp": {
+            "start": 0,
+            "end": f"1 {unit}",
+            "slope": f"50 {unit}/s",
+            "t_start": 0,
+            "t_hold": 0,
+            "after": "return",
+        },
+        "sine": {
+            "mean": f"1 {unit}",
+            "amplitude": f"1 {unit}",
+            "f": "100 Hz",
+            "t_start": 0,
+            "phase": 0,
+        },
+        "chirp": {
+            "mean": f"1 {unit}",
+            "amplitude": f"1 {unit}",
+            "f_start": "1 Hz",
+            "f_end": "100 Hz",
+            "t_sweep": "40 ms",
+            "sweep": "linear",
+            "t_start": 0,
+        },
+        "multisine": {
+            "mean": f"1 {unit}",
+            "amplitude": f"0.1 {unit}",
+            "f_base": "10 Hz",
+            "n": 5,
+            "t_start": 0,
+        },
         "table": {"times": "0 s, 20 ms", "values": f"0 {unit}, 1 {unit}", "between": "hold"},
-    }  # fmt: skip
+    }
     options = {"source": source, "duration": "50 ms"}
     bench = bywire.Bench(
-        "motor-open-loop", "dardanelli2010", options=options,
+        "motor-open-loop",
+        "dardanelli2010",
+        options=options,
         stimulus={"kind": kind, **values[kind]},
     )
     recording = bywire.run(bench).recordings["run"]

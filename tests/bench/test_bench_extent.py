@@ -114,6 +114,8 @@ def test_inadmissible_step(value):
 def test_sample_times_that_would_make_it_settle_for_long():
     with pytest.raises(StepError, match=r"would settle for 970\.471 s, .*multiples of each other"):
         bywire.Bench(
-            "moment-release", "roberts2003", {"control.T_slow": "97.0471 s"},
+            "moment-release",
+            "roberts2003",
+            {"control.T_slow": "97.0471 s"},
             {"settle": "60 ms", "duration": "40 ms"},
-        )  # fmt: skip
+        )

@@ -166,9 +166,10 @@ def test_set_of_another_assembly_is_refused(monkeypatch):
     other = dataclasses.replace(PARAMETER_SETS.find(SET), name="wedge", assembly="wedge-brake")
     find = type(PARAMETER_SETS).find
     monkeypatch.setattr(
-        type(PARAMETER_SETS), "find",
+        type(PARAMETER_SETS),
+        "find",
         lambda kind, name: other if kind is PARAMETER_SETS else find(kind, name),
-    )  # fmt: skip
+    )
     with pytest.raises(ParameterError, match=r"tests a motorcycle-brake.* is for a wedge-brake"):
         bywire.Bench("hard-braking", "wedge")
 

@@ -167,8 +167,9 @@ def test_engines_agree_on_every_signal():
         assert float(abs(compiled[name] - slow[name]).max()) <= 1e-6 * scale
 
 
-@pytest.mark.parametrize(("k_lf", "is_open"), [("32", False), ("3.2e-12", False),
-                                               ("3.2e-15", True), ("3.2e-19", True)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("k_lf", "is_open"), [("32", False), ("3.2e-12", False), ("3.2e-15", True), ("3.2e-19", True)]
+)
 def test_a_run_whose_energy_balance_is_open_says_so(k_lf, is_open):
     """A pipeline nearly without friction lets fluid of a few grams whirl at absurd speed."""
     result = run_once("hard-braking", {"pipeline.k_lf": k_lf})

@@ -51,9 +51,13 @@ def test_zero_is_a_row_for_every_recording_interval(record):
 
 def test_settling_time_is_a_common_multiple_of_both_intervals():
     bench = bywire.Bench(
-        "hard-braking", SET, {"ecu.T_s": "0.625 ms"}, {"settle": "1 s"}, step="25 us",
+        "hard-braking",
+        SET,
+        {"ecu.T_s": "0.625 ms"},
+        {"settle": "1 s"},
+        step="25 us",
         record="1 ms",
-    )  # fmt: skip
+    )
     (case,) = bench.cases()
     assert case.settle == pytest.approx(1.0)
     assert bench.runs()["run"].duration == pytest.approx(case.settle + case.duration)
@@ -95,9 +99,13 @@ def test_recording_can_be_made_again():
     recording = run_once(bench).recording
     attrs = recording.attrs
     again = bywire.Bench(
-        attrs["experiment"], attrs["parameter_set"], options=json.loads(attrs["options"]),
-        stimulus=json.loads(attrs["stimulus"]), step=attrs["step"], seed=attrs["seed"],
-    )  # fmt: skip
+        attrs["experiment"],
+        attrs["parameter_set"],
+        options=json.loads(attrs["options"]),
+        stimulus=json.loads(attrs["stimulus"]),
+        step=attrs["step"],
+        seed=attrs["seed"],
+    )
     assert again.chosen_options == bench.chosen_options
     assert run_once(again).recording.equals(recording)
     assert json.loads(braking(0.0).recording.attrs["stimulus"]) == {}
@@ -106,10 +114,12 @@ def test_recording_can_be_made_again():
 def test_breakaway_is_that_of_the_highest_pressure_in_any_order():
     names = ("breakaway_apply", "breakaway_release")
     found = [
-        [run_once(bywire.Bench("seal-stribeck", SET, options={"pressures": p})).kpi(n).value
-         for n in names]
+        [
+            run_once(bywire.Bench("seal-stribeck", SET, options={"pressures": p})).kpi(n).value
+            for n in names
+        ]
         for p in ("2 bar, 20 bar, 40 bar", "40 bar, 2 bar, 20 bar")
-    ]  # fmt: skip
+    ]
     assert found[0] == found[1]
 
 

@@ -33,18 +33,39 @@ VALUES = st.recursive(
 )
 NAMES = st.sampled_from(
     [
-        "motor.R_m", "motor", "caliper.p_table", "gear.law", "drive.mode", "p_to", "trace", "kind",
-        "times", "values", "start", "end", "t_step", "source", "step", "record", "seed",
-        "overshoot", "energy", "ecu.pedal_map.V_nodes", "", ".", "..", "motor.", "__class__",
+        "motor.R_m",
+        "motor",
+        "caliper.p_table",
+        "gear.law",
+        "drive.mode",
+        "p_to",
+        "trace",
+        "kind",
+        "times",
+        "values",
+        "start",
+        "end",
+        "t_step",
+        "source",
+        "step",
+        "record",
+        "seed",
+        "overshoot",
+        "energy",
+        "ecu.pedal_map.V_nodes",
+        "",
+        ".",
+        "..",
+        "motor.",
+        "__class__",
     ]
-)  # fmt: skip
+)
 SECTION = st.one_of(st.dictionaries(NAMES, VALUES, max_size=3), VALUES)
 CONTENT = st.fixed_dictionaries(
     {
         "experiment": st.one_of(
-            st.sampled_from(
-                ["hard-braking", "motor-open-loop", "seal-stribeck", "pedal-tracking"]
-            ), VALUES
+            st.sampled_from(["hard-braking", "motor-open-loop", "seal-stribeck", "pedal-tracking"]),
+            VALUES,
         ),
         "parameters": st.one_of(st.just("dardanelli2010"), VALUES),
     },

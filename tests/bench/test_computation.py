@@ -20,11 +20,11 @@ from bywire.studies.study_file import read_study
 from systems.loading import SPRING_AXIS, loaded
 
 FILES = {
-    "__init__.py": '''
+    "__init__.py": """
 from bywire.core.brake import Brake
 
 BRAKE = Brake("sprung", "s", __name__)
-''',
+""",
     "laws.py": '''
 """The law."""
 
@@ -92,7 +92,7 @@ def judge(recordings, options):
 PUSH = Experiment("push", "spring-axis", "a push", Options, Options(F=20.0), cases, judge,
                   FIGURES.units, ())
 ''',
-}  # fmt: skip
+}
 
 
 @pytest.fixture
@@ -104,8 +104,8 @@ def sprung(tmp_path: Path) -> Iterator[Callable[..., Path]]:
     files = FILES | {
         "models.py": models.replace("\n\n\nclass", "\n\nfrom .laws import held\n\n\nclass", 1),
         "sets.py": "from bywire.core.catalog import CitedSet\n\n"
-                   f"from .models import Parameters\n\nVALUES = {sets}",
-    }  # fmt: skip
+        f"from .models import Parameters\n\nVALUES = {sets}",
+    }
 
     def write(*changes: tuple[str, str, str], renamed: tuple[str, str] = ("", "")) -> Path:
         folder = tmp_path / "sprung"
@@ -169,7 +169,7 @@ OTHER = {
     "constant of a key figure": [("figures.py", "SHARE = 0.5", "SHARE = 0.4")],
     "start": [("experiments.py", "State(0.0, 0.0)", "State(0.0, 0.1)")],
     "stimulus": [("experiments.py", "t > 0.0", "t > 0.01")],
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("changes", SAME.values(), ids=SAME.keys())

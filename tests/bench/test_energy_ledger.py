@@ -107,12 +107,20 @@ def test_energy_given_back_is_turned_over():
 
 
 def test_a_loss_gives_what_it_loses_of_its_largest_value():
-    rows = {"E_source": [0.0, 5.0, 5.0], "E_friction": [0.0, 3.0, 2.5], "E_tyre": [0.0, 2.0, -0.5],
-            "E_air": [0.0, -1.0, 1.0], "E_stored": [0.0, -4.0, 2.0], "W_load": [0.0, -3.0, 0.0],
-            "E_alone": [1.0, 1.5, 2.0]}  # fmt: skip
-    roles = {"E_tyre": Role("sink", "tyre", book="vehicle", returns="taken"),
-             "E_air": Role("sink", "air", returns="any"),
-             "W_load": Role("sink", "load")}  # fmt: skip
+    rows = {
+        "E_source": [0.0, 5.0, 5.0],
+        "E_friction": [0.0, 3.0, 2.5],
+        "E_tyre": [0.0, 2.0, -0.5],
+        "E_air": [0.0, -1.0, 1.0],
+        "E_stored": [0.0, -4.0, 2.0],
+        "W_load": [0.0, -3.0, 0.0],
+        "E_alone": [1.0, 1.5, 2.0],
+    }
+    roles = {
+        "E_tyre": Role("sink", "tyre", book="vehicle", returns="taken"),
+        "E_air": Role("sink", "air", returns="any"),
+        "W_load": Role("sink", "load"),
+    }
     made = xr.Dataset(
         {n: ("time", v, role_attributes(roles.get(n))) for n, v in rows.items()},
         {"time": [0.0, 1.0, 2.0]},
@@ -170,9 +178,10 @@ def of_ensemble(bench: Bench) -> Sequence[str]:
 
 
 @pytest.mark.parametrize(
-    "warned", [lambda bench: run_bench(bench).warnings, of_study, of_ensemble],
+    "warned",
+    [lambda bench: run_bench(bench).warnings, of_study, of_ensemble],
     ids=["run", "study", "ensemble"],
-)  # fmt: skip
+)
 def test_every_run_tells_of_a_loss_that_gives_energy(
     axis: Callable[[str], Bench], warned: Callable[[Bench], Sequence[str]]
 ) -> None:

@@ -63,8 +63,10 @@ def test_no_summary_has_the_default_of_an_option_written_out(name):
 
 def test_a_summary_survives_copies_and_refuses_what_is_no_option():
     experiment = EXPERIMENTS.find("hard-braking")
-    for copied in (pickle.loads(pickle.dumps(experiment.summary)),
-                   replace(experiment, name="another").summary):  # fmt: skip
+    for copied in (
+        pickle.loads(pickle.dumps(experiment.summary)),
+        replace(experiment, name="another").summary,
+    ):
         assert (copied, copied.template) == (experiment.summary, experiment.summary.template)
     for wrong in ("step to {p_end}", "step to {p_to", "step to {}"):
         with pytest.raises(ModelError, match="names of options are wanted in braces"):

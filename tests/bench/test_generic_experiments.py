@@ -88,8 +88,12 @@ def test_every_stimulus_of_our_brakes_can_be_driven(name: str, parameters: str) 
         if stimulus.startswith("noise_"):
             continue
         driven = {"kind": "step", "start": 0, "end": 1, "t_step": 0}
-        made = bywire.Bench(name, parameters, options={"input": stimulus},
-                            stimulus=driven if name == "open-loop" else {})  # fmt: skip
+        made = bywire.Bench(
+            name,
+            parameters,
+            options={"input": stimulus},
+            stimulus=driven if name == "open-loop" else {},
+        )
         (case,) = made.cases()
         assert set(case.stimulus(np.zeros(1))) == {stimulus}
         output = made.chosen_options.flat()["output"]
@@ -126,8 +130,15 @@ def test_a_ramp_opens_the_loop_of_its_friction() -> None:
 
 
 def test_a_sine_sweep_has_the_gain_of_the_equation() -> None:
-    options = {"output": "x", "mean": 0, "amplitude": "10 N", "f_start": "1 Hz", "f_end": "40 Hz",
-               "n": 9, "n_settle": 12}  # fmt: skip
+    options = {
+        "output": "x",
+        "mean": 0,
+        "amplitude": "10 N",
+        "f_start": "1 Hz",
+        "f_end": "40 Hz",
+        "n": 9,
+        "n_settle": 12,
+    }
     made = bench("sine-sweep", options, overrides=SMOOTH)
     result = run_once(made)
     setting = made.definition.sweep(made.chosen_options)
@@ -164,8 +175,14 @@ def test_a_release_tells_when_it_is_empty_and_what_is_left() -> None:
 
 
 def test_tracking_of_what_is_held_lags_half_a_sample_at_most() -> None:
-    stimulus = {"kind": "sine", "mean": 0, "amplitude": "10 N", "f": "5 Hz", "t_start": 0,
-                "phase": 0}  # fmt: skip
+    stimulus = {
+        "kind": "sine",
+        "mean": 0,
+        "amplitude": "10 N",
+        "f": "5 Hz",
+        "t_start": 0,
+        "phase": 0,
+    }
     result = run_once(bench("tracking", {"output": "F"}, stimulus=stimulus))
     assert result.kpi("tracking_max").value < 10.0 * 2.0 * math.pi * 5.0 * 1.1e-3
     with pytest.raises(ParameterError, match=r"options.output: x is in m, and the set point F_set"):
@@ -188,18 +205,25 @@ def test_further_stimuli_act_beside() -> None:
 @pytest.mark.parametrize(
     ("options", "error", "text"),
     [
-        ({"input": "F_sett"}, UnknownNameError, "stimulus of spring-axis in options.input 'F_sett'"
-         ": did you mean 'F_set'?"),
+        (
+            {"input": "F_sett"},
+            UnknownNameError,
+            "stimulus of spring-axis in options.input 'F_sett': did you mean 'F_set'?",
+        ),
         ({"input": "noise_x"}, UnknownNameError, "known are F_set, load"),
         ({"output": "y"}, UnknownNameError, "recording of spring-axis in options.output 'y'"),
-        ({"input": ""}, ParameterError, "options.input is missing: name the stimulus of spring-axis"
-         " that experiment 'step' drives: F_set, load"),
+        (
+            {"input": ""},
+            ParameterError,
+            "options.input is missing: name the stimulus of spring-axis"
+            " that experiment 'step' drives: F_set, load",
+        ),
         ({"input": 3}, ParameterError, "options.input = 3: name a stimulus of spring-axis"),
         ({"end": "2 bar"}, UnitError, "end"),
         ({"endd": "2 N"}, UnknownNameError, "did you mean 'end'?"),
         ({"duration": "-1 s"}, ParameterError, "duration = -1.0 s is not admissible"),
     ],
-)  # fmt: skip
+)
 def test_names_and_units_are_checked_against_the_model(
     options: dict[str, Any], error: type[InputError], text: str
 ) -> None:

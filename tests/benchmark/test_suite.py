@@ -52,8 +52,12 @@ def test_a_part_that_fails_is_a_row_with_its_reason(parts):
     parts(broken=broken, refused=refused, ended=ended, sound=sound)
     done = measure()
     assert [r.id for r in done.results] == [
-        "broken.first", "broken", "refused", "ended", "sound.time",
-    ]  # fmt: skip
+        "broken.first",
+        "broken",
+        "refused",
+        "ended",
+        "sound.time",
+    ]
     reasons = {r.id: r.note for r in done.results if r.is_failed}
     place, _, text = reasons.pop("broken").partition(": ")
     assert "suite.py, line" in place

@@ -67,14 +67,31 @@ MOTORCYCLE: list[tuple[dict[str, Any], Counts]] = [
 WEDGE: list[tuple[dict[str, Any], Counts]] = [
     ({}, (1541, 1000, 450, (109, 98))),
     ({"screw.law": "drive", "encoder.law": "ideal"}, (1527, 986, 450, (98, 86))),
-    ({"caliper.law": "table", **BENT, "flywheel.law": "driven",
-      "control.offset.law": "scheduled"}, (1609, 1028, 472, (109, 111))),
-    ({"wedge_friction.stopped_disc": "stick", "command.mode": "position"},
-     (1547, 1006, 450, (70,))),
-    ({"motor_heat.law": "lumped", "control.derating.law": "current"},
-     (1618, 1079, 477, (109, 158))),
-    ({"adjuster.law": "screw", "control.adjuster.ways": "both",
-      "control.adjuster.fault": "none"}, (1561, 1021, 456, (114, 72, 98))),
+    (
+        {
+            "caliper.law": "table",
+            **BENT,
+            "flywheel.law": "driven",
+            "control.offset.law": "scheduled",
+        },
+        (1609, 1028, 472, (109, 111)),
+    ),
+    (
+        {"wedge_friction.stopped_disc": "stick", "command.mode": "position"},
+        (1547, 1006, 450, (70,)),
+    ),
+    (
+        {"motor_heat.law": "lumped", "control.derating.law": "current"},
+        (1618, 1079, 477, (109, 158)),
+    ),
+    (
+        {
+            "adjuster.law": "screw",
+            "control.adjuster.ways": "both",
+            "control.adjuster.fault": "none",
+        },
+        (1561, 1021, 456, (114, 72, 98)),
+    ),
     ({"command.mode": "current"}, (1541, 1000, 450, (8,))),  # limits the demand
 ]
 RIGS: list[tuple[type[Model], dict[str, Any], Counts]] = [

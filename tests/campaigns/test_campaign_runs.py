@@ -116,8 +116,14 @@ def test_a_fault_does_in_the_campaign_what_it_does_alone(campaign):
 def _with(bench, section):
     """Return a bench with a fault and the same scatter and noise."""
     flat = {name: bench.par.value(name) for name in ("motor.R_m", "seal.T_pr")}
-    made = bywire.Bench(bench.experiment, bench.parameters, overrides=flat, options=bench.options,
-                        seed=bench.seed, faults=[section])  # fmt: skip
+    made = bywire.Bench(
+        bench.experiment,
+        bench.parameters,
+        overrides=flat,
+        options=bench.options,
+        seed=bench.seed,
+        faults=[section],
+    )
     assert made.par == bench.par
     return made
 
@@ -125,8 +131,9 @@ def _with(bench, section):
 def test_classes_coverage_and_reaction_follow_from_the_runs(campaign):
     findings = campaign.findings
     assert len(findings.faults) == 7
-    kinds = {f"{each.failing.mode.name} {each.failing.value:g}": each.kind
-             for each in findings.faults}  # fmt: skip
+    kinds = {
+        f"{each.failing.mode.name} {each.failing.value:g}": each.kind for each in findings.faults
+    }
     assert kinds["battery.lost 0"] == kinds["pressure.stuck 0"] == "covered"
     assert kinds["fluid.cold 3"] in ("latent", "harmless, seen")
     # Where a residual alarms at the same instant by chance, it may stand first.
@@ -163,8 +170,11 @@ def test_healthy_halves_are_apart_and_alarms_fall_with_the_threshold(campaign):
 
 def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monkeypatch):
     threads, keep = set(), CampaignStore.keep
-    monkeypatch.setattr(CampaignStore, "keep", lambda *given: (
-        threads.add(threading.current_thread()), keep(*given)))  # fmt: skip
+    monkeypatch.setattr(
+        CampaignStore,
+        "keep",
+        lambda *given: (threads.add(threading.current_thread()), keep(*given)),
+    )
     kept = sorted((folder / "faults").glob("*.json"))
     texts = [path.read_bytes() for path in kept]
     kept[1].unlink()
@@ -174,10 +184,10 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
     # Two that write into one folder at a time would take each other's scratch files away.
     assert threads == {threading.main_thread()}
     first = CampaignFindings(
-        campaign.findings.plan, campaign.findings.healthy,
-        tuple(finding(campaign.findings.plan, k, json.loads(text))
-              for k, text in enumerate(texts)),
-    )  # fmt: skip
+        campaign.findings.plan,
+        campaign.findings.healthy,
+        tuple(finding(campaign.findings.plan, k, json.loads(text)) for k, text in enumerate(texts)),
+    )
     assert again.findings.coverage == first.coverage == campaign.findings.coverage
     with pytest.raises(FileError, match="holds another campaign"):
         bywire.run_faults(file, folder, {"options.p_to": "36.5 bar"})
@@ -198,23 +208,29 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
         ("battery = 1", "batery = 1", "unknown fault in .rates. 'batery'"),
         ('delay = "5 ms"', 'delay = "-5 ms"', "must be >= 0 s"),
         ('"motor.R_m" = "+-10 %"', f'"adc.law" = {LAWS}', "only numbers vary"),
-        ('bench = "hard-braking"', 'bench = "hard-braking"\nresiduals = ["x"]',
-         "unknown residual 'x'"),
-        ('bench = "hard-braking"', 'bench = "hard-braking"\nresiduals = [["x"]]',
-         "unknown residual"),
+        (
+            'bench = "hard-braking"',
+            'bench = "hard-braking"\nresiduals = ["x"]',
+            "unknown residual 'x'",
+        ),
+        (
+            'bench = "hard-braking"',
+            'bench = "hard-braking"\nresiduals = [["x"]]',
+            "unknown residual",
+        ),
         ("healthy = 8", "healthy = 1000000", "a whole number from 4 to 10000"),
-        ('"0 bar", "50 bar"]', '20]', "wrong unit"),
-        ('["0 bar", "50 bar"]', '[]', "give a value, or use leave_out"),
+        ('"0 bar", "50 bar"]', "20]", "wrong unit"),
+        ('["0 bar", "50 bar"]', "[]", "give a value, or use leave_out"),
         ("[values]", '[values]\n"battery.lost" = 3', "battery.lost takes no value"),
         ('above_healthy = "5 bar"', "above_healthy = 5", "wrong unit"),
         ('signal = "p_pd"\nbelow', 'signal = ["p_pd"]\nbelow', "unknown signal of criterion"),
-        ('present =', 'leave_out = ["*"]\npresent =', "leaves no fault"),
-        ('delay = "5 ms"', 'value = 3', "bridge.open-phase takes no value"),
+        ("present =", 'leave_out = ["*"]\npresent =', "leaves no fault"),
+        ('delay = "5 ms"', "value = 3", "bridge.open-phase takes no value"),
         ("battery = 1", "battery = 1" + "0" * 400, "battery = a number of 300 digits or more"),
         ("battery = 1", "battery = 1e13", "0 to 1e12 is wanted"),
         (SMALL, 'bench = "bandwidths"', "makes one run without faults, but 'bandwidths' makes"),
     ],
-)  # fmt: skip
+)
 def test_what_does_not_fit_is_refused(tmp_path, right, wrong, message):
     assert SMALL.count(right) >= 1
     (tmp_path / "bad.toml").write_text(SMALL.replace(right, wrong, 1))
@@ -240,8 +256,11 @@ def test_a_campaign_that_does_not_fit_into_memory_is_refused(tmp_path):
 
 def test_a_reaction_may_be_a_fault_that_the_campaign_leaves_out(tmp_path):
     text = SMALL.replace('"bridge.open-phase"', '"current.stuck"').replace('"0.6 s"', '"0.5 s"')
-    text = text.replace('["pressure.stuck", "battery.lost", "motor.hot", "ecu.frozen", '
-                        '"bridge.late", "fluid.cold"]', '["pressure.*"]')  # fmt: skip
+    text = text.replace(
+        '["pressure.stuck", "battery.lost", "motor.hot", "ecu.frozen", '
+        '"bridge.late", "fluid.cold"]',
+        '["pressure.*"]',
+    )
     (tmp_path / "other.toml").write_text(text)
     plan = read_campaign(tmp_path / "other.toml")
     assert [tap.name for tap in plan.taps[0]] == ["current", "pressure"]
@@ -251,8 +270,9 @@ def test_a_reaction_may_be_a_fault_that_the_campaign_leaves_out(tmp_path):
 
 
 def test_a_drift_that_is_there_from_the_start_grows_from_time_zero():
-    drift = next(each for each in read_campaign("motorcycle").faults
-                 if each.mode.name == "pressure.drift")  # fmt: skip
+    drift = next(
+        each for each in read_campaign("motorcycle").faults if each.mode.name == "pressure.drift"
+    )
     (fault,) = replace(drift, is_present=True).at(0.0, 0)
     assert fault.course.onset == 0.0
 
@@ -286,9 +306,11 @@ def test_faults_of_what_a_bench_lacks_are_left_out():
 
 
 def test_double_faults_stand_beside_the_latent_one(tmp_path):
-    text = SMALL.replace('present =', 'latent = ["seal.swollen"]\npresent =').replace(
-        "healthy = 8", "healthy = 4"
-    ).replace(', "ecu.frozen", "bridge.late", "fluid.cold"]', ', "fluid.cold"]')
+    text = (
+        SMALL.replace("present =", 'latent = ["seal.swollen"]\npresent =')
+        .replace("healthy = 8", "healthy = 4")
+        .replace(', "ecu.frozen", "bridge.late", "fluid.cold"]', ', "fluid.cold"]')
+    )
     text = text.replace('"pressure.stuck" = ["0 bar", "50 bar"]', '"seal.swollen" = 3')
     (tmp_path / "pairs.toml").write_text(text.replace('"pressure.stuck", ', ""))
     campaign = bywire.run_faults(tmp_path / "pairs.toml")
@@ -303,8 +325,11 @@ def test_double_faults_stand_beside_the_latent_one(tmp_path):
 def test_a_residual_that_is_never_looked_at_sees_nothing_by_any_threshold(campaign):
     plan = campaign.findings.plan
     alive = plan.residuals[0]
-    dead = replace(alive, name="dead", compute=lambda signals, par, dt: np.where(
-        signals["i_meas"] < 1e3, NEVER, 0.0))  # fmt: skip
+    dead = replace(
+        alive,
+        name="dead",
+        compute=lambda signals, par, dt: np.where(signals["i_meas"] < 1e3, NEVER, 0.0),
+    )
     judged = judge_healthy(replace(plan, residuals=(alive, dead)), healthy_traces(plan))
     assert judged.thresholds["dead"] == NEVER
     assert not any(judged.alarms["dead"])
@@ -340,11 +365,13 @@ def hand_made(plan, loss, reacted, answered, seen=0.01):
     """Return a finding of two runs: when each violates "loss", and with the reaction."""
     never = np.full(2, np.nan)
     return FaultFinding(
-        plan.faults[0], {"loss": np.array(loss), "too much": never},
-        {each.name: np.full((len(FACTORS), 2), seen) for each in plan.watched}, {},
+        plan.faults[0],
+        {"loss": np.array(loss), "too much": never},
+        {each.name: np.full((len(FACTORS), 2), seen) for each in plan.watched},
+        {},
         {"loss": np.array(reacted), "too much": never[: len(answered)]} if answered else {},
         answered,
-    )  # fmt: skip
+    )
 
 
 def test_harm_done_by_the_reaction_is_counted_run_by_run(campaign):

@@ -52,15 +52,26 @@ def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         monkeypatch.chdir(tmp_path)
         (tmp_path / "axis.toml").write_text(BENCH)
         bench = bywire.Bench(
-            "open-loop", overrides={"F_c": 0.0, "k_c": 1e-3, "k": 9e3},
+            "open-loop",
+            overrides={"F_c": 0.0, "k_c": 1e-3, "k": 9e3},
             options={"input": "F_set", "output": "x", "record": 1e-3, "duration": 0.3},
-            stimulus={"kind": "multisine", "mean": 0.0, "amplitude": 60.0, "f_base": 4.0, "n": 12,
-                      "t_start": 0.0},
-        )  # fmt: skip
+            stimulus={
+                "kind": "multisine",
+                "mean": 0.0,
+                "amplitude": 60.0,
+                "f_base": 4.0,
+                "n": 12,
+                "t_start": 0.0,
+            },
+        )
         recording = bywire.run(bench, estimate_error=False).recording
         demand = bench.cases()[0].stimulus(recording["time"].values)["F_set"]
-        columns = (recording["time"].values, demand / POUND_FORCE, recording["x"].values / INCH,
-                   np.arange(demand.size))  # fmt: skip
+        columns = (
+            recording["time"].values,
+            demand / POUND_FORCE,
+            recording["x"].values / INCH,
+            np.arange(demand.size),
+        )
         rows = [",".join(f"{value:.17g}" for value in row) for row in zip(*columns, strict=True)]
         table = tmp_path / "rig.csv"
         table.write_text("\n".join(["Zeit,Kraft,Weg,Zaehler", *rows]) + "\n")
@@ -81,12 +92,38 @@ def test_replay_takes_columns_by_their_names_and_units(bywire: Bywire, rig: Path
 
 def test_identify_takes_columns_and_noise(bywire: Bywire, rig: Path) -> None:
     named = [text.replace("[inch]", "[inch] +- 1 um") for text in NAMED]
-    done = bywire("identify", "output-error", rig, "--bench", "axis.toml", *named, "--unknown",
-                  "k", "--starts", 1, "--holdout", "other.csv", "--json")  # fmt: skip
+    done = bywire(
+        "identify",
+        "output-error",
+        rig,
+        "--bench",
+        "axis.toml",
+        *named,
+        "--unknown",
+        "k",
+        "--starts",
+        1,
+        "--holdout",
+        "other.csv",
+        "--json",
+    )
     refused(done, "other.csv")  # the held-out file is read as the other one is
     (rig.parent / "other.csv").write_text(rig.read_text() + "0.3010,0,0,0\n")
-    done = bywire("identify", "output-error", rig, "--bench", "axis.toml", *named, "--unknown",
-                  "k", "--starts", 1, "--holdout", "other.csv", "--json")  # fmt: skip
+    done = bywire(
+        "identify",
+        "output-error",
+        rig,
+        "--bench",
+        "axis.toml",
+        *named,
+        "--unknown",
+        "k",
+        "--starts",
+        1,
+        "--holdout",
+        "other.csv",
+        "--json",
+    )
     assert done.object["parameters"]["k"] == pytest.approx(9e3, rel=1e-9)
     assert "warning" not in done.err  # the record is the model's own
     assert done.object["figures"]["x.noise"]["value"] == pytest.approx(1e-6)
@@ -94,16 +131,27 @@ def test_identify_takes_columns_and_noise(bywire: Bywire, rig: Path) -> None:
 
 def test_a_check_that_fails_says_what_to_try_next(bywire: Bywire, rig: Path) -> None:
     """The spring is 10 % too stiff, and nothing but the damping is searched."""
-    done = bywire("identify", "output-error", rig, "--bench", "axis.toml", *NAMED, "--unknown", "d",
-                  "--starts", 1)  # fmt: skip
+    done = bywire(
+        "identify",
+        "output-error",
+        rig,
+        "--bench",
+        "axis.toml",
+        *NAMED,
+        "--unknown",
+        "d",
+        "--starts",
+        1,
+    )
     assert done.status == 1
     assert "check failed: residual_over_noise" in done.err
     assert "; next, look at x, of which most is left" in done.err
 
 
 def test_convert_names_columns(bywire: Bywire, rig: Path) -> None:
-    done = bywire("convert", rig, "out.nc", "--signals", "x=Weg [inch], Kraft [lbf]", "--time",
-                  "Zeit [s]")  # fmt: skip
+    done = bywire(
+        "convert", rig, "out.nc", "--signals", "x=Weg [inch], Kraft [lbf]", "--time", "Zeit [s]"
+    )
     assert done.status == 0, done.err
     table = np.loadtxt(rig, delimiter=",", skiprows=1)
     found = read_measurement("out.nc")
@@ -117,20 +165,59 @@ def test_convert_names_columns(bywire: Bywire, rig: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "typed"),
     [
-        (("replay", "titled.csv", "--bench", "axis.toml", "--input", "F_set=Kraft", "--output",
-          "x=Weg"), '--input F_set="Kraft [N]" --output x="Weg [mm]" --time "time [s]"'),
-        (("identify", "output-error", "titled.csv", "--bench", "axis.toml", "--input",
-          "F_set=Kraft", "--output", "x=Weg", "--unknown", "k"),
-         '--input F_set="Kraft [N]" --output x="Weg [mm]" --time "time [s]"'),
-        (("convert", "titled.csv", "out.csv", "--signals", "x=Weg, Kraft"),
-         '--signals "x=Weg [UNIT], Kraft [UNIT]" --time "time [s]"'),
-        (("identify", "seal-friction", "titled.csv", "--output", "F=Kraft", "--output", "x=Weg"),
-         '--output F="Kraft [N]" --output x="Weg [mm]" --time "time [s]"'),
-        (("replay", "timeless.csv", "--bench", "axis.toml", "--input", "F_set=Kraft", "--output",
-          "x=Weg"), '--input F_set="Kraft [N]" --output x="Weg [mm]" --time "COLUMN [s]"'),
+        (
+            (
+                "replay",
+                "titled.csv",
+                "--bench",
+                "axis.toml",
+                "--input",
+                "F_set=Kraft",
+                "--output",
+                "x=Weg",
+            ),
+            '--input F_set="Kraft [N]" --output x="Weg [mm]" --time "time [s]"',
+        ),
+        (
+            (
+                "identify",
+                "output-error",
+                "titled.csv",
+                "--bench",
+                "axis.toml",
+                "--input",
+                "F_set=Kraft",
+                "--output",
+                "x=Weg",
+                "--unknown",
+                "k",
+            ),
+            '--input F_set="Kraft [N]" --output x="Weg [mm]" --time "time [s]"',
+        ),
+        (
+            ("convert", "titled.csv", "out.csv", "--signals", "x=Weg, Kraft"),
+            '--signals "x=Weg [UNIT], Kraft [UNIT]" --time "time [s]"',
+        ),
+        (
+            ("identify", "seal-friction", "titled.csv", "--output", "F=Kraft", "--output", "x=Weg"),
+            '--output F="Kraft [N]" --output x="Weg [mm]" --time "time [s]"',
+        ),
+        (
+            (
+                "replay",
+                "timeless.csv",
+                "--bench",
+                "axis.toml",
+                "--input",
+                "F_set=Kraft",
+                "--output",
+                "x=Weg",
+            ),
+            '--input F_set="Kraft [N]" --output x="Weg [mm]" --time "COLUMN [s]"',
+        ),
     ],
     ids=["replay", "identify", "convert", "method", "no-time"],
-)  # fmt: skip
+)
 def test_one_message_shows_what_to_type_for_all_columns_without_units(
     bywire: Bywire, rig: Path, words: tuple[str, ...], typed: str
 ) -> None:
@@ -152,14 +239,15 @@ def test_columns_with_brackets_and_commas_in_their_names(bywire: Bywire, tmp_pat
 
 def test_python_takes_the_same_words(rig: Path) -> None:
     named = {"inputs": {"F_set": "Kraft [lbf]"}, "time": "Zeit [s]"}
-    found = bywire.replay(
-        rig, "axis.toml", {"k": "9 N/mm"}, outputs={"x": "Weg [inch]"}, **named
-    )  # fmt: skip
+    found = bywire.replay(rig, "axis.toml", {"k": "9 N/mm"}, outputs={"x": "Weg [inch]"}, **named)
     assert nrmse(found) < 1e-9
     data = bywire.read_measurement(
-        rig, {"time": {"column": "Zeit", "unit": "s"},
-              "signals": {"F": {"column": "Kraft [lbf]"}, "s": {"column": "Weg [inch]"}}},
-    )  # fmt: skip
+        rig,
+        {
+            "time": {"column": "Zeit", "unit": "s"},
+            "signals": {"F": {"column": "Kraft [lbf]"}, "s": {"column": "Weg [inch]"}},
+        },
+    )
     again = bywire.replay(
         data, "axis.toml", {"k": "9 N/mm"}, inputs={"F_set": "F"}, outputs={"x": "s"}
     )
@@ -168,8 +256,13 @@ def test_python_takes_the_same_words(rig: Path) -> None:
         bywire.replay(rig, "axis.toml", outputs={"x": "Weg"}, **named)
     (rig.parent / "units.csv").write_text(rig.read_text().replace("Kraft", "Kraft [N]"))
     with pytest.raises(UnitError, match="the file says 'N' and the mapping 'kN'"):
-        bywire.replay("units.csv", "axis.toml", outputs={"x": "Weg [mm]"},
-                      inputs={"F_set": "Kraft [kN]"}, time="Zeit [s]")  # fmt: skip
+        bywire.replay(
+            "units.csv",
+            "axis.toml",
+            outputs={"x": "Weg [mm]"},
+            inputs={"F_set": "Kraft [kN]"},
+            time="Zeit [s]",
+        )
     with pytest.raises(ParameterError, match="x means two columns"):
         bywire.replay(rig, "axis.toml", inputs={"F_set": "x"}, outputs={"x": "Weg [mm]"})
     with pytest.raises(FileError, match="has no column 'Wege"):
@@ -178,13 +271,25 @@ def test_python_takes_the_same_words(rig: Path) -> None:
 
 def test_forms_take_the_same_words(rig: Path) -> None:
     place = Place(rig.parent.resolve())
-    typed = {"bench": "axis.toml", "measurement": "rig.csv", "inputs": "F_set=Kraft [lbf]",
-             "outputs": "x=Weg [inch]", "time": "Zeit [s]", "set": "k=9 N/mm"}  # fmt: skip
+    typed = {
+        "bench": "axis.toml",
+        "measurement": "rig.csv",
+        "inputs": "F_set=Kraft [lbf]",
+        "outputs": "x=Weg [inch]",
+        "time": "Zeit [s]",
+        "set": "k=9 N/mm",
+    }
     asked = replay_form.TASK.read(typed, place)
     found = replay_form.TASK.compute(asked, rig.parent / "out", None)
     assert nrmse(found) < 1e-9
-    fitted = {**typed, "method": "output-error", "measurements": "rig.csv", "set": "",
-              "unknowns": "k", "starts": "1"}  # fmt: skip
+    fitted = {
+        **typed,
+        "method": "output-error",
+        "measurements": "rig.csv",
+        "set": "",
+        "unknowns": "k",
+        "starts": "1",
+    }
     del fitted["measurement"]
     (rig.parent / "out").mkdir()
     asked = identify_form.TASK.read(fitted, place)

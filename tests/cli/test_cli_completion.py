@@ -13,11 +13,13 @@ from bywire.cli.completion import ANYTHING, BENCHES, CAMPAIGNS, LOOPS, changeabl
 @pytest.mark.parametrize(
     ("complete", "typed", "wanted"),
     [
-        (BENCHES, "hard", "hard-braking"), (BENCHES, "motor-o", "motor-open-loop"),
-        (LOOPS, "pres", "pressure"), (CAMPAIGNS, "mot", "motorcycle"),
+        (BENCHES, "hard", "hard-braking"),
+        (BENCHES, "motor-o", "motor-open-loop"),
+        (LOOPS, "pres", "pressure"),
+        (CAMPAIGNS, "mot", "motorcycle"),
         (ANYTHING, "dardanelli2010-m", "dardanelli2010-measured"),
     ],
-)  # fmt: skip
+)
 def test_names(complete, typed, wanted):
     completed = dict(complete(typed))
     assert wanted in completed
@@ -41,8 +43,9 @@ def test_parameters_are_those_of_the_bench():
         "wedge.mu_B="
     ]
     assert [name for name, _ in changeable(["hard-braking"], "options.p_")] == [
-        "options.p_from=", "options.p_to=",
-    ]  # fmt: skip
+        "options.p_from=",
+        "options.p_to=",
+    ]
     assert [name for name, _ in varied(["hard-braking"], "motor.R")] == ["motor.R_m"]
     assert changeable(["hard-braking"], "motor.R_m=0") == []
     of_all = dict(changeable(["pressure"], ""))  # a loop: any set's

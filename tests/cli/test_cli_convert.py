@@ -59,8 +59,9 @@ def test_alignment_is_told(bywire, run, tmp_path):
 
 @pytest.mark.parametrize("out", ["a.tsv", "a.mat", "a.csv"])
 def test_there_and_back(bywire, run, tmp_path, out):
-    first = bywire("convert", run, tmp_path / out, "--map", tmp_path / "map.toml",
-                   "--signals", "x_mc")  # fmt: skip
+    first = bywire(
+        "convert", run, tmp_path / out, "--map", tmp_path / "map.toml", "--signals", "x_mc"
+    )
     assert first.status == 0
     assert "x_mc" in first.out
     found = read_measurement(tmp_path / out)

@@ -20,17 +20,25 @@ def few():
 
 def test_design_over_a_range_names_what_binds(bywire):
     outcome = bywire(
-        "design", "moment", "--require", "crossover >= 5 Hz", "--require", "phase margin >= 60 deg",
-        "--over", "wedge.mu_B=0.25:0.45:2", *LINEAR,
-    )  # fmt: skip
+        "design",
+        "moment",
+        "--require",
+        "crossover >= 5 Hz",
+        "--require",
+        "phase margin >= 60 deg",
+        "--over",
+        "wedge.mu_B=0.25:0.45:2",
+        *LINEAR,
+    )
     assert outcome.status == 0
     found = outcome.object
     assert found["status"] == "met"
     assert found["bench"] is None
     assert found["linear"]["worst"]["phase_margin"]["at"] == "wedge.mu_B = 0.45"
     assert {one["requirement"] for one in found["linear"]["binding"]} == {
-        "crossover >= 5 Hz", "phase_margin >= 60 deg",
-    }  # fmt: skip
+        "crossover >= 5 Hz",
+        "phase_margin >= 60 deg",
+    }
     gains = found["gains"]
     # The command margins says the same of these gains.
     settings = [text for name, value in gains.items() for text in ("--set", f"{name}={value} Hz")]
@@ -47,9 +55,15 @@ def test_requirements_from_a_file_and_a_bench_file_that_runs(bywire, tmp_path):
         '[requirements]\nbandwidth = ">= 80 Hz"\nphase_margin = [">= 60 deg", "<= 150 deg"]\n'
     )
     outcome = bywire(
-        "design", "current", "--requirements", file, "--set", "motor.R_m=0.4 ohm", "--out",
+        "design",
+        "current",
+        "--requirements",
+        file,
+        "--set",
+        "motor.R_m=0.4 ohm",
+        "--out",
         tmp_path / "out",
-    )  # fmt: skip
+    )
     assert outcome.status in (0, 1)
     assert "nonlinear bench" in outcome.out
     assert "bandwidth, sine of 1 A" in outcome.out
@@ -69,9 +83,14 @@ def test_requirements_from_a_file_and_a_bench_file_that_runs(bywire, tmp_path):
 
 def test_what_excludes_what(bywire):
     outcome = bywire(
-        "design", "moment", "--require", "bandwidth >= 20 Hz", "--require",
-        "phase margin >= 80 deg", *LINEAR,
-    )  # fmt: skip
+        "design",
+        "moment",
+        "--require",
+        "bandwidth >= 20 Hz",
+        "--require",
+        "phase margin >= 80 deg",
+        *LINEAR,
+    )
     assert outcome.status == 1
     found = outcome.object
     assert found["status"] == "infeasible"
@@ -82,9 +101,14 @@ def test_what_excludes_what(bywire):
 
 def test_what_is_set_stays(bywire):
     outcome = bywire(
-        "design", "current", "--set", "ecu.current.k_i=10 1/(A*s)", "--require",
-        "phase margin >= 60 deg", *LINEAR,
-    )  # fmt: skip
+        "design",
+        "current",
+        "--set",
+        "ecu.current.k_i=10 1/(A*s)",
+        "--require",
+        "phase margin >= 60 deg",
+        *LINEAR,
+    )
     assert outcome.status == 0
     assert set(outcome.object["gains"]) == {"ecu.current.k_p"}
 
@@ -92,10 +116,15 @@ def test_what_is_set_stays(bywire):
 def test_the_operating_point_may_be_a_range(bywire):
     kept = ("k_d=1.5e-7 A*s/Pa", "tau_d=2 ms", "b=1", "c=0", "k_i=5e-5 A/(Pa*s)")
     outcome = bywire(
-        "design", "pressure", "--require", "phase margin >= 60 deg", "--over",
-        "at=5 bar:35 bar:2", *LINEAR,
+        "design",
+        "pressure",
+        "--require",
+        "phase margin >= 60 deg",
+        "--over",
+        "at=5 bar:35 bar:2",
+        *LINEAR,
         *(part for one in kept for part in ("--set", f"ecu.pressure.{one}")),
-    )  # fmt: skip
+    )
     assert outcome.status == 0
     places = {one["at"] for one in outcome.object["linear"]["worst"].values()}
     assert {"pressure = 5 bar", "pressure = 35 bar"} & places
@@ -106,10 +135,17 @@ def test_the_operating_point_may_be_a_range(bywire):
 
 def test_the_bench_looks_at_the_worst_corner_too(bywire):
     arguments = (
-        "design", "current", "--require", "bandwidth >= 60 Hz", "--set",
-        "ecu.current.k_i=10.39 1/(A*s)", "--over", "motor.R_m=0.3 ohm, 0.4 ohm",
-        "--amplitudes", "1 A",
-    )  # fmt: skip
+        "design",
+        "current",
+        "--require",
+        "bandwidth >= 60 Hz",
+        "--set",
+        "ecu.current.k_i=10.39 1/(A*s)",
+        "--over",
+        "motor.R_m=0.3 ohm, 0.4 ohm",
+        "--amplitudes",
+        "1 A",
+    )
     outcome = bywire(*arguments)
     assert outcome.status in (0, 1)
     assert "bandwidth, sine of 1 A at motor.R_m = 0." in outcome.out
@@ -126,21 +162,34 @@ def test_a_gain_schedule_as_a_bench_file_that_runs(bywire, tmp_path):
     ]
     kept += ["ecu.pressure.tau_d=56 us", "ecu.pressure.b=1", "ecu.pressure.c=1"]
     outcome = bywire(
-        "design", "pressure", "--schedule", "--at", "6 bar, 20 bar, 37 bar",
-        "--require", "phase margin >= 60 deg", "--linear-only", "--json", "--out", tmp_path / "out",
+        "design",
+        "pressure",
+        "--schedule",
+        "--at",
+        "6 bar, 20 bar, 37 bar",
+        "--require",
+        "phase margin >= 60 deg",
+        "--linear-only",
+        "--json",
+        "--out",
+        tmp_path / "out",
         *(part for one in kept for part in ("--set", one)),
-    )  # fmt: skip
+    )
     assert outcome.status == 0
     found = outcome.object
-    assert found["operating_points"] == {"unit": "Pa", "low": [6e5], "medium": [2e6],
-                                         "high": [3.7e6]}  # fmt: skip
+    assert found["operating_points"] == {
+        "unit": "Pa",
+        "low": [6e5],
+        "medium": [2e6],
+        "high": [3.7e6],
+    }
     assert found["gains"].keys() == {"ecu.schedule.low.k_p"}
     # Less gain has more phase margin, until the floor of the steady-state error has less room.
     bound = {one["requirement"] for one in found["regions"]["low"]["binding"]}
     assert bound & {"phase_margin >= 60 deg", "steady_state_error <= 5 %"}
     assert found["across"]["worst"]["slack"] == min(
         one["slack"] for one in found["across"]["cases"]
-    )  # fmt: skip
+    )
     file = tmp_path / "out" / "pressure-design.toml"
     assert 'ecu.schedule.law = "regions"' in file.read_text()
     run = bywire("run", file, "--json")
@@ -175,8 +224,14 @@ def test_a_gain_schedule_as_a_bench_file_that_runs(bywire, tmp_path):
             ("region 'high'", "35 bar", "--at"),
         ),
         (
-            ("pressure", "--schedule", "--require", "bandwidth >= 5 Hz", "--over",
-             "at=5 bar:30 bar:3"),
+            (
+                "pressure",
+                "--schedule",
+                "--require",
+                "bandwidth >= 5 Hz",
+                "--over",
+                "at=5 bar:30 bar:3",
+            ),
             ("what the schedule follows", "--at"),
         ),
         (

@@ -5,9 +5,26 @@ from __future__ import annotations
 import pytest
 from command_line import no_half_files, refused
 
-SMALL = ("--set", "pressures=20 bar", "--set", "gains=3", "--set", "gain_min=0.9", "--set",
-         "gain_max=1.3", "--set", "frequencies=3", "--set", "f_min=45 Hz", "--set", "f_max=65 Hz",
-         "--set", "settle=2 s", "--set", "compare=none")  # fmt: skip
+SMALL = (
+    "--set",
+    "pressures=20 bar",
+    "--set",
+    "gains=3",
+    "--set",
+    "gain_min=0.9",
+    "--set",
+    "gain_max=1.3",
+    "--set",
+    "frequencies=3",
+    "--set",
+    "f_min=45 Hz",
+    "--set",
+    "f_max=65 Hz",
+    "--set",
+    "settle=2 s",
+    "--set",
+    "compare=none",
+)
 
 
 @pytest.mark.usefixtures("drawn")

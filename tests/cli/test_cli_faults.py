@@ -41,8 +41,14 @@ def test_a_campaign_is_written_and_shown(bywire, tmp_path):
     kinds = {each["fault"]: each["class"] for each in made["faults"]}
     assert kinds["pressure.stuck"] in ("covered", "too late", "undetected")
     names = {path.name for path in out.iterdir()}
-    assert names == {"campaign.json", "faults", "report.json", "report.html", "fault-times.png",
-                     "alarm-curves.png"}  # fmt: skip
+    assert names == {
+        "campaign.json",
+        "faults",
+        "report.json",
+        "report.html",
+        "fault-times.png",
+        "alarm-curves.png",
+    }
     page = (out / "report.html").read_text(encoding="utf-8")
     assert all(text in page for text in ("diagnostic coverage", "still-pressure", "unweighted"))
     no_half_files(out)

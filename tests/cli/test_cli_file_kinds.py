@@ -14,8 +14,11 @@ FILES = {
     "campaign": 'bench = "hard-braking"\n[vary]\n"motor.R_m" = "+-5 %"\n[[criteria]]\n',
 }
 COMMANDS = {
-    "bench": ("run",), "study": ("study", "run"), "life": ("life",), "campaign": ("faults",),
-}  # fmt: skip
+    "bench": ("run",),
+    "study": ("study", "run"),
+    "life": ("life",),
+    "campaign": ("faults",),
+}
 WORDS = {kind: f"a {kind}" for kind in FILES} | {"campaign": "a campaign of faults"}
 
 

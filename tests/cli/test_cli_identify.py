@@ -24,10 +24,15 @@ def test_a_simulated_measurement_can_be_fed_back(bywire: Bywire, tmp_path: Path)
     first = bywire("identify", "seal-friction", "--synthetic", "2", "--out", out, "--json")
     assert first.status == 0
     assert {Path(f).name for f in first.object["files"]} == {
-        "measurement.nc", "report.html", "estimate.json", "friction.png", "strokes.png",
+        "measurement.nc",
+        "report.html",
+        "estimate.json",
+        "friction.png",
+        "strokes.png",
         "loops.png",
-        "residuals.png", "correlation.png",
-    }  # fmt: skip
+        "residuals.png",
+        "correlation.png",
+    }
     assert all(Path(f).stat().st_size > 500 for f in first.object["files"])
     no_half_files(out)
     again = bywire("identify", "seal-friction", out / "measurement.nc", "--json")
@@ -59,8 +64,11 @@ def test_a_bench_file_says_what_failed_and_what_it_cannot_do(
     first = (tmp_path / "wrong" / "parameters.toml").read_text().splitlines()[0]
     assert first.startswith("# CHECK FAILED, do not use it as it is: residual_over_noise = ")
     assert wrong.object["options"] == {}  # all of them only simulate
-    refused(bywire("identify", "motor-winding", data, "--option", "rotor=turning"),
-            "rotor", "only shapes simulated")  # fmt: skip
+    refused(
+        bywire("identify", "motor-winding", data, "--option", "rotor=turning"),
+        "rotor",
+        "only shapes simulated",
+    )
 
 
 @pytest.mark.parametrize(
@@ -90,8 +98,11 @@ def test_an_older_result_does_not_stay_beside_a_new_one(bywire: Bywire, tmp_path
     assert bywire(*seal, "--synthetic", "1", "--out", tmp_path).status == 0
     data, other = tmp_path / "measurement.nc", tmp_path / "notes.txt"
     other.write_text("the user's own")
-    refused(bywire("identify", "friction-model", "--synthetic", "1", "--out", tmp_path),
-            "holds a result of seal-friction", "--out")  # fmt: skip
+    refused(
+        bywire("identify", "friction-model", "--synthetic", "1", "--out", tmp_path),
+        "holds a result of seal-friction",
+        "--out",
+    )
     assert (tmp_path / "strokes.png").exists()
     bad = tmp_path / "still.csv"
     bad.write_text("t [s],F [N],x [m],p [Pa]\n" + "".join(f"{k},1,0,2\n" for k in range(50)))
@@ -109,15 +120,20 @@ def test_a_study_keeps_out_of_other_folders(bywire: Bywire, tmp_path: Path) -> N
     file = tmp_path / "study.json"
     file.write_text('{"method": "seal-friction"}')
     for wanted in (("--study", "2"), ("--synthetic", "1")):
-        refused(bywire("identify", "friction-model", *wanted, *law),
-                "holds a study of seal-friction", "study.json")  # fmt: skip
+        refused(
+            bywire("identify", "friction-model", *wanted, *law),
+            "holds a study of seal-friction",
+            "study.json",
+        )
     file.unlink()
     found = bywire("identify", "friction-model", "--synthetic", "1", *law, "--json")
     assert found.status == 0
     assert found.object["put_in"]["F_c"] == 20.0
     assert found.object["start"] == {}  # it needs none
-    refused(bywire("identify", "seal-friction", "--study", "2", "--out", tmp_path),
-            "holds a result of friction-model")  # fmt: skip
+    refused(
+        bywire("identify", "seal-friction", "--study", "2", "--out", tmp_path),
+        "holds a result of friction-model",
+    )
     page = (tmp_path / "report.html").read_text()
     assert "put in" in page
     assert ">start<" not in page
@@ -136,8 +152,16 @@ def test_what_was_put_in_stands_beside_the_start(bywire: Bywire) -> None:
 
 
 def test_a_failed_check_is_status_1(bywire: Bywire) -> None:
-    outcome = bywire("identify", "friction-model", "--synthetic", "1", "--option", "law=viscous",
-                     "--option", "duration=4 s")  # fmt: skip
+    outcome = bywire(
+        "identify",
+        "friction-model",
+        "--synthetic",
+        "1",
+        "--option",
+        "law=viscous",
+        "--option",
+        "duration=4 s",
+    )
     assert outcome.status == 1
     assert "check failed: misfit_over_friction" in outcome.err
     assert "failed" in outcome.out
@@ -159,20 +183,34 @@ def test_a_study_is_stored_with_its_seeds(bywire: Bywire, tmp_path: Path) -> Non
 def test_refusals(bywire: Bywire, tmp_path: Path) -> None:
     refused(bywire("identify", "seal-frictio"), "seal-friction")
     refused(bywire("identify", "seal-friction"), "needs one of", "F [N], x [m], p [Pa]")
-    refused(bywire("identify", "seal-friction", "--synthetic", "1", "--study", "5"),
-            "give only one of")  # fmt: skip
+    refused(
+        bywire("identify", "seal-friction", "--synthetic", "1", "--study", "5"), "give only one of"
+    )
     for flag in ("--map", "--holdout"):
-        refused(bywire("identify", "seal-friction", "--study", "5", flag, "x.csv"),
-                f"{flag} is for measurement files")  # fmt: skip
+        refused(
+            bywire("identify", "seal-friction", "--study", "5", flag, "x.csv"),
+            f"{flag} is for measurement files",
+        )
     refused(bywire("identify", "seal-friction", "--synthetic", "1", "--set", "a.b=1"), "--set")
     refused(
-        bywire("identify", "seal-friction", "--synthetic", "1", "--option", "x_lo=1 mm"), "x_low",
+        bywire("identify", "seal-friction", "--synthetic", "1", "--option", "x_lo=1 mm"),
+        "x_low",
         "'bywire list seal-friction'",
     )
-    for text, said in (("3", "'20 bar'"), ("1 bar, 3", "pressures.1 = '3'"), ("x", "commas"),
-                       ("1 bar", "at least 2 wanted, got '1 bar'"), ("-1 bar, 1 bar", ">= 0 Pa")):
-        refused(bywire("identify", "seal-friction", "--synthetic", "1", "--option",
-                       f"pressures={text}"), "pressures", said)  # fmt: skip
+    for text, said in (
+        ("3", "'20 bar'"),
+        ("1 bar, 3", "pressures.1 = '3'"),
+        ("x", "commas"),
+        ("1 bar", "at least 2 wanted, got '1 bar'"),
+        ("-1 bar, 1 bar", ">= 0 Pa"),
+    ):
+        refused(
+            bywire(
+                "identify", "seal-friction", "--synthetic", "1", "--option", f"pressures={text}"
+            ),
+            "pressures",
+            said,
+        )
     refused(
         bywire("identify", "friction-ramp", "--synthetic", "1", "--parameters", "roberts2003"),
         "wedge-brake",
@@ -212,8 +250,16 @@ def test_values_lie_beside_their_checks_when_the_report_is_interrupted(
         raise KeyboardInterrupt
 
     out = tmp_path / "out"
-    arguments = ("identify", "motor-winding", "--synthetic", "1", "--option", "duration=0.1 s",
-                 "--out", out)  # fmt: skip
+    arguments = (
+        "identify",
+        "motor-winding",
+        "--synthetic",
+        "1",
+        "--option",
+        "duration=0.1 s",
+        "--out",
+        out,
+    )
     with monkeypatch.context() as stop:
         stop.setattr("bywire.report.files.save_figure", stopped)
         outcome = bywire(*arguments)

@@ -210,9 +210,12 @@ def test_interrupt_within_text_that_is_executed_ends_with_130_too(tmp_path):
         "main()"
     )
     done = subprocess.run(
-        [sys.executable, "-m", "interrupted"], cwd=tmp_path, capture_output=True, text=True,
+        [sys.executable, "-m", "interrupted"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
         check=False,
-    )  # fmt: skip
+    )
     assert (done.returncode, done.stderr) == (130, "bywire: interrupted\n")
 
 

@@ -28,8 +28,11 @@ def test_a_life_is_written_and_told(bywire, tmp_path):
     assert made["states"]["h_pad"]["end"] == pytest.approx(0.5e-3, rel=0.001)
     assert abs(made["states"]["h_pad"]["deviation"]) < 1e-6
     assert {path.name for path in out.iterdir()} == {
-        "life.nc", "life.png", "life.json", "report.html"
-    }  # fmt: skip
+        "life.nc",
+        "life.png",
+        "life.json",
+        "report.html",
+    }
     page = (out / "report.html").read_text(encoding="utf-8")
     assert all(text in page for text in ("fluid in the reservoir", "lining left", "kappa_0"))
     no_half_files(out)

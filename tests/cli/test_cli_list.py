@@ -96,8 +96,11 @@ def test_an_assembly_says_its_signals_and_what_there_is_for_it(bywire: Bywire, n
     one = only(bywire("list", name, "--json"), "assembly")
     model = ASSEMBLIES.all()[name]
     where = {(row["signal"], place) for row in one["signals"] for place in row["where"].split(", ")}
-    for place, fields in (("stimulus", model.Stimulus), ("recording", model.Output),
-                          ("state", model.State)):  # fmt: skip
+    for place, fields in (
+        ("stimulus", model.Stimulus),
+        ("recording", model.Output),
+        ("state", model.State),
+    ):
         assert {n for n, known in where if known == place} == set(fields._fields)
     known = [e.name for e in EXPERIMENTS.all().values() if e.assembly == name]
     assert one["experiments"] == ", ".join(known)
@@ -115,8 +118,10 @@ def test_every_experiment_says_what_it_drives(bywire: Bywire) -> None:
 def test_every_loop_and_plant_says_input_output_and_states(bywire: Bywire) -> None:
     for loop in LOOPS.all().values():
         rows = described_loop(loop)["signals"]
-        told = {part: [r["signal"] for r in rows if r["as"] == part]
-                for part in ("input", "output", "cut open at", "state")}  # fmt: skip
+        told = {
+            part: [r["signal"] for r in rows if r["as"] == part]
+            for part in ("input", "output", "cut open at", "state")
+        }
         assert told["input"] == list(loop.inputs)
         assert told["output"] == [loop.output]
         assert all(r["meaning"] for r in rows), loop.name
@@ -174,11 +179,14 @@ def test_the_overview_gives_tables() -> None:
 @pytest.mark.parametrize(
     ("word", "kind", "name"),
     [
-        ("battery", "parameter group", "supply"), ("friction", "parameter group", "seal"),
-        ("Winding resistance", "parameter", "motor.R_m"), ("caliper pressure", "signal", "p_pd"),
-        ("bar", "signal", "p_mc"), ("phase", "method", "cogging"),
+        ("battery", "parameter group", "supply"),
+        ("friction", "parameter group", "seal"),
+        ("Winding resistance", "parameter", "motor.R_m"),
+        ("caliper pressure", "signal", "p_pd"),
+        ("bar", "signal", "p_mc"),
+        ("phase", "method", "cogging"),
     ],
-)  # fmt: skip
+)
 def test_a_word_finds_what_is_declared_to_mean_it(
     bywire: Bywire, word: str, kind: str, name: str
 ) -> None:

@@ -88,9 +88,16 @@ def test_agreement_by_cause_with_its_report(bywire, tmp_path, monkeypatch):
 @pytest.mark.usefixtures("drawn")
 def test_frequency_response_beside_the_linear_one(bywire, tmp_path):
     outcome = bywire(
-        "frequency-response", "screw-position", "--frequencies", "5 Hz, 10 Hz", "--amplitudes",
-        "0.5 rad", "--out", tmp_path / "out", "--json",
-    )  # fmt: skip
+        "frequency-response",
+        "screw-position",
+        "--frequencies",
+        "5 Hz, 10 Hz",
+        "--amplitudes",
+        "0.5 rad",
+        "--out",
+        tmp_path / "out",
+        "--json",
+    )
     assert outcome.status == 0
     found = outcome.object
     assert found["frequency"] == pytest.approx([5.0, 10.0], rel=0.01)
@@ -106,9 +113,16 @@ def test_frequency_response_beside_the_linear_one(bywire, tmp_path):
 @pytest.mark.parametrize("excitation", ["multisine", "chirp"])
 def test_all_frequencies_at_once(bywire, excitation):
     found = bywire(
-        "frequency-response", "screw-position", "--frequencies", "5 Hz, 10 Hz", "--amplitudes",
-        "0.5 rad", "--excitation", excitation, "--json",
-    ).object  # fmt: skip
+        "frequency-response",
+        "screw-position",
+        "--frequencies",
+        "5 Hz, 10 Hz",
+        "--amplitudes",
+        "0.5 rad",
+        "--excitation",
+        excitation,
+        "--json",
+    ).object
     assert found["excitation"] == excitation
     assert found["frequency"] == pytest.approx([5.0, 10.0], rel=0.05)
     for measured, linear in zip(found["gain"][0], found["linear"]["gain"], strict=True):
@@ -119,9 +133,15 @@ def test_all_frequencies_at_once(bywire, excitation):
 @pytest.mark.usefixtures("drawn")
 def test_bandwidths_over_a_range_name_the_worst_case(bywire, tmp_path):
     asked = (
-        "frequency-response", "screw-position", "--frequencies", "20 Hz:70 Hz:4", "--amplitudes",
-        "0.25 rad, 1 rad", "--over", "control.position.f_n=15 Hz:60 Hz:2",
-    )  # fmt: skip
+        "frequency-response",
+        "screw-position",
+        "--frequencies",
+        "20 Hz:70 Hz:4",
+        "--amplitudes",
+        "0.25 rad, 1 rad",
+        "--over",
+        "control.position.f_n=15 Hz:60 Hz:2",
+    )
     outcome = bywire(*asked, "--out", tmp_path, "--json")
     found = outcome.object
     assert [case["control.position.f_n"] for case in found["cases"]] == [15.0, 60.0]
@@ -156,9 +176,14 @@ def test_a_sine_beyond_the_end_stop_is_told(bywire):
 
 def test_what_sticks_is_said_and_has_no_gain(bywire):
     outcome = bywire(
-        "frequency-response", "screw-position", "--frequencies", "5 Hz", "--amplitudes",
-        "0.001 rad", "--json",
-    )  # fmt: skip
+        "frequency-response",
+        "screw-position",
+        "--frequencies",
+        "5 Hz",
+        "--amplitudes",
+        "0.001 rad",
+        "--json",
+    )
     assert outcome.object["gain"] == [[None]]
     assert any("sticks" in line for line in outcome.lines)
 

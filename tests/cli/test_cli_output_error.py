@@ -41,17 +41,29 @@ def bench(tmp_path: Path) -> Path:
 
 def run_file(path: Path, p_start: float, f: str, seed: int) -> Path:
     """Write what the bench's sensors would show, with other parameters than it has."""
-    made = bywire.run(bywire.Bench(
-        "motor-open-loop", "dardanelli2010", overrides={"motor.R_m": 0.42, "motor.K_e": 0.028},
-        options={"source": "voltage", "add_holding": True, "duration": 0.25, "p_start": p_start},
-        stimulus={"kind": "sine", "mean": 0, "amplitude": 2, "f": f, "phase": 0, "t_start": 0},
-    )).recording  # fmt: skip
+    made = bywire.run(
+        bywire.Bench(
+            "motor-open-loop",
+            "dardanelli2010",
+            overrides={"motor.R_m": 0.42, "motor.K_e": 0.028},
+            options={
+                "source": "voltage",
+                "add_holding": True,
+                "duration": 0.25,
+                "p_start": p_start,
+            },
+            stimulus={"kind": "sine", "mean": 0, "amplitude": 2, "f": f, "phase": 0, "t_start": 0},
+        )
+    ).recording
     random = np.random.default_rng(seed)
-    table = np.column_stack((
-        made["time"], made["voltage"],
-        made["p_mc"] / 1e5 + random.normal(0.0, 0.02, made.sizes["time"]),
-        made["i"] + random.normal(0.0, 0.01, made.sizes["time"]),
-    ))  # fmt: skip
+    table = np.column_stack(
+        (
+            made["time"],
+            made["voltage"],
+            made["p_mc"] / 1e5 + random.normal(0.0, 0.02, made.sizes["time"]),
+            made["i"] + random.normal(0.0, 0.01, made.sizes["time"]),
+        )
+    )
     np.savetxt(path, table, delimiter=",", header="t [s],u [V],pressure [bar],i [A]", comments="")
     return path
 
@@ -63,11 +75,31 @@ def test_files_become_a_bench_file(bywire: Bywire, bench: Path, tmp_path: Path) 
     columns = {"p_mc": "pressure", "i": "i", "u": "u"}
     mapping.write_text("".join(f'[signals.{k}]\ncolumn = "{v}"\n' for k, v in columns.items()))
     found = bywire(
-        "identify", "output-error", *files[:2], "--holdout", files[2], "--map", mapping,
-        "--bench", bench, "--input", "v_set=u", *OUTPUTS[:2], *UNKNOWNS, "--prior",
-        "motor.K_e=0.03 +- 0.01 N*m/A", "--loss", "huber", "--option", "between=linear",
-        "--starts", "2", "--out", out, "--json",
-    )  # fmt: skip
+        "identify",
+        "output-error",
+        *files[:2],
+        "--holdout",
+        files[2],
+        "--map",
+        mapping,
+        "--bench",
+        bench,
+        "--input",
+        "v_set=u",
+        *OUTPUTS[:2],
+        *UNKNOWNS,
+        "--prior",
+        "motor.K_e=0.03 +- 0.01 N*m/A",
+        "--loss",
+        "huber",
+        "--option",
+        "between=linear",
+        "--starts",
+        "2",
+        "--out",
+        out,
+        "--json",
+    )
     assert found.status == 0, found.err
     rows = found.object["estimates"]["output error"]["parameters"]
     for name, value in (("motor.R_m", 0.42), ("motor.K_e", 0.028), ("run1:start.p_start", 12e5)):
@@ -77,31 +109,61 @@ def test_files_become_a_bench_file(bywire: Bywire, bench: Path, tmp_path: Path) 
     assert found.object["options"]["loss"] == "huber"
     assert found.object["start"]["motor.R_m"] == pytest.approx(0.7)  # the bench's lies outside
     assert found.object["start"]["run1:start.p_start"] == pytest.approx(12e5, rel=0.05)
-    assert json.loads((out / "estimate.json").read_text())["parameters"] == (
-        found.object["parameters"]
+    assert (
+        json.loads((out / "estimate.json").read_text())["parameters"]
+        == (found.object["parameters"])
     )
     assert {Path(f).name for f in found.object["files"]} == {
-        "parameters.toml", "report.html", "estimate.json", "residuals.png", "correlation.png",
-        "fit-p_mc-run0.png", "fit-p_mc-run1.png", "validation-p_mc-held_out.png",
-    }  # fmt: skip
+        "parameters.toml",
+        "report.html",
+        "estimate.json",
+        "residuals.png",
+        "correlation.png",
+        "fit-p_mc-run0.png",
+        "fit-p_mc-run1.png",
+        "validation-p_mc-held_out.png",
+    }
     no_half_files(out)
     written = load(out / "parameters.toml")
     assert written.par.leaves()["motor.R_m"] == pytest.approx(rows["motor.R_m"]["value"], rel=1e-9)
     assert written.options == {"source": "voltage", "duration": "0.25 s"}
     assert written.requirements == {"p_max": "<= 100 bar"}
     replayed = bywire(
-        "replay", files[2], "--map", mapping, "--bench", out / "parameters.toml", "--input",
-        "v_set=u", "--output", "p_mc", "--tolerance", "p_mc.nrmse <= 3 %",
-    )  # fmt: skip
+        "replay",
+        files[2],
+        "--map",
+        mapping,
+        "--bench",
+        out / "parameters.toml",
+        "--input",
+        "v_set=u",
+        "--output",
+        "p_mc",
+        "--tolerance",
+        "p_mc.nrmse <= 3 %",
+    )
     assert replayed.status == 0, replayed.err
 
 
 def test_a_closed_loop_simulated_and_fed_back(bywire: Bywire, tmp_path: Path) -> None:
     common = (
-        "--bench", "hard-braking", "--set", "options.duration=0.3 s", "--set",
-        "options.settle=0.2 s", "--output", "p_mc", "--output", "i", "--unknown", "motor.R_m",
-        "--unknown", "motor.K_e", "--starts", "2",
-    )  # fmt: skip
+        "--bench",
+        "hard-braking",
+        "--set",
+        "options.duration=0.3 s",
+        "--set",
+        "options.settle=0.2 s",
+        "--output",
+        "p_mc",
+        "--output",
+        "i",
+        "--unknown",
+        "motor.R_m",
+        "--unknown",
+        "motor.K_e",
+        "--starts",
+        "2",
+    )
     out = tmp_path / "out"
     given = ("identify", "output-error", "--synthetic", "1", *common)
     first = bywire(*given, "--out", out, "--json")
@@ -133,14 +195,25 @@ def test_refusals(bywire: Bywire, bench: Path, tmp_path: Path) -> None:
     refused(bywire(*current, "--loss", "hubert"), "'huber'")
     refused(bywire(*current, "--unknown", "motor.K_e"), "motor.K_e is given twice")
     refused(bywire(*current, "--set", "motor.Rm=1 ohm"), "motor.R_m")
-    refused(bywire(*method, "--synthetic", "1", "--holdout", data, "--bench", bench, *OUTPUTS,
-                   *UNKNOWNS), "--holdout is for measurement files")  # fmt: skip
-    refused(bywire("identify", "friction-ramp", "--synthetic", "1", "--unknown", "motor.R_m"),
-            "--unknown is for methods of any bench (output-error)")  # fmt: skip
-    refused(bywire("identify", "friction-ramp", "--synthetic", "1", "--loss", "huber"),
-            "--loss is for methods of any bench (output-error)")  # fmt: skip
-    refused(bywire(*given, "--holdout", tmp_path / ".." / tmp_path.name / "run.csv"), "run.csv is",
-            "which is fitted")  # fmt: skip
+    refused(
+        bywire(
+            *method, "--synthetic", "1", "--holdout", data, "--bench", bench, *OUTPUTS, *UNKNOWNS
+        ),
+        "--holdout is for measurement files",
+    )
+    refused(
+        bywire("identify", "friction-ramp", "--synthetic", "1", "--unknown", "motor.R_m"),
+        "--unknown is for methods of any bench (output-error)",
+    )
+    refused(
+        bywire("identify", "friction-ramp", "--synthetic", "1", "--loss", "huber"),
+        "--loss is for methods of any bench (output-error)",
+    )
+    refused(
+        bywire(*given, "--holdout", tmp_path / ".." / tmp_path.name / "run.csv"),
+        "run.csv is",
+        "which is fitted",
+    )
     copy = tmp_path / "copy.csv"
     copy.write_bytes(data.read_bytes())
     refused(bywire(*given, "--holdout", copy), "has the same content as", "which is fitted")

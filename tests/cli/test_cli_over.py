@@ -25,8 +25,9 @@ def test_what_is_no_range(bywire):
 
 
 def test_a_requirement_that_every_value_meets_is_no_remark(bywire):
-    met = bywire("run", "hard-braking", *QUICK, *OVER,
-                 "--set", "requirements.peak_current=<= 1000 A")  # fmt: skip
+    met = bywire(
+        "run", "hard-braking", *QUICK, *OVER, "--set", "requirements.peak_current=<= 1000 A"
+    )
     assert met.status == 0
     assert "peak_current <= 1000 A: met at all 3 values of motor.R_m" in met.out
     assert "requirement" not in met.err

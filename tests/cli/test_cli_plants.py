@@ -10,7 +10,7 @@ from command_line import refused
 def test_a_plant_as_json_with_its_error_and_a_reduced_model(bywire):
     found = bywire(
         "linearize", "wedge-mechanical", "--at", "300 Nm", "--reduce", "4", "--json"
-    ).object  # fmt: skip
+    ).object
     assert found["operating_point"] == {"moment": 300.0, "unit": "N*m"}
     assert np.array(found["A"]).shape == (6, 6)
     assert found["error"]["band_Hz"][1] == pytest.approx(150.0)
@@ -23,9 +23,15 @@ def test_a_plant_as_json_with_its_error_and_a_reduced_model(bywire):
 @pytest.mark.usefixtures("drawn")
 def test_texts_and_figures(bywire, tmp_path):
     outcome = bywire(
-        "linearize", "motorcycle-plant", "--at", "2 A", "--reduce", "50 Hz", "--out",
+        "linearize",
+        "motorcycle-plant",
+        "--at",
+        "2 A",
+        "--reduce",
+        "50 Hz",
+        "--out",
         tmp_path / "out",
-    )  # fmt: skip
+    )
     assert outcome.status == 0
     assert "motorcycle-plant" in outcome.out
     assert "reduced to" in outcome.out
@@ -43,7 +49,7 @@ def test_friction_of_a_plant(bywire):
     assert "what friction holds, rests" in stuck.out
     slides = bywire(
         "linearize", "motorcycle-plant", "--friction", "sliding", "--speed", "5 rad/s", "--json"
-    ).object  # fmt: skip
+    ).object
     assert (slides["friction"], slides["speed"]) == ("sliding", 5.0)
 
 

@@ -19,9 +19,11 @@ Bywire = Callable[..., Outcome]
 def stop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the file of a braking whose brake has less friction than the parameter set's."""
     bench = package.Bench(
-        "moment-pulses", "roberts2003", overrides={"wedge.mu_B": 0.32},
+        "moment-pulses",
+        "roberts2003",
+        overrides={"wedge.mu_B": 0.32},
         options={"t_hold": 0.3, "pulses": 3},
-    )  # fmt: skip
+    )
     run = package.run(bench).recording[["M_set", "y_M", "F_N", "x", "Omega"]]
     noise = np.random.default_rng(1).standard_normal(run.sizes["time"])
     run["y_M"] = ("time", run["y_M"].values + 2.0 * noise, run["y_M"].attrs)
@@ -33,10 +35,28 @@ def test_right_parameters_pass_and_the_report_is_complete(
     bywire: Bywire, stop: Path, tmp_path: Path
 ) -> None:
     outcome = bywire(
-        "replay", stop, "--bench", "moment-pulses", "--set", "wedge.mu_B=0.32", "--output", "y_M",
-        "--output", "x", "--tolerance", "nrmse <= 2 %", "--tolerance", "x.max_error <= 0.01 mm",
-        "--segments", "auto", "--track", "mu_B", "--out", tmp_path, "--json",
-    )  # fmt: skip
+        "replay",
+        stop,
+        "--bench",
+        "moment-pulses",
+        "--set",
+        "wedge.mu_B=0.32",
+        "--output",
+        "y_M",
+        "--output",
+        "x",
+        "--tolerance",
+        "nrmse <= 2 %",
+        "--tolerance",
+        "x.max_error <= 0.01 mm",
+        "--segments",
+        "auto",
+        "--track",
+        "mu_B",
+        "--out",
+        tmp_path,
+        "--json",
+    )
     assert outcome.status == 0, outcome.err
     found = outcome.object
     assert found["holds"]
@@ -45,8 +65,13 @@ def test_right_parameters_pass_and_the_report_is_complete(
     }
     assert {s["name"] for s in found["segments"]} >= {"hold-1", "move-1"}
     assert {Path(f).name for f in found["files"]} == {
-        "y_M.png", "x.png", "track-wedge.mu_B.png", "report.html", "replay.nc", "replay.json",
-    }  # fmt: skip
+        "y_M.png",
+        "x.png",
+        "track-wedge.mu_B.png",
+        "report.html",
+        "replay.nc",
+        "replay.json",
+    }
     assert all(Path(f).stat().st_size > 500 for f in found["files"])
     no_half_files(tmp_path)
     tracked = found["tracked"]["wedge.mu_B"]
@@ -56,8 +81,15 @@ def test_right_parameters_pass_and_the_report_is_complete(
 
 def test_wrong_parameters_miss_the_tolerance(bywire: Bywire, stop: Path) -> None:
     outcome = bywire(
-        "replay", stop, "--bench", "moment-pulses", "--output", "x", "--tolerance", "nrmse <= 2 %",
-    )  # fmt: skip
+        "replay",
+        stop,
+        "--bench",
+        "moment-pulses",
+        "--output",
+        "x",
+        "--tolerance",
+        "nrmse <= 2 %",
+    )
     assert outcome.status == 1
     assert "missed: nrmse <= 2 %" in " ".join(outcome.out.split())
 

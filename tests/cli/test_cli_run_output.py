@@ -167,9 +167,13 @@ def test_what_a_run_did_instead_stands_above_its_key_figures(bywire, bench):
     weak = ("seal.T_pr=0.15 N*m", "ecu.dither.waveform=off", "ecu.pressure.k_i=0")
     changes = [part for text in ("options.duration=0.2 s", *weak) for part in ("--set", text)]
     above = " ".join(bywire("run", bench(), *changes).out.partition("name  ")[0].split())
-    for text in ("changed from dardanelli2010: ", "seal.T_pr = 0.15 N·m (was 0.002 N·m)",
-                 "ecu.dither.waveform = off (was ", "misses its set point: p_mc ends ",
-                 "40.3 % of the step"):  # fmt: skip
+    for text in (
+        "changed from dardanelli2010: ",
+        "seal.T_pr = 0.15 N·m (was 0.002 N·m)",
+        "ecu.dither.waveform = off (was ",
+        "misses its set point: p_mc ends ",
+        "40.3 % of the step",
+    ):
         assert text in above
     shown = bywire("run", bench(), *changes, "--json").object
     assert shown["status"] == "done"  # nothing was required

@@ -90,10 +90,23 @@ def test_list_is_complete(bywire):
     assert (status, err) == (0, "")
     found = json.loads(out)
     titles = {
-        "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "loops",
-        "plants", "elements",
-        "studies", "lives", "methods", "stimuli", "faults", "campaigns", "residuals", "kpis",
-    }  # fmt: skip
+        "brakes",
+        "assemblies",
+        "parameter_sets",
+        "experiments",
+        "generic_experiments",
+        "loops",
+        "plants",
+        "elements",
+        "studies",
+        "lives",
+        "methods",
+        "stimuli",
+        "faults",
+        "campaigns",
+        "residuals",
+        "kpis",
+    }
     assert set(found) == titles | {"kpis_of_experiments"}
     for topic, content in found.items():
         assert content

@@ -12,9 +12,16 @@ SMALL = ("--set", "slopes=3", "--set", "leads=3", "--set", "mu_B=0.25, 0.45")
 def test_the_actuator_is_sized_with_figures_and_numbers(bywire, tmp_path):
     out = tmp_path / "out"
     outcome = bywire(
-        "study", "actuator-sizing", "--set", "ratios=5", "--set", "frequencies=4", "--out", out,
+        "study",
+        "actuator-sizing",
+        "--set",
+        "ratios=5",
+        "--set",
+        "frequencies=4",
+        "--out",
+        out,
         "--json",
-    )  # fmt: skip
+    )
     assert outcome.status == 0
     found = outcome.object
     assert found["kpis"]["optimum_k_g"]["unit"] == "m/rad"

@@ -29,8 +29,15 @@ def test_from_the_file_to_the_report_and_on(bywire, study, tmp_path, monkeypatch
     assert "64 of 64" in outcome.out
     out = tmp_path / "tolerances"
     names = {path.name for path in out.iterdir()}
-    assert {"report.html", "report.json", "study.json", "histograms.png", "convergence.png",
-            "worst-peak_current.toml", "worst-peak_current.nc"} <= names  # fmt: skip
+    assert {
+        "report.html",
+        "report.json",
+        "study.json",
+        "histograms.png",
+        "convergence.png",
+        "worst-peak_current.toml",
+        "worst-peak_current.nc",
+    } <= names
     extended = bywire("study", "extend", out, "--cases", "128", "--json").object
     assert (extended["cases"], extended["status"]) == (128, "passed")
     assert bywire("study", "resume", out).status == 0

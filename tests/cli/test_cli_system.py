@@ -18,8 +18,14 @@ from systems.loading import SPRING_AXIS, forgotten, loaded
 Bywire = Callable[..., Outcome]
 ROOT = Path(__file__).parents[2]
 SYSTEM = ("--system", SPRING_AXIS)
-STEP = ("--set", "parameters=spring-axis-one", "--set", "options.input=F_set",
-        "--set", "options.output=x")  # fmt: skip
+STEP = (
+    "--set",
+    "parameters=spring-axis-one",
+    "--set",
+    "options.input=F_set",
+    "--set",
+    "options.output=x",
+)
 
 OWN_EXPERIMENT = """
 from bywire.bench.experiment import Case, Experiment
@@ -66,8 +72,16 @@ def test_list_knows_it(bywire: Bywire) -> None:
 
 @pytest.mark.parametrize("front", [True, False], ids=["before", "behind"])
 def test_run_with_requirements_and_a_report(bywire: Bywire, tmp_path: Path, front: bool) -> None:
-    command = ("run", "step", *STEP, "--set", "requirements.overshoot=<= 1 %", "--json",
-               "--out", tmp_path / "out")  # fmt: skip
+    command = (
+        "run",
+        "step",
+        *STEP,
+        "--set",
+        "requirements.overshoot=<= 1 %",
+        "--json",
+        "--out",
+        tmp_path / "out",
+    )
     done = bywire(*SYSTEM, *command) if front else bywire(*command, *SYSTEM)
     assert done.status == 1  # it overshoots, as it must
     assert done.object["kpis"]["overshoot"]["value"] > 1.0
@@ -79,8 +93,10 @@ def test_run_with_requirements_and_a_report(bywire: Bywire, tmp_path: Path, fron
 
 def test_a_bench_file_names_it_and_never_loads_it(bywire: Bywire, tmp_path: Path) -> None:
     path = tmp_path / "axis.toml"
-    path.write_text('experiment = "step"\nparameters = "spring-axis-one"\n'
-                    '[options]\ninput = "F_set"\nend = "150 N"\n')  # fmt: skip
+    path.write_text(
+        'experiment = "step"\nparameters = "spring-axis-one"\n'
+        '[options]\ninput = "F_set"\nend = "150 N"\n'
+    )
     refused(bywire("run", path), "unknown parameter set 'spring-axis-one'")
     assert bywire("run", path, *SYSTEM).status == 0
     path.write_text(f'system = "{SPRING_AXIS}"\n{path.read_text()}')
@@ -100,10 +116,19 @@ def test_output_error_finds_its_parameters(bywire: Bywire, tmp_path: Path) -> No
     assert bywire("run", bench, "--out", out, *other, *SYSTEM).status == 0
     on_bench = ("--bench", bench, "--input", "F_set=F_set")
     done = bywire(
-        "identify", "output-error", out / "run.nc", *on_bench, "--output", "x=1 um",
-        "--unknown", "k=8000 N/m..12000 N/m", "--unknown", "d=30 N*s/m..90 N*s/m", "--json",
+        "identify",
+        "output-error",
+        out / "run.nc",
+        *on_bench,
+        "--output",
+        "x=1 um",
+        "--unknown",
+        "k=8000 N/m..12000 N/m",
+        "--unknown",
+        "d=30 N*s/m..90 N*s/m",
+        "--json",
         *SYSTEM,
-    )  # fmt: skip
+    )
     assert done.status == 0, done.err
     assert done.object["parameters"] == pytest.approx({"k": 9000.0, "d": 50.0}, rel=1e-6)
     beside = bywire("replay", out / "run.nc", *on_bench, *other, "--json", *SYSTEM)
@@ -176,12 +201,19 @@ def test_what_it_prints_is_no_result(bywire: Bywire, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("stem", "stimulus", "signal", "parts"),
     [
-        ("wrong_stimulus", "F_sett", "x",
-         ["wrong_stimulus.py, line 1", "experiment 'push': unknown stimulus of spring-axis "
-          "'F_sett': did you mean 'F_set'?"]),
+        (
+            "wrong_stimulus",
+            "F_sett",
+            "x",
+            [
+                "wrong_stimulus.py, line 1",
+                "experiment 'push': unknown stimulus of spring-axis "
+                "'F_sett': did you mean 'F_set'?",
+            ],
+        ),
         ("wrong_signal", "F_set", "xx", ["wrong_signal.py, line 1", "xx"]),
     ],
-)  # fmt: skip
+)
 def test_an_experiment_that_names_what_the_model_lacks(
     bywire: Bywire, tmp_path: Path, stem: str, stimulus: str, signal: str, parts: list[str]
 ) -> None:

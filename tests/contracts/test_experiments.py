@@ -57,12 +57,12 @@ def test_experiments_of_ours_name_what_there_is(name: str) -> None:
         ("", "", "", "", ""),
         ("figures", "time-traces", "time-trace", "unknown figure 'time-trace'", "PUSH = "),
         ("assembly", '"spring-axis", "a', '"spring-axes", "a', "did you mean 'spring-axis'", ""),
-        ("stimuli", "F_set\": np", "F_sett\": np", "'F_sett': did you mean 'F_set'?", "PUSH = "),
+        ("stimuli", 'F_set": np', 'F_sett": np', "'F_sett': did you mean 'F_set'?", "PUSH = "),
         ("key figures", '["x"]', '["xx"]', "xx", "    return (Kpi("),
         ("key figures", '{"farthest": "m"}', '{"fartest": "m"}', "never gives: fartest", "PUSH = "),
         ("key figures", '"m", "largest', '"mm", "largest', "farthest in mm", "PUSH = "),
     ],
-)  # fmt: skip
+)
 def test_what_an_experiment_names_and_nobody_has(
     tmp_path: Path, contract: str, right: str, wrong: str, text: str, line_of: str
 ) -> None:

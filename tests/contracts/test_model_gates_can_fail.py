@@ -64,8 +64,13 @@ MISTAKES = {
     "friction that creeps": Mistake(
         "hidden friction",
         "model",
-        (OPS, ("return ((-T, T),)", "T = T * ops.fmin(ops.fabs(w.spindle.x.omega), 1.0)\n"
-                                    "        return ((-T, T),)")),
+        (
+            OPS,
+            (
+                "return ((-T, T),)",
+                "T = T * ops.fmin(ops.fabs(w.spindle.x.omega), 1.0)\n        return ((-T, T),)",
+            ),
+        ),
     ),
     "friction in the balance": Mistake(
         "hidden friction",
@@ -83,7 +88,7 @@ MISTAKES = {
     "torque and force mixed up": Mistake(
         "units", "model", (("spindle.Input(torque, w.F)", "spindle.Input(w.F, torque)"),)
     ),
-}  # fmt: skip
+}
 
 
 FAULTS = """

@@ -98,4 +98,3 @@ def test_a_fault_of_an_unknown_signal_is_found(tmp_path: Path) -> None:
         found = examine(OF_A_MODEL["faults"], trial, trial.place())
     assert not found.holds
     assert "the channel 'angle' names no signal: 'fi'" in found.text
-

@@ -18,9 +18,14 @@ SIGNALS = ("i", "theta", "omega")
 
 def drive(step: float) -> Run:
     return Run(
-        NonlinearDrive(), PARAMETERS, State(0.0, 0.0, 0.0), Memory(VOLTAGE),
-        lambda t: np.full((t.size, 1), VOLTAGE), DURATION, step,
-    )  # fmt: skip
+        NonlinearDrive(),
+        PARAMETERS,
+        State(0.0, 0.0, 0.0),
+        Memory(VOLTAGE),
+        lambda t: np.full((t.size, 1), VOLTAGE),
+        DURATION,
+        step,
+    )
 
 
 def exact(times: np.ndarray) -> np.ndarray:

@@ -19,9 +19,13 @@ STEPS = (50e-6, 40e-6, 25e-6, 20e-6, 12.5e-6, 10e-6, 5e-6)
 def test_oscillator_against_its_closed_form() -> None:
     """No friction, no contact, an integral of a power beside the states."""
     run = Run(
-        oscillator.Oscillator(), oscillator.PARAMETERS, oscillator.START, oscillator.Memory(0.0),
-        lambda t: np.zeros((t.size, 1)), duration=0.05,
-    )  # fmt: skip
+        oscillator.Oscillator(),
+        oscillator.PARAMETERS,
+        oscillator.START,
+        oscillator.Memory(0.0),
+        lambda t: np.zeros((t.size, 1)),
+        duration=0.05,
+    )
     names, errors = ("x", "v", "action"), []
     for step in STEPS:
         result = simulate(replace(run, step=step))
@@ -40,9 +44,16 @@ def _sliding(law: str) -> Run:
         "dardanelli2010",
         overrides={"gear.law": law, "drive.T_source": 1e-3},
         options={"source": "voltage", "p_start": 10e5, "add_holding": True, "duration": 0.1},
-        stimulus={"kind": "ramp", "start": 0.5, "end": 9.0, "slope": 20.0, "t_start": 0.0,
-                  "t_hold": 0.0, "after": "stay"},
-    )  # fmt: skip
+        stimulus={
+            "kind": "ramp",
+            "start": 0.5,
+            "end": 9.0,
+            "slope": 20.0,
+            "t_start": 0.0,
+            "t_hold": 0.0,
+            "after": "stay",
+        },
+    )
     run = as_run(bench.cases()[0], 1e-6)
     names = run.model.State._fields
     before = simulate(run)
@@ -52,8 +63,20 @@ def _sliding(law: str) -> Run:
     return replace(run, state=start, stimulus=lambda t: run.stimulus(t + moment), duration=0.05)
 
 
-SIGNALS = ("i", "theta", "omega", "p_mc", "p_pd", "E_source", "E_copper", "E_gear", "E_seal",
-           "E_damping", "E_pipeline", "E_stored")  # fmt: skip
+SIGNALS = (
+    "i",
+    "theta",
+    "omega",
+    "p_mc",
+    "p_pd",
+    "E_source",
+    "E_copper",
+    "E_gear",
+    "E_seal",
+    "E_damping",
+    "E_pipeline",
+    "E_stored",
+)
 
 
 @pytest.mark.parametrize("law", ["paper", "directional"])

@@ -32,9 +32,16 @@ def test_first_jumps_of_the_ramp(law: str) -> None:
         "dardanelli2010",
         overrides={"gear.law": law, "drive.T_source": 5e-3},
         options={"source": "current", "duration": 12.0, "record": 5e-3},
-        stimulus={"kind": "ramp", "start": 0.0, "end": 5.0, "slope": 0.2, "t_start": 0.0,
-                  "t_hold": 0.0, "after": "stay"},
-    )  # fmt: skip
+        stimulus={
+            "kind": "ramp",
+            "start": 0.0,
+            "end": 5.0,
+            "slope": 0.2,
+            "t_start": 0.0,
+            "t_hold": 0.0,
+            "after": "stay",
+        },
+    )
     run = as_run(bench.cases()[0], 20e-6)
     reference = run_reference(run, 4e-4)
     assert reference["mode_changes"] == 10
@@ -53,9 +60,15 @@ def test_first_jumps_of_the_ramp(law: str) -> None:
 
 def _released(x_0: float, duration: float, record: float) -> Run:
     return Run(
-        oscillator.Oscillator(rubs=True), oscillator.PARAMETERS, oscillator.State(x_0, 0.0),
-        oscillator.Memory(0.0), lambda t: np.zeros((t.size, 1)), duration, 20e-6, record,
-    )  # fmt: skip
+        oscillator.Oscillator(rubs=True),
+        oscillator.PARAMETERS,
+        oscillator.State(x_0, 0.0),
+        oscillator.Memory(0.0),
+        lambda t: np.zeros((t.size, 1)),
+        duration,
+        20e-6,
+        record,
+    )
 
 
 def _errors(x_0: float) -> list[float]:

@@ -93,11 +93,16 @@ def test_differences_within_rounding_show_nothing():
 @pytest.mark.parametrize(
     ("value", "error", "expected"),
     [
-        (1.0, 0.05, "met"), (1.2, 0.05, "missed"), (1.08, 0.05, "undecided"),
-        (1.12, 0.05, "undecided"), (1.0, math.nan, "met"), (1.0, math.inf, "undecided"),
-        (math.nan, math.nan, "missed"), (math.nan, math.inf, "undecided"),
+        (1.0, 0.05, "met"),
+        (1.2, 0.05, "missed"),
+        (1.08, 0.05, "undecided"),
+        (1.12, 0.05, "undecided"),
+        (1.0, math.nan, "met"),
+        (1.0, math.inf, "undecided"),
+        (math.nan, math.nan, "missed"),
+        (math.nan, math.inf, "undecided"),
     ],
-)  # fmt: skip
+)
 def test_what_is_closer_to_its_limit_than_its_error_is_undecided(value, error, expected):
     (verdict,) = judge({"energy": "<= 1.1 J"}, [kpi(value, error)])
     assert verdict.outcome == expected
@@ -141,9 +146,11 @@ def test_that_no_other_step_runs_is_said(monkeypatch, is_range):
     monkeypatch.setattr("bywire.bench.running.simulate", stubborn)
     monkeypatch.setattr("bywire.bench.side_by_side.simulate", stubborn)
     monkeypatch.setattr("bywire.bench.side_by_side.fit_lanes", lambda *_: False)
-    results = run_benches([bench, bench], estimate_error=True) if is_range else (
-        run(bench, estimate_error=True),
-    )  # fmt: skip
+    results = (
+        run_benches([bench, bench], estimate_error=True)
+        if is_range
+        else (run(bench, estimate_error=True),)
+    )
     for result in results:
         (said,) = (text for text in result.warnings if "not known" in text)
         assert "neither half nor double steps (0.5 of the step: left the numbers; 2 " in said
@@ -153,9 +160,12 @@ def test_that_no_other_step_runs_is_said(monkeypatch, is_range):
 
 def test_that_a_case_of_a_range_has_no_other_step_costs_the_others_nothing(monkeypatch):
     benches = [
-        read("hard-braking", {"options.duration": "40 ms", "options.settle": "10 ms",
-                              "motor.R_m": f"{R_m} ohm"}) for R_m in (0.3, 0.4)
-    ]  # fmt: skip
+        read(
+            "hard-braking",
+            {"options.duration": "40 ms", "options.settle": "10 ms", "motor.R_m": f"{R_m} ohm"},
+        )
+        for R_m in (0.3, 0.4)
+    ]
 
     def fragile(each, **options):
         if each.step != benches[0].step and each.par.motor.R_m == 0.3:
@@ -202,9 +212,10 @@ def random_bench(rng: np.random.Generator, left_out: Collection[str]) -> Bench:
     while True:
         bench = read(str(rng.choice(names)), {})
         values = {
-            name: value for name, value in bench.par.flat().items()
+            name: value
+            for name, value in bench.par.flat().items()
             if isinstance(value, float) and value and not name.rpartition(".")[2].startswith("T_")
-        }  # fmt: skip
+        }
         changed = rng.choice(sorted(values), 3, replace=False)
         overrides = {str(name): values[name] * rng.uniform(0.8, 1.25) for name in changed}
         try:

@@ -55,9 +55,12 @@ def said_by(lines: str, **chosen: str) -> str:
     """Return what a program prints whose user has chosen so much and no more."""
     kept = {name: value for name, value in os.environ.items() if name not in VARIABLES}
     done = subprocess.run(
-        [sys.executable, "-c", THREADS + lines], env=kept | chosen, capture_output=True, text=True,
+        [sys.executable, "-c", THREADS + lines],
+        env=kept | chosen,
+        capture_output=True,
+        text=True,
         check=False,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 

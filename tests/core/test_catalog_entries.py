@@ -122,8 +122,11 @@ def torque(par):
     return par.F * par.arm
 
 
-LEVER = {"F": chosen(4.0, "a force"), "arm": chosen(0.5, "an arm"),
-         "T_hat": derived(torque, "F times arm")}  # fmt: skip
+LEVER = {
+    "F": chosen(4.0, "a force"),
+    "arm": chosen(0.5, "an arm"),
+    "T_hat": derived(torque, "F times arm"),
+}
 
 
 def test_a_derived_value_is_computed_once_and_found_where_it_no_longer_matches():
@@ -139,11 +142,22 @@ def test_a_derived_value_is_computed_once_and_found_where_it_no_longer_matches()
 
 
 def test_a_derived_value_follows_its_set_into_another_one():
-    values = {f"{side}.{name}": each.moved_to({"": side}) for side in ("left", "right")
-              for name, each in LEVER.items()}  # fmt: skip
-    levers = CitedSet("levers", "levers", "2026", "two levers", Levers, {
-        **values, "right.F": chosen(6.0, "a larger force"),
-    })  # fmt: skip
+    values = {
+        f"{side}.{name}": each.moved_to({"": side})
+        for side in ("left", "right")
+        for name, each in LEVER.items()
+    }
+    levers = CitedSet(
+        "levers",
+        "levers",
+        "2026",
+        "two levers",
+        Levers,
+        {
+            **values,
+            "right.F": chosen(6.0, "a larger force"),
+        },
+    )
     assert (levers.parameters().left.T_hat, levers.parameters().right.T_hat) == (2.0, 3.0)
     changed = levers.parameters().replace({"right.arm": 1.0})
     (found,) = outdated_values(levers.values, changed, {"right.arm"})
@@ -164,7 +178,7 @@ def test_a_formula_that_reads_what_there_is_not_is_refused():
         ("roberts2003-corner", {"screw.lead": 4e-3}, "control.offset.k_hat", 2e-3 / math.pi),
         ("dardanelli2010-measured", {"seal.k_brk_p": 3.0}, "ecu.est_par.k_brk_p", 3.0),
     ],
-)  # fmt: skip
+)
 def test_derived_values_of_our_sets_are_found(name, changed, derived_name, value):
     found = PARAMETER_SETS.find(name)
     outdated = outdated_values(found.values, found.parameters().replace(changed), changed)

@@ -25,7 +25,7 @@ from bywire.core.errors import ParameterError
         (lambda: bywire.design("pressure", require="gain"), "require = .gain.: a list"),
         (lambda: bywire.trust("friction-ramp", count=2.5), r"count = 2\.5: a whole number"),
     ],
-)  # fmt: skip
+)
 def test_another_kind_than_the_signature_says_is_refused(call, said):
     with pytest.raises(ParameterError, match=said):
         call()

@@ -77,9 +77,19 @@ def test_all_follows_from_the_parts() -> None:
     assert Screw.State._fields == ("i", "theta", "omega")
     assert Screw.Flow._fields == ("E_copper", "W_stop", "W_in")
     assert Screw.Output._fields == (
-        "i", "theta", "omega", "v", "E_copper", "W_stop", "W_in", "E_stored", "x", "E_stop",
-        "torque", "P_in",
-    )  # fmt: skip
+        "i",
+        "theta",
+        "omega",
+        "v",
+        "E_copper",
+        "W_stop",
+        "W_in",
+        "E_stored",
+        "x",
+        "E_stop",
+        "torque",
+        "P_in",
+    )
     shown = signals_of(Screw.Output)
     assert shown["x"] == signals_of(ball_screw_gear.Output)["x"]
     assert shown["E_copper"].label == "copper loss"

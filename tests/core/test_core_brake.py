@@ -76,37 +76,80 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
 @pytest.mark.parametrize(
     ("name", "text", "error", "parts"),
     [
-        ("raises.py", f"{HEAD}x = 3\ny = x / 0\n", ModelError,
-         ["raises.py, line 3: ZeroDivisionError: division by zero", "mend it and load it again"]),
-        ("deep.py", f"{HEAD}import math\n\ndef f():\n    return math.sqrt('a')\n\nf()\n",
-         ModelError, ["deep.py, line 5: TypeError"]),
+        (
+            "raises.py",
+            f"{HEAD}x = 3\ny = x / 0\n",
+            ModelError,
+            ["raises.py, line 3: ZeroDivisionError: division by zero", "mend it and load it again"],
+        ),
+        (
+            "deep.py",
+            f"{HEAD}import math\n\ndef f():\n    return math.sqrt('a')\n\nf()\n",
+            ModelError,
+            ["deep.py, line 5: TypeError"],
+        ),
         ("syntax.py", "BRAKE = (\n", ModelError, ["syntax.py, line 1: SyntaxError"]),
         ("leaves.py", "raise SystemExit(3)\n", ModelError, ["leaves.py, line 1: SystemExit: 3"]),
-        ("imports.py", "import no_such_module_at_all\n", ModelError,
-         ["imports.py, line 1: ModuleNotFoundError", "no_such_module_at_all"]),
-        ("nothing.py", "x = 1\n", ModelError,
-         ["declares no BRAKE", "BRAKE = bywire.Brake(name, summary, __name__)"]),
+        (
+            "imports.py",
+            "import no_such_module_at_all\n",
+            ModelError,
+            ["imports.py, line 1: ModuleNotFoundError", "no_such_module_at_all"],
+        ),
+        (
+            "nothing.py",
+            "x = 1\n",
+            ModelError,
+            ["declares no BRAKE", "BRAKE = bywire.Brake(name, summary, __name__)"],
+        ),
         ("other.py", "BRAKE = 'mine'\n", ModelError, ["declares a BRAKE that is a str"]),
-        ("wrong_module.py", f'{HEAD}BRAKE = Brake("wrong-module", "", "elsewhere")\n', ModelError,
-         ["BRAKE is declared for the module 'elsewhere'", "Brake('wrong-module', ..., __name__)"]),
-        ("taken.py", declared("motorcycle"), ModelError,
-         ["taken.py declares a brake 'motorcycle', and so does", "give it another name"]),
-        ("json.py", declared("json"), ModelError,
-         ["there is a module 'json' already", "give it another name"]),
+        (
+            "wrong_module.py",
+            f'{HEAD}BRAKE = Brake("wrong-module", "", "elsewhere")\n',
+            ModelError,
+            [
+                "BRAKE is declared for the module 'elsewhere'",
+                "Brake('wrong-module', ..., __name__)",
+            ],
+        ),
+        (
+            "taken.py",
+            declared("motorcycle"),
+            ModelError,
+            ["taken.py declares a brake 'motorcycle', and so does", "give it another name"],
+        ),
+        (
+            "json.py",
+            declared("json"),
+            ModelError,
+            ["there is a module 'json' already", "give it another name"],
+        ),
         ("numpy.py", declared("numpy"), ModelError, ["there is a module 'numpy' already"]),
         ("my-brake.py", declared("my-brake"), ModelError, ["must be one that Python can import"]),
         ("brake.txt", declared("txt"), FileError, ["is no brake: give a Python file"]),
-        ("half_typed.py", f"{HEAD}from typing import NamedTuple\nfrom bywire.core.signals import "
-         "signals_of\n\n\nclass State(NamedTuple):\n    x: float\n\n\nsignals_of(State)\n",
-         ModelError, ["half_typed.py, line 6: State.x has no Signal annotation",
-                      'write x: Annotated[float, Signal("m", "what it is")]']),
-        ("unitless.py", f"{HEAD}from bywire.core.parameters import ParameterSet\n"
-         "from bywire.core.catalog import CitedSet\n\n\nclass Parameters(ParameterSet):\n"
-         '    m: float\n\n\nSET = CitedSet("u", "u", "", "", Parameters, {"m": 1.0})\n',
-         ModelError, ["unitless.py, line 6: Parameters.m is a number without a unit",
-                      'm: Annotated[float, Unit("kg")]']),
+        (
+            "half_typed.py",
+            f"{HEAD}from typing import NamedTuple\nfrom bywire.core.signals import "
+            "signals_of\n\n\nclass State(NamedTuple):\n    x: float\n\n\nsignals_of(State)\n",
+            ModelError,
+            [
+                "half_typed.py, line 6: State.x has no Signal annotation",
+                'write x: Annotated[float, Signal("m", "what it is")]',
+            ],
+        ),
+        (
+            "unitless.py",
+            f"{HEAD}from bywire.core.parameters import ParameterSet\n"
+            "from bywire.core.catalog import CitedSet\n\n\nclass Parameters(ParameterSet):\n"
+            '    m: float\n\n\nSET = CitedSet("u", "u", "", "", Parameters, {"m": 1.0})\n',
+            ModelError,
+            [
+                "unitless.py, line 6: Parameters.m is a number without a unit",
+                'm: Annotated[float, Unit("kg")]',
+            ],
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_with_a_file_is_said_with_its_line(
     write: Write, name: str, text: str, error: type[InputError], parts: list[str]
 ) -> None:
@@ -155,18 +198,30 @@ def test_a_file_that_was_mended_loads(write: Write) -> None:
 @pytest.mark.parametrize(
     ("stem", "line", "kind", "text"),
     [
-        ("same_set", 'S = CitedSet("roberts2003", "a", "", "", ParameterSet, {})', PARAMETER_SETS,
-         r"same_set.py, line 6: the parameter set 'roberts2003' is declared in .*roberts2003"),
-        ("twice", 'S = CitedSet("s", "a", "", "", ParameterSet, {})\n'
-         'T = CitedSet("s", "b", "", "", ParameterSet, {})', PARAMETER_SETS,
-         r"twice.py, line 7: the parameter set 's' is declared in .*twice.py, line 6 already: "
-         "give this one another name"),
-        ("same_test", 'E = Experiment("hard-braking", "a", "", ParameterSet, ParameterSet(), '
-         "None, None, {}, ())", EXPERIMENTS,
-         r"same_test.py, line 6: the experiment 'hard-braking' is declared in "
-         r".*hard_braking.py, line \d\d already"),
+        (
+            "same_set",
+            'S = CitedSet("roberts2003", "a", "", "", ParameterSet, {})',
+            PARAMETER_SETS,
+            r"same_set.py, line 6: the parameter set 'roberts2003' is declared in .*roberts2003",
+        ),
+        (
+            "twice",
+            'S = CitedSet("s", "a", "", "", ParameterSet, {})\n'
+            'T = CitedSet("s", "b", "", "", ParameterSet, {})',
+            PARAMETER_SETS,
+            r"twice.py, line 7: the parameter set 's' is declared in .*twice.py, line 6 already: "
+            "give this one another name",
+        ),
+        (
+            "same_test",
+            'E = Experiment("hard-braking", "a", "", ParameterSet, ParameterSet(), '
+            "None, None, {}, ())",
+            EXPERIMENTS,
+            r"same_test.py, line 6: the experiment 'hard-braking' is declared in "
+            r".*hard_braking.py, line \d\d already",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_name_that_is_taken_is_refused(
     write: Write, stem: str, line: str, kind: object, text: str
 ) -> None:
@@ -253,11 +308,16 @@ def test_what_an_installed_brake_breaks_is_left_out_and_the_others_stay(
 
 
 def test_a_name_taken_within_a_tuple_or_by_a_class_has_its_line(write: Write) -> None:
-    load_system(write("held.py", f"{declared('held')}from bywire.core.catalog import CitedSet\n"
-                "from bywire.core.parameters import ParameterSet\n"
-                'A = CitedSet("a", "x", "", "", ParameterSet, {})\n'
-                'SETS = (\n    CitedSet("b", "x", "", "", ParameterSet, {}),\n'
-                '    CitedSet("c", "x", "", "", ParameterSet, {}),\n)\n'))  # fmt: skip
+    load_system(
+        write(
+            "held.py",
+            f"{declared('held')}from bywire.core.catalog import CitedSet\n"
+            "from bywire.core.parameters import ParameterSet\n"
+            'A = CitedSet("a", "x", "", "", ParameterSet, {})\n'
+            'SETS = (\n    CitedSet("b", "x", "", "", ParameterSet, {}),\n'
+            '    CitedSet("c", "x", "", "", ParameterSet, {}),\n)\n',
+        )
+    )
     lines = {name: PARAMETER_SETS.place(name)[1] for name in "abc"}
     assert lines == {"a": 5, "b": 7, "c": 8}
     file, line = ASSEMBLIES.place("motorcycle-brake")

@@ -23,7 +23,7 @@ from bywire.core.errors import ParameterError, UnknownNameError
         ("'bywire convert --exclude nothing'", "'bywire convert --exclude nothing'"),
         ("file a--b.csv: 1--2", "file a--b.csv: 1--2"),
     ],
-)  # fmt: skip
+)
 def test_flags_are_arguments_in_a_program(written: str, read: str) -> None:
     assert in_callers_words(written) == read
     with command_line():

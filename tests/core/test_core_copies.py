@@ -74,11 +74,25 @@ def test_a_command_is_copied_with_a_single_thread(tmp_path):
     study = tmp_path / "study.toml"
     study.write_text(STUDY)
     done = subprocess.run(
-        [sys.executable, "-W", "always", "-c", AUDITED, "study", "run", study, "--workers", "2",
-         "--out", tmp_path / "out"],
+        [
+            sys.executable,
+            "-W",
+            "always",
+            "-c",
+            AUDITED,
+            "study",
+            "run",
+            study,
+            "--workers",
+            "2",
+            "--out",
+            tmp_path / "out",
+        ],
         env={k: v for k, v in os.environ.items() if k not in VARIABLES},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     copied = [line for line in done.stderr.splitlines() if line.startswith("copied with")]
     assert len(copied) >= (4 if (os.cpu_count() or 1) > 1 else 2)  # cases, figures
@@ -132,9 +146,12 @@ with processes(2, print, Slow(), is_copied=False) as pool:
 def test_processes_that_still_load_end_when_their_maker_is_killed(when):
     """In silence: Python's own process that tidies up behind them has nothing to complain of."""
     done = subprocess.run(
-        [sys.executable, "-c", LOADING, when], capture_output=True, text=True, check=False,
+        [sys.executable, "-c", LOADING, when],
+        capture_output=True,
+        text=True,
+        check=False,
         timeout=50,
-    )  # fmt: skip
+    )
     begun = [int(text) for text in done.stdout.split()]
     assert len(begun) == 2
     assert not any(map(_is_there, begun))  # they held the pipes until they ended

@@ -68,9 +68,16 @@ class Counted(ParameterSet):
 
 
 VALUES: dict[str, Any] = {
-    "inner.R": 0.35, "inner.law": "paper", "share": 0.9, "table": (0.0, 1e5, 2e5), "n": 3,
-    "on": True, "note": "as built", "long": 2.0, "short": 1.0,
-}  # fmt: skip
+    "inner.R": 0.35,
+    "inner.law": "paper",
+    "share": 0.9,
+    "table": (0.0, 1e5, 2e5),
+    "n": 3,
+    "on": True,
+    "note": "as built",
+    "long": 2.0,
+    "short": 1.0,
+}
 
 
 def made(**changes: Any) -> Outer:
@@ -128,10 +135,15 @@ class Doubled(Pair):
 PAIR = {"left.R": 1.0, "left.law": "paper", "right.R": 2.0, "right.law": "paper"}
 
 
-@pytest.mark.parametrize("changes", [
-    {"left.R": 1.5}, {"left.R": 1.5, "right.R": 3.0}, {"left.law": "directional"},
-    {"right.R": 4.0, "right.law": "directional"},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"left.R": 1.5},
+        {"left.R": 1.5, "right.R": 3.0},
+        {"left.law": "directional"},
+        {"right.R": 4.0, "right.law": "directional"},
+    ],
+)
 def test_a_set_of_which_parts_change_is_as_if_built_anew(changes):
     replaced, built = Pair.create(PAIR).replace(changes), Pair.create(PAIR | changes)
     assert replaced == built
@@ -190,15 +202,17 @@ def test_nothing_can_be_assigned_or_added():
         ({"table": (math.nan,)}, "table.0 = nan Pa is not admissible: it must be >= 0 Pa"),
         ({"table": ()}, "table: at least 1 wanted, got ()"),
         ({"table": 3.0}, "table = 3.0 Pa is not admissible: it must be >= 0 Pa"),
-        ({"inner.law": "papr"}, "inner.law: it must be 'paper' or 'directional', got 'papr': "
-                                "did you mean 'paper'?"),
+        (
+            {"inner.law": "papr"},
+            "inner.law: it must be 'paper' or 'directional', got 'papr': did you mean 'paper'?",
+        ),
         ({"inner.law": 3}, "inner.law: it must be 'paper' or 'directional', got 3"),
         ({"on": "maybe"}, "on: it must be true or false, got 'maybe'"),
         ({"on": [1]}, "on: it must be true or false, got [1]"),
         ({"note": 3}, "note: it must be a text, got 3"),
         ({"short": 2.0}, "Outer: short must be shorter than long"),
     ],
-)  # fmt: skip
+)
 def test_refusal_is_one_line_that_helps(changes, text):
     with pytest.raises(ParameterError) as refused:
         made(**changes)
@@ -208,15 +222,21 @@ def test_refusal_is_one_line_that_helps(changes, text):
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"short": Written(-2e-5, "-0.02mm")},
-         "short = -2e-05 m is not admissible: it must be > 0 m, got '-0.02mm'"),
-        ({"share": Written(1.2, "120 %")},
-         "share = 1.2 is not admissible: it must be > 0 and <= 1, got '120 %'"),
+        (
+            {"short": Written(-2e-5, "-0.02mm")},
+            "short = -2e-05 m is not admissible: it must be > 0 m, got '-0.02mm'",
+        ),
+        (
+            {"share": Written(1.2, "120 %")},
+            "share = 1.2 is not admissible: it must be > 0 and <= 1, got '120 %'",
+        ),
         ({"share": Written(1.2, "1.2")}, "share = 1.2 is not admissible: it must be > 0 and <= 1"),
-        ({"table": (Written(0.0, "0 bar"), Written(-1e5, "-1 bar"))},
-         "table.1 = -100000.0 Pa is not admissible: it must be >= 0 Pa, got '-1 bar'"),
+        (
+            {"table": (Written(0.0, "0 bar"), Written(-1e5, "-1 bar"))},
+            "table.1 = -100000.0 Pa is not admissible: it must be >= 0 Pa, got '-1 bar'",
+        ),
     ],
-)  # fmt: skip
+)
 def test_refusal_repeats_the_text_as_typed(changes, text):
     with pytest.raises(ParameterError) as refused:
         made(**changes)
@@ -257,9 +277,15 @@ def test_unknown_name(name):
 
 def test_leaves_spread_tables():
     assert made().leaves() == {
-        "inner.R": 0.35, "share": 0.9, "table.0": 0.0, "table.1": 1e5, "table.2": 2e5, "n": 3.0,
-        "long": 2.0, "short": 1.0,
-    }  # fmt: skip
+        "inner.R": 0.35,
+        "share": 0.9,
+        "table.0": 0.0,
+        "table.1": 1e5,
+        "table.2": 2e5,
+        "n": 3.0,
+        "long": 2.0,
+        "short": 1.0,
+    }
     assert all(type(value) is float for value in made().leaves().values())
 
 
@@ -273,8 +299,11 @@ def test_numbers_of_several_sets_are_a_table():
 
 def test_choices_hold_the_length_of_tables():
     assert made().choices() == {
-        "inner.law": "paper", "table": 3, "on": True, "note": "as built",
-    }  # fmt: skip
+        "inner.law": "paper",
+        "table": 3,
+        "on": True,
+        "note": "as built",
+    }
     assert made(table=(1.0,)).choices()["table"] == 1
 
 
@@ -306,8 +335,10 @@ def test_fields_know_unit_range_and_description():
     assert choice_fields(Outer) == ("inner.law", "on", "note")
     notes = field_notes(Outer)
     assert [notes[name] for name in choice_fields(Outer)] == [
-        "which equations", "whether", "what about it",
-    ]  # fmt: skip
+        "which equations",
+        "whether",
+        "what about it",
+    ]
 
 
 def test_notes_of_classes_within_others_and_in_conditions():

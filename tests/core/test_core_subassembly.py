@@ -31,12 +31,15 @@ needs_a_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C comp
 
 def test_signals_get_prefix_label_and_book() -> None:
     assert Pair.State._fields == (
-        "left_i", "left_theta", "left_omega", "right_i", "right_theta", "right_omega"
-    )  # fmt: skip
+        "left_i",
+        "left_theta",
+        "left_omega",
+        "right_i",
+        "right_theta",
+        "right_omega",
+    )
     assert Pair.Memory._fields == ("left_v", "left_x_seen", "right_v", "right_x_seen")
-    assert Pair.Stimulus._fields == (
-        "left_v_set", "noise_left_v", "right_v_set", "noise_right_v"
-    )  # fmt: skip
+    assert Pair.Stimulus._fields == ("left_v_set", "noise_left_v", "right_v_set", "noise_right_v")
     assert Pair.frictions == ("left_omega", "right_omega")
     assert set(Pair.right.records) <= set(Pair.Output._fields)
     shown = signals_of(Pair.Output)
@@ -71,9 +74,14 @@ def test_equations_are_those_of_one_alone_number_by_number() -> None:
     for k, (sub, par) in enumerate(((Pair.left, BOTH.left), (Pair.right, BOTH.right))):
         own, own_e, own_rate, own_m, own_flow = (
             sub.inside(kind, values)
-            for kind, values in (("State", x), ("State", xe), ("State", rate), ("Memory", m),
-                                 ("Flow", flow))
-        )  # fmt: skip
+            for kind, values in (
+                ("State", x),
+                ("State", xe),
+                ("State", rate),
+                ("Memory", m),
+                ("Flow", flow),
+            )
+        )
         pressed, rubbed = contact[2 * k : 2 * k + 2], reaction[k : k + 1]
         wanted = {
             "mass": alone.mass(own_e, par),

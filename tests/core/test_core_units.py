@@ -101,15 +101,60 @@ WRONG_UNIT = [
     ("20 deg", "1", "deg cannot be a pure number"),
     ("3 %", "K", "% cannot be K"),
 ]
-UNKNOWN = ["9 bananas", "9 nan", "9 inf", "9 None", "9 True", "9 def", "9 is not m", "9 import",
-           "3 lambda", "3 furlong", "3 tex", "3 year"]
+UNKNOWN = [
+    "9 bananas",
+    "9 nan",
+    "9 inf",
+    "9 None",
+    "9 True",
+    "9 def",
+    "9 is not m",
+    "9 import",
+    "3 lambda",
+    "3 furlong",
+    "3 tex",
+    "3 year",
+]
 NO_QUANTITY = [
-    "", " ", "m", "mm 9", "nine mm", "9,5 mm", "1_000 mm", "0x10 mm", "- 9 mm", "--9 mm", "9 9 mm",
-    "9 mm 3", "9 m*", "9 *m", "9 m**", "9 (m", "9 m)", "9 m*(s", "9 m**9**9", "9 m^2^3", "9 m**10",
-    "9**9**9**9", "9**9", "9*9 mm", "9+9 mm", "nan", "inf", "nan mm", "1e1000 mm",
-    "9 m; s", "9 __import__('os')", "9 m.__class__", "9 [mm]", "9 {m}", "9\0 m", "9 m\nimport os",
-    "1" * 101, "9 " + "m*" * 60 + "m",
-]  # fmt: skip
+    "",
+    " ",
+    "m",
+    "mm 9",
+    "nine mm",
+    "9,5 mm",
+    "1_000 mm",
+    "0x10 mm",
+    "- 9 mm",
+    "--9 mm",
+    "9 9 mm",
+    "9 mm 3",
+    "9 m*",
+    "9 *m",
+    "9 m**",
+    "9 (m",
+    "9 m)",
+    "9 m*(s",
+    "9 m**9**9",
+    "9 m^2^3",
+    "9 m**10",
+    "9**9**9**9",
+    "9**9",
+    "9*9 mm",
+    "9+9 mm",
+    "nan",
+    "inf",
+    "nan mm",
+    "1e1000 mm",
+    "9 m; s",
+    "9 __import__('os')",
+    "9 m.__class__",
+    "9 [mm]",
+    "9 {m}",
+    "9\0 m",
+    "9 m\nimport os",
+    "1" * 101,
+    "9 " + "m*" * 60 + "m",
+]
 
 
 @pytest.mark.parametrize(("text", "symbol", "message"), WRONG_UNIT)
@@ -161,7 +206,7 @@ HOSTILE = [
 
 @pytest.mark.parametrize("text", HOSTILE, ids=lambda text: text[:12])
 def test_hostile_text_is_refused_at_once(text):
-    units.parse('9 mm', 'm', 'x')  # making the list does not count
+    units.parse("9 mm", "m", "x")  # making the list does not count
     started = time.process_time()
     with pytest.raises(BywireError) as refused:
         units.parse(text, "m", "x")

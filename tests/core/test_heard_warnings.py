@@ -21,9 +21,11 @@ print(*[str(each.message) for each in heard], sep="; ")
 
 @pytest.mark.parametrize(
     ("options", "told"),
-    [((), "the step is coarse; the step is coarse"),
-     (("-W", "default"), "the step is coarse; the step is coarse; use reshape; unclosed file")],
-)  # fmt: skip
+    [
+        ((), "the step is coarse; the step is coarse"),
+        (("-W", "default"), "the step is coarse; the step is coarse; use reshape; unclosed file"),
+    ],
+)
 def test_what_python_hides_is_not_told_unless_it_was_asked_for(options, told):
     done = subprocess.run(
         [sys.executable, *options, "-c", LINES], capture_output=True, text=True, check=True

@@ -102,15 +102,21 @@ def declare(**body: Any) -> type[Any]:
     ("body", "message"),
     [
         (lambda: {"a": Sub(Ram, prefix="2_")}, r"Sub\(Ram\): the prefix '2_' makes no names"),
-        (lambda: {"a": Sub(Ram, prefix="a_"), "b": Sub(Ram, prefix="a_")},
-         r"Wrong.b: there is a signal 'a_i' already: give it another prefix"),
-        (lambda: {"a": Sub(Ram, prefix="a_", feeds={"v_st": "x"})},
-         r"feeds names an unknown stimulus 'v_st': did you mean 'v_set'"),
-        (lambda: {"a": Sub(Ram, prefix="a_", feeds={"v_set": "a_vv"})},
-         r"Wrong.a: v_set is fed by an unknown signal 'a_vv': did you mean 'a_v'"),
+        (
+            lambda: {"a": Sub(Ram, prefix="a_"), "b": Sub(Ram, prefix="a_")},
+            r"Wrong.b: there is a signal 'a_i' already: give it another prefix",
+        ),
+        (
+            lambda: {"a": Sub(Ram, prefix="a_", feeds={"v_st": "x"})},
+            r"feeds names an unknown stimulus 'v_st': did you mean 'v_set'",
+        ),
+        (
+            lambda: {"a": Sub(Ram, prefix="a_", feeds={"v_set": "a_vv"})},
+            r"Wrong.a: v_set is fed by an unknown signal 'a_vv': did you mean 'a_v'",
+        ),
         (lambda: {"a": Sub(Held, prefix="a_")}, r"Sub\(Held\): it is no assembly"),
     ],
-)  # fmt: skip
+)
 def test_mistakes_of_a_declaration_are_said(body: Any, message: str) -> None:
     with pytest.raises(ModelError, match=message):
         declare(**body())

@@ -15,8 +15,17 @@ from bywire.plant import current_sensor, pressure_sensor
 from bywire.simulation.run import Run
 from reference.event_driven import STATES, Controller, Plant, simulate
 
-GROUPS = ("motor", "supply", "gear", "master_cylinder", "fluid", "pipeline", "caliper",
-          "anti_alias", "seal")  # fmt: skip
+GROUPS = (
+    "motor",
+    "supply",
+    "gear",
+    "master_cylinder",
+    "fluid",
+    "pipeline",
+    "caliper",
+    "anti_alias",
+    "seal",
+)
 
 
 def plant_of(par: MotorcycleParameters) -> Plant:

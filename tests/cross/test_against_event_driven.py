@@ -90,9 +90,10 @@ def test_hard_braking_without_dither(law: str) -> None:
     compare(run, run_reference(run, REFERENCE_STEP), 0.001)
 
 
-@pytest.mark.parametrize(("law", "duration"), [
-    ("directional", 18.0), *(pytest.param(law, 36.0, marks=pytest.mark.trust) for law in LAWS)
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("law", "duration"),
+    [("directional", 18.0), *(pytest.param(law, 36.0, marks=pytest.mark.trust) for law in LAWS)],
+)
 def test_ramp(law: str, duration: float) -> None:
     """The staircase of jumps, and the way back."""
     run = ramp(law, duration)

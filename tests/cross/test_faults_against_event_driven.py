@@ -20,8 +20,13 @@ STEP = 4e-4
 SETTLE = 0.2
 OFFSET, GAIN, LATE = 2e5, 0.8, 3
 # Windows on the recording's axis [s], one after the other; parameters stay changed.
-WINDOWS = {"offset": (0.05, 0.09), "gain": (0.10, 0.13), "late": (0.14, 0.17),
-           "dropped": (0.18, 0.21), "frozen": (0.22, 0.228)}  # fmt: skip
+WINDOWS = {
+    "offset": (0.05, 0.09),
+    "gain": (0.10, 0.13),
+    "late": (0.14, 0.17),
+    "dropped": (0.18, 0.21),
+    "frozen": (0.22, 0.228),
+}
 HOT, SWOLLEN = 0.07, 0.16
 FAULTS = [
     {"fault": "pressure.offset", "value": OFFSET, "onset": 0.05, "lasts": 0.04},
@@ -36,11 +41,17 @@ FAULTS = [
 
 @pytest.fixture(scope="module")
 def faulty() -> Run:
-    (run,) = Bench(
-        "hard-braking", "dardanelli2010",
-        overrides={"adc.law": "ideal", "gear.law": "directional"},
-        options={"settle": SETTLE, "duration": 0.25}, faults=FAULTS,
-    ).runs().values()  # fmt: skip
+    (run,) = (
+        Bench(
+            "hard-braking",
+            "dardanelli2010",
+            overrides={"adc.law": "ideal", "gear.law": "directional"},
+            options={"settle": SETTLE, "duration": 0.25},
+            faults=FAULTS,
+        )
+        .runs()
+        .values()
+    )
     return run
 
 
@@ -83,13 +94,19 @@ def reference(faulty: Run) -> dict[str, Any]:
     pieces: list[dict[str, Any]] = []
     for (k, last), now in zip(pairwise(edges), (par, hot, hot.replace(seal)), strict=True):
         made = simulate_reference(
-            plant_of(now), lambda n, t, state, k=k: tick(k + n, state),  # type: ignore[misc]
-            (last - k) * period, period, start, STEP,
-        )  # fmt: skip
+            plant_of(now),
+            lambda n, t, state, k=k: tick(k + n, state),  # type: ignore[misc]
+            (last - k) * period,
+            period,
+            start,
+            STEP,
+        )
         start = {name: float(made[name][-1]) for name in STATES}
         pieces.append(made)
-    return {name: np.concatenate([*(each[name][:-1] for each in pieces[:-1]), pieces[-1][name]])
-            for name in ("p_mc", "stuck", "i")}  # fmt: skip
+    return {
+        name: np.concatenate([*(each[name][:-1] for each in pieces[:-1]), pieces[-1][name]])
+        for name in ("p_mc", "stuck", "i")
+    }
 
 
 def test_every_kind_of_fault_does_what_the_reference_does(
@@ -104,9 +121,15 @@ def test_every_kind_of_fault_does_what_the_reference_does(
 @pytest.mark.parametrize("left_out", range(len(FAULTS)))
 def test_a_fault_that_is_left_out_shows(left_out: int, reference: dict[str, Any]) -> None:
     others = [each for k, each in enumerate(FAULTS) if k != left_out]
-    (run,) = Bench(
-        "hard-braking", "dardanelli2010",
-        overrides={"adc.law": "ideal", "gear.law": "directional"},
-        options={"settle": SETTLE, "duration": 0.25}, faults=others,
-    ).runs().values()  # fmt: skip
+    (run,) = (
+        Bench(
+            "hard-braking",
+            "dardanelli2010",
+            overrides={"adc.law": "ideal", "gear.law": "directional"},
+            options={"settle": SETTLE, "duration": 0.25},
+            faults=others,
+        )
+        .runs()
+        .values()
+    )
     assert np.abs(simulate(run)["p_mc"] - reference["p_mc"]).max() > 0.05e5

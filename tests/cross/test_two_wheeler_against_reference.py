@@ -37,9 +37,12 @@ RIDER = 4e6  # Pa, on both brakes
 RATE = 2e7  # Pa/s, of a controlled demand
 UNCONTROLLED = {"ecu.abs": "off", "ecu.lift": "off", "ecu.p_rate": 1e12}
 CONTROLLED = {
-    "ecu.abs": "pi", "ecu.lift": "off", "ecu.p_rate": RATE, "ecu.sees": "known",
+    "ecu.abs": "pi",
+    "ecu.lift": "off",
+    "ecu.p_rate": RATE,
+    "ecu.sees": "known",
     "sensors.encoder.law": "ideal",
-}  # fmt: skip
+}
 BESIDE = 3e-3  # s about an instant at which a wheel locks: its speed there is that of a step
 CLOSE = {"x": 1e-5, "v": 2e-5, "front": 5e-5, "rear": 5e-5}  # m, m/s
 
@@ -60,21 +63,24 @@ def vehicle_of(run: Run, surface: Surface) -> TwoWheeler:
     assert body["load"] == "lagged"
     wheels = [
         Wheel(
-            J=wheel.J, r=wheel.r, C_rr=wheel.C_rr, sigma=tyre.sigma, c_t=tyre.c_t, v_low=tyre.v_low,
+            J=wheel.J,
+            r=wheel.r,
+            C_rr=wheel.C_rr,
+            sigma=tyre.sigma,
+            c_t=tyre.c_t,
+            v_low=tyre.v_low,
             k=brake.disc.faces * brake.disc.mu_pad * brake.disc.A_cal * brake.disc.r_eff,
         )
         for wheel, tyre, brake in (
             (parts.front_wheel, parts.front_tyre, par.front),
             (parts.rear_wheel, parts.rear_tyre, par.rear),
         )
-    ]  # fmt: skip
+    ]
     names = ("m", "g", "L", "h", "h_a", "l_f", "CdA", "rho", "tau_N")
     shared = {name: body[name] for name in names}
     circuit = par.front.circuit
     assert par.rear.circuit == circuit
-    return TwoWheeler(
-        (wheels[0], wheels[1]), surface, **shared, f_n=circuit.f_n, zeta=circuit.zeta
-    )
+    return TwoWheeler((wheels[0], wheels[1]), surface, **shared, f_n=circuit.f_n, zeta=circuit.zeta)
 
 
 def demanded(rate: float) -> Any:

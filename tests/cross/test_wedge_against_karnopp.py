@@ -107,9 +107,13 @@ def test_karnopp_converges_to_the_package_as_the_band_falls() -> None:
     assert rms(run, reference("moment pulses"), "x") < 0.05 * found[-1]
 
 
-@pytest.mark.parametrize(("name", "nanometers"), [
-    ("moment pulses", 0.001), pytest.param("release", 0.1, marks=pytest.mark.trust),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "nanometers"),
+    [
+        ("moment pulses", 0.001),
+        pytest.param("release", 0.1, marks=pytest.mark.trust),
+    ],
+)
 def test_the_reference_is_converged(name: str, nanometers: float) -> None:
     coarse, fine = (reference(name, step=step) for step in (2e-6, 1e-6))
     assert rms(coarse, fine, "x") < nanometers * NANOMETER

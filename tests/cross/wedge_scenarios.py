@@ -74,14 +74,20 @@ SCENARIOS = {
         300.0, 300.0, 0.0, 0.4, changes={"flywheel.Omega_0": 2.0}, step=1e-6
     ),
     "disc stops, pads stick": Scenario(
-        300.0, 300.0, 0.0, 0.4,
+        300.0,
+        300.0,
+        0.0,
+        0.4,
         # The reference finds a stop to 1 nm only, where this speed is lower.
-        changes={"flywheel.Omega_0": 2.0, "wedge_friction.stopped_disc": "stick",
-                 "flywheel.Omega_still": 1e-3},
+        changes={
+            "flywheel.Omega_0": 2.0,
+            "wedge_friction.stopped_disc": "stick",
+            "flywheel.Omega_still": 1e-3,
+        },
         step=1e-6,
     ),
     "runaway to the end stop": Scenario(950.0, 950.0, 0.0, 0.6, mu_B=0.6, power_off=0.3),
-}  # fmt: skip
+}
 
 
 @cache

@@ -11,9 +11,14 @@ from bywire.data.writing import write_measurement
 
 NEEDS = {"parquet": "pyarrow", "mat73": "h5py", "mdf4": "asammdf"}
 FORMATS = {
-    "csv": ".csv", "tsv": ".tsv", "parquet": ".parquet", "mat": ".mat", "mat73": ".mat",
-    "mdf4": ".mf4", "netcdf": ".nc",
-}  # fmt: skip
+    "csv": ".csv",
+    "tsv": ".tsv",
+    "parquet": ".parquet",
+    "mat": ".mat",
+    "mat73": ".mat",
+    "mdf4": ".mf4",
+    "netcdf": ".nc",
+}
 
 
 def measurement(size: int = 400, seed: int = 0) -> xr.Dataset:

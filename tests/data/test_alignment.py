@@ -135,8 +135,11 @@ def test_jitter_is_the_largest_distance_from_the_median_step():
         ({"interval": "0 s"}, ParameterError, "interval = '0 s' is not admissible"),
         ({"interval": 1e-12}, ParameterError, "would make 2e[+]12 samples of each signal"),
         ({"interval": 2e-9}, ParameterError, r"14.9 GiB, and .* GiB are made at most"),
-        ({"interval": 0.1, "signals": ["high"], "exclude": ["clipped"]}, ParameterError,
-         "high has no value that is not excluded .clipped.: check its limits"),
+        (
+            {"interval": 0.1, "signals": ["high"], "exclude": ["clipped"]},
+            ParameterError,
+            "high has no value that is not excluded .clipped.: check its limits",
+        ),
         ({"interval": 1, "max_gap": -1}, ParameterError, "max_gap = -1"),
         ({"interval": 1, "method": "linaer"}, UnknownNameError, "did you mean 'linear'"),
         ({"interval": 1, "exclude": ["gap"]}, UnknownNameError, "did you mean 'gaps'"),
@@ -149,9 +152,11 @@ def test_jitter_is_the_largest_distance_from_the_median_step():
 def test_refused_alignments(options, kind, text):
     t = [0, 1, 2]
     data = measurement(
-        a=(t, t), late=([5, 6], [1, 2]), none=(t, [np.nan, 1, np.nan]),
+        a=(t, t),
+        late=([5, 6], [1, 2]),
+        none=(t, [np.nan, 1, np.nan]),
         high=(t, [7, 8, 9], {"valid_min": 0.0, "valid_max": 5.0}),
-    )  # fmt: skip
+    )
     with pytest.raises(kind, match=text):
         resample(data, **{"signals": ["a"], **options})
 

@@ -89,9 +89,12 @@ def words(endless: Path, tmp_path: Path) -> Callable[[str], list[str]]:
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 @pytest.mark.parametrize("command", COMMANDS)
 def test_ctrl_c_ends_every_command_at_once(
-    words: Callable[[str], list[str]], tmp_path: Path, command: str,
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+    words: Callable[[str], list[str]],
+    tmp_path: Path,
+    command: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     children, within = [], limited_source.Child.within
 
     def interrupted(child: limited_source.Child, seconds: float) -> AbstractContextManager[None]:
@@ -118,9 +121,11 @@ def test_ctrl_c_ends_a_process_and_those_that_it_started(
     words: Callable[[str], list[str]], tmp_path: Path
 ) -> None:
     with subprocess.Popen(
-        [sys.executable, "-m", "bywire.cli", *words("convert")], stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
+        [sys.executable, "-m", "bywire.cli", *words("convert")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
         wait_for_reader(process)
         process.send_signal(signal.SIGINT)
         started = time.monotonic()

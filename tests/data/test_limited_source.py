@@ -161,9 +161,12 @@ def test_the_child_ends_with_ctrl_c(tmp_path):
     path.write_text("late spin")
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     with subprocess.Popen(
-        [sys.executable, "-c", SCRIPT, str(path), here], stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL, text=True, env=environment,
-    ) as parent:  # fmt: skip
+        [sys.executable, "-c", SCRIPT, str(path), here],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env=environment,
+    ) as parent:
         group = int(parent.stdout.readline())
         time.sleep(0.3)
         os.killpg(group, 0)  # it runs, with the one that it forked

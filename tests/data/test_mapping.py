@@ -90,16 +90,22 @@ def test_refused_mapping_files(tmp_path, content, text):
 @pytest.mark.parametrize(
     ("mapping", "kind", "text"),
     [
-        ({"signals": {"q": {"column": "p_sensr"}}}, FileError,
-         r"no column 'p_sensr' \(signals.q.column\): is it 'p_sensor'\? its columns are t, p_sens"),
-        ({"signals": {"p_sensor": {"unit": "MPa"}}}, UnitError,
-         "the file says 'bar' and the mapping 'MPa'"),
+        (
+            {"signals": {"q": {"column": "p_sensr"}}},
+            FileError,
+            r"no column 'p_sensr' \(signals.q.column\): is it 'p_sensor'\? its columns are t,",
+        ),
+        (
+            {"signals": {"p_sensor": {"unit": "MPa"}}},
+            UnitError,
+            "the file says 'bar' and the mapping 'MPa'",
+        ),
         ({"time": {"column": "clock", "unit": "s"}}, FileError, r"no column 'clock' \(time.col"),
         ({"time": {"column": "p_sensor"}}, UnitError, "'bar' is no unit of time"),
         ({"format": "cvs"}, UnknownNameError, "unknown file format 'cvs': did you mean 'csv'"),
         ({"format": "mdf4"}, FileError, "holds a text table, not an MDF file as format = 'mdf4'"),
     ],
-)  # fmt: skip
+)
 def test_mappings_that_do_not_fit_the_file(tmp_path, mapping, kind, text):
     path = tmp_path / "a.csv"
     path.write_text("t [s],p_sensor [bar]\n0,1\n1,2\n")

@@ -59,8 +59,7 @@ def test_cut_files(tmp_path, name):
 def test_a_table_that_ends_within_a_number(tmp_path, number, mark, lost, text):
     """A missing line end alone is no damage, nor is a short number that has one."""
     path = tmp_path / "a.csv"
-    rows = [f"{0.01 * k:.2f};{number.format(0.1234 * k * (1 + 1e-12))}"
-            for k in range(40)]  # fmt: skip
+    rows = [f"{0.01 * k:.2f};{number.format(0.1234 * k * (1 + 1e-12))}" for k in range(40)]
     whole = "\n".join(["time [s];y [m]", *rows]).replace(".", mark)
     path.write_text(whole)
     assert read_measurement(path)["y"].size == 40
@@ -74,8 +73,10 @@ def test_a_table_that_ends_within_a_number(tmp_path, number, mark, lost, text):
 def test_a_cut_shows_beside_a_number_that_is_as_short(tmp_path):
     """A few short ones, as where a ride begins at rest, do not hide it; many do."""
     path, rng = tmp_path / "a.csv", np.random.default_rng(2)
-    for number, text in ((lambda v: repr(float(v)), "are longer"),
-                         ("{:.4f}".format, "have more decimals")):  # fmt: skip
+    for number, text in (
+        (lambda v: repr(float(v)), "are longer"),
+        ("{:.4f}".format, "have more decimals"),
+    ):
         cells = ["0", "0", *(number(0.1 + 0.1 * v) for v in rng.uniform(size=70))]
         rows = [f"{0.01 * k:.2f},{cell}" for k, cell in enumerate([*cells, "0.12"])]
         path.write_text("\n".join(["time [s],y [m]", *rows]))
@@ -165,8 +166,9 @@ def test_bombs_are_sound():
 def mat_bomb():
     """Return a compressed element that inflates to 512 MB of zeros."""
     size = 512 * len(PIECE)
-    head = struct.pack("<II", 14, size + 64) + mat_element((1, size // 8),
-                                                           struct.pack("<II", 9, size))  # fmt: skip
+    head = struct.pack("<II", 14, size + 64) + mat_element(
+        (1, size // 8), struct.pack("<II", 9, size)
+    )
     return packed(head, 512)
 
 
@@ -204,8 +206,11 @@ def test_netcdf_files_are_not_read_as_bare_hdf5(tmp_path, ending):
     """Their numbers may be packed, and HDF5 would give them as they are stored."""
     pytest.importorskip("h5py")
     path = tmp_path / f"a{ending}"
-    measurement().to_netcdf(path, engine="netcdf4", encoding={"x_mc": {"dtype": "i2",
-                            "scale_factor": 1e-3, "_FillValue": -32768}})  # fmt: skip
+    measurement().to_netcdf(
+        path,
+        engine="netcdf4",
+        encoding={"x_mc": {"dtype": "i2", "scale_factor": 1e-3, "_FillValue": -32768}},
+    )
     with pytest.raises(FileError, match="is a NetCDF file: rename it"):
         read_measurement(path)
     np.testing.assert_allclose(
@@ -258,8 +263,9 @@ def test_mdf_records_in_a_block_that_cannot_be_inflated(tmp_path):
     """The library stops there without a word, and leaves whatever lies in memory."""
     asammdf = pytest.importorskip("asammdf")
     time, path = np.arange(6000) * 1e-3, tmp_path / "a.mf4"
-    before = {key: asammdf.get_global_option(key) for key in ("read_fragment_size",
-                                                              "write_fragment_size")}  # fmt: skip
+    before = {
+        key: asammdf.get_global_option(key) for key in ("read_fragment_size", "write_fragment_size")
+    }
     try:
         for key in before:
             asammdf.set_global_option(key, 8192)

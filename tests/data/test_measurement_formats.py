@@ -121,8 +121,14 @@ def test_signals_without_units_are_pure_numbers_over_seconds(tmp_path, name):
 def test_mat_files_of_scipy(tmp_path):
     table = np.stack([VALUES, 2 * VALUES], axis=1)
     nested = {"a": VALUES.astype(np.float32), "b": {"c": np.arange(300, dtype=np.int16)}}
-    content = {"t": TIME, "y": table, "log": nested, "note": "rig 3", "n": 7.0,
-               "cells": np.array(["a", "bb"], dtype=object)}  # fmt: skip
+    content = {
+        "t": TIME,
+        "y": table,
+        "log": nested,
+        "note": "rig 3",
+        "n": 7.0,
+        "cells": np.array(["a", "bb"], dtype=object),
+    }
     signals = {
         "y2": {"column": "y(:,2)", "unit": "m"},
         "a": {"column": "log.a", "unit": "N"},
@@ -165,10 +171,14 @@ def test_hdf5_files_of_h5py(tmp_path):
 
 def test_parquet_files_of_pandas(tmp_path):
     pytest.importorskip("pyarrow")
-    frame = pd.DataFrame({
-        "t": pd.to_timedelta((TIME * 1e9).astype(np.int64), unit="ns"),
-        "p": VALUES, "n": pd.array([None, *range(299)], dtype="Int64"), "text": "x",
-    })  # fmt: skip
+    frame = pd.DataFrame(
+        {
+            "t": pd.to_timedelta((TIME * 1e9).astype(np.int64), unit="ns"),
+            "p": VALUES,
+            "n": pd.array([None, *range(299)], dtype="Int64"),
+            "text": "x",
+        }
+    )
     frame.to_parquet(tmp_path / "a.parquet")
     mapping = {"time": "t", "signals": {"p": {"unit": "Pa"}, "n": {"unit": "1"}}}
     found = read_measurement(tmp_path / "a.parquet", mapping)
@@ -191,12 +201,14 @@ def test_mdf_files_of_asammdf(tmp_path):
     linear, formula = {"a": 0.5, "b": 1}, {"formula": "X1*2"}
     texts = {"val_0": 0, "text_0": "off", "val_1": 1, "text_1": "on"}
     with asammdf.MDF(version="4.10") as file:
-        file.append([
-            asammdf.Signal(VALUES, TIME, name="p", unit="Pa", invalidation_bits=VALUES > 1),
-            asammdf.Signal(counts, TIME, name="u", unit="V", conversion=convert(linear)),
-            asammdf.Signal(states, TIME, name="on", conversion=convert(texts)),
-            asammdf.Signal(counts, TIME, name="f", unit="V", conversion=convert(formula)),
-        ])  # fmt: skip
+        file.append(
+            [
+                asammdf.Signal(VALUES, TIME, name="p", unit="Pa", invalidation_bits=VALUES > 1),
+                asammdf.Signal(counts, TIME, name="u", unit="V", conversion=convert(linear)),
+                asammdf.Signal(states, TIME, name="on", conversion=convert(texts)),
+                asammdf.Signal(counts, TIME, name="f", unit="V", conversion=convert(formula)),
+            ]
+        )
         file.append([asammdf.Signal(VALUES[:30], 7 * TIME[:30], name="p", unit="Pa")])
         file.save(tmp_path / "a.mf4", compression=2)
     with pytest.warns(MeasurementWarning) as warned:

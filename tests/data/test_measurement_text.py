@@ -32,12 +32,16 @@ def written(tmp_path, content, name="run.csv"):
         ("t\tx\tp\n[ms]\t[mm]\t[bar]\n0\t1,5\t20\n10\t2,5\t\n", None),
         ("t;note;x;p\ns;;mm;bar\n0;a;1.5;20\n\n0.01;;2.5;\n", None),
         ("0\t1.5\t20\n10\t2.5\t\n", PLAIN),
-        ('"0","1,5","20"\n"10","2,5",""\n'.replace(",", ";").replace("1;5", "1,5")
-         .replace("2;5", "2,5"), PLAIN),
+        (
+            '"0","1,5","20"\n"10","2,5",""\n'.replace(",", ";")
+            .replace("1;5", "1,5")
+            .replace("2;5", "2,5"),
+            PLAIN,
+        ),
         ("Rig 3, hot\nby night\n0,1.5,20,\n10,2.5,,\n", {**PLAIN, "skip_lines": 2}),
     ],
     ids=["plain", "commas", "units row", "text column", "no header", "quotes", "preamble"],
-)  # fmt: skip
+)
 def test_the_same_measurement_in_many_dialects(tmp_path, content, mapping):
     chosen = ["x", "p"]
     if mapping is None and "note" in content:

@@ -11,9 +11,13 @@ from bywire.data.recursive_filter import filtered
 
 @pytest.mark.parametrize(
     ("b", "a"),
-    [([0.2], [1.0, -0.8]), ([1.0], [1.0, -1.6, 0.9, -0.1]), ([0.3, 0.1, -0.2], [1.0, -0.5]),
-     ([0.5, 0.5], [1.0])],
-)  # fmt: skip
+    [
+        ([0.2], [1.0, -0.8]),
+        ([1.0], [1.0, -1.6, 0.9, -0.1]),
+        ([0.3, 0.1, -0.2], [1.0, -0.5]),
+        ([0.5, 0.5], [1.0]),
+    ],
+)
 def test_a_filter_is_scipys(b: list[float], a: list[float]) -> None:
     x = np.random.default_rng(1).standard_normal((9000, 2))
     np.testing.assert_allclose(filtered(b, a, x), signal.lfilter(b, a, x, axis=0), atol=1e-12)

@@ -25,9 +25,10 @@ sys.path.insert(0, str(DOCS))
 from site_pages import commands, markdown, pages, papers  # noqa: E402  beside what they describe
 
 WRITTEN = [
-    page for page in sorted(DOCS.rglob("*.md"))
+    page
+    for page in sorted(DOCS.rglob("*.md"))
     if not {"_build", "_generated", "trust"} & set(page.parts)
-]  # fmt: skip
+]
 
 
 @pytest.fixture(scope="module")

@@ -38,9 +38,12 @@ def _holds_its_pressure() -> None:
         {"seal.F_pr": 0.0, "seal.f_p": 0.0, "seal.f_n": 0.0, "gear.eta": 1.0, "rack.eta": 1.0}
     )
     run = bywire.Run(
-        HydraulicBrake(), par, *held(par, 30e5), duration=0.1,
+        HydraulicBrake(),
+        par,
+        *held(par, 30e5),
+        duration=0.1,
         stimulus=lambda t: np.full((t.size, len(Stimulus._fields)), 30e5),
-    )  # fmt: skip
+    )
     assert np.ptp(bywire.simulate(run)["p_mc"]) < 1e-4  # Pa
 
 

@@ -15,8 +15,11 @@ ROWS = [row for rows in MAKER["TABLES"].values() for row in rows]
 def wrong_ones(rows):
     """Return rows that agree in spite of a reason why not, or do not, without one."""
     values = [(row, row.computed()) for row in rows]
-    return [(row.fault, row.what, value) for row, value in values
-            if row.agrees(value) == bool(row.because)]  # fmt: skip
+    return [
+        (row.fault, row.what, value)
+        for row, value in values
+        if row.agrees(value) == bool(row.because)
+    ]
 
 
 def test_the_cheap_rows_agree_or_say_why_not():

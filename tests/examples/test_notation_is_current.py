@@ -34,9 +34,10 @@ def test_symbols_follow_from_names(name: str, symbol: str) -> None:
 
 
 PAGES = [
-    page for page in sorted((ROOT / "docs").rglob("*.md"))
+    page
+    for page in sorted((ROOT / "docs").rglob("*.md"))
     if not {"_build", "_generated"} & set(page.parts)
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -116,10 +116,17 @@ def option(rng: Random, folder: Path) -> Verdict:
 
 
 KINDS: dict[str, Callable[[Random, Path], Verdict]] = {
-    "bench": bench, "command": command, "extreme": extreme, "measurement": measurement,
-    "faulty": faulty, "campaign": campaign, "study": study, "life": life, "option": option,
+    "bench": bench,
+    "command": command,
+    "extreme": extreme,
+    "measurement": measurement,
+    "faulty": faulty,
+    "campaign": campaign,
+    "study": study,
+    "life": life,
+    "option": option,
     "layout": layouts.case,
-}  # fmt: skip
+}
 
 
 LEAST = 4

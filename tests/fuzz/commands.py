@@ -12,19 +12,48 @@ import xarray as xr
 from bywire.data.writing import write_measurement
 from fuzz import sound
 
-_LOOPS = {"current": "dardanelli2010", "pressure": "dardanelli2010", "position": "roberts2003",
-          "moment": "roberts2003", "drive-current": "roberts2003", "screw-position": "roberts2003",
-          "force-fight": "roberts2003", "force-against": "roberts2003"}  # fmt: skip
+_LOOPS = {
+    "current": "dardanelli2010",
+    "pressure": "dardanelli2010",
+    "position": "roberts2003",
+    "moment": "roberts2003",
+    "drive-current": "roberts2003",
+    "screw-position": "roberts2003",
+    "force-fight": "roberts2003",
+    "force-against": "roberts2003",
+}
 _PLANTS = {"motorcycle-plant": "dardanelli2010", "wedge-plant": "roberts2003"}
-_WORDS = ("battery", "seal", "motor.R_m", "experiments", "dither", "wedge-brake", "step", "sine",
-          "overshoot", "hard-braking", "pressure", "identification")  # fmt: skip
+_WORDS = (
+    "battery",
+    "seal",
+    "motor.R_m",
+    "experiments",
+    "dither",
+    "wedge-brake",
+    "step",
+    "sine",
+    "overshoot",
+    "hard-braking",
+    "pressure",
+    "identification",
+)
 _VARIED = {"dardanelli2010": ("motor.R_m", 0.35, "ohm"), "roberts2003": ("wedge.M_W", 0.5, "kg")}
 
 
 def command(rng: Random, folder: Path) -> list[str]:
     """Return a command; measurements that it reads lie in the folder then."""
-    makers = {_run: 4, _over: 2, _compare: 1, _margins: 3, _linearize: 2, _response: 1, _convert: 2,
-              _replay: 2, _identify: 1, _list: 1}  # fmt: skip
+    makers = {
+        _run: 4,
+        _over: 2,
+        _compare: 1,
+        _margins: 3,
+        _linearize: 2,
+        _response: 1,
+        _convert: 2,
+        _replay: 2,
+        _identify: 1,
+        _list: 1,
+    }
     (make,) = rng.choices(list(makers), list(makers.values()))
     maker: Callable[[Random, Path], list[str]] = make
     return maker(rng, folder)
@@ -54,8 +83,15 @@ def _over(rng: Random, _: Path) -> list[str]:
 def _compare(rng: Random, _: Path) -> list[str]:
     duration = sound.text(rng, rng.choice((20e-3, 30e-3)), "s")
     other = rng.choice(("current-step", "hard-braking", "pressure-release"))
-    return ["compare", "hard-braking", other,
-            "--set", f"options.duration={duration}", "--set", "simulation.step=50 us"]  # fmt: skip
+    return [
+        "compare",
+        "hard-braking",
+        other,
+        "--set",
+        f"options.duration={duration}",
+        "--set",
+        "simulation.step=50 us",
+    ]
 
 
 def _sets(rng: Random, name: str) -> list[str]:
@@ -78,15 +114,25 @@ def _linearize(rng: Random, _: Path) -> list[str]:
     name = rng.choice(sorted(systems))
     words = ["linearize", name, "--parameters", systems[name], *_sets(rng, systems[name])]
     if name in _PLANTS and rng.random() < 0.5:
-        words += rng.choice((["--reduce", "4"], ["--friction", "stuck"],
-                             ["--friction", "sliding", "--speed", "5 rad/s"]))  # fmt: skip
+        words += rng.choice(
+            (
+                ["--reduce", "4"],
+                ["--friction", "stuck"],
+                ["--friction", "sliding", "--speed", "5 rad/s"],
+            )
+        )
     return words
 
 
 def _response(rng: Random, _: Path) -> list[str]:
     first = rng.uniform(50.0, 150.0)
-    return ["frequency-response", "current", "--frequencies", f"{first:.4g} Hz, {2 * first:.4g} Hz",
-            *_sets(rng, "dardanelli2010")]  # fmt: skip
+    return [
+        "frequency-response",
+        "current",
+        "--frequencies",
+        f"{first:.4g} Hz, {2 * first:.4g} Hz",
+        *_sets(rng, "dardanelli2010"),
+    ]
 
 
 def _measured(rng: Random, folder: Path) -> Path:
@@ -94,10 +140,12 @@ def _measured(rng: Random, folder: Path) -> Path:
     time = np.arange(rng.randrange(40, 120)) * 1e-3
     swing = np.sin(2 * np.pi * rng.uniform(2.0, 20.0) * time)
     data = xr.Dataset(
-        {"p_mc": ("time", 1e5 * (10.0 + rng.uniform(0.0, 5.0) * swing), {"units": "Pa"}),
-         "i": ("time", rng.uniform(0.0, 3.0) * swing, {"units": "A"})},
+        {
+            "p_mc": ("time", 1e5 * (10.0 + rng.uniform(0.0, 5.0) * swing), {"units": "Pa"}),
+            "i": ("time", rng.uniform(0.0, 3.0) * swing, {"units": "A"}),
+        },
         coords={"time": ("time", time, {"units": "s"})},
-    )  # fmt: skip
+    )
     path = folder / f"measured{rng.choice(('.csv', '.tsv', '.nc', '.mat', '.parquet'))}"
     write_measurement(data, path, overwrite=True)
     return path
@@ -114,8 +162,15 @@ def _convert(rng: Random, folder: Path) -> list[str]:
 
 
 def _replay(rng: Random, folder: Path) -> list[str]:
-    words = ["replay", str(_measured(rng, folder)), "--bench", "hard-braking",
-             "--input", "p_set=p_mc", *_sets(rng, "dardanelli2010")]  # fmt: skip
+    words = [
+        "replay",
+        str(_measured(rng, folder)),
+        "--bench",
+        "hard-braking",
+        "--input",
+        "p_set=p_mc",
+        *_sets(rng, "dardanelli2010"),
+    ]
     if rng.random() < 0.5:
         words += ["--output", rng.choice(("p_mc", "i"))]
     if rng.random() < 0.3:

@@ -74,10 +74,15 @@ def _listed(rng: Random) -> str:
 def campaign_text(rng: Random) -> str:
     """Return a campaign file, of a braking of 60 ms."""
     mode = rng.choice(sorted(modes("dardanelli2010").values(), key=lambda each: each.name))
-    lines = ['bench = "hard-braking"', "[set]", '"options.duration" = "60 ms"',
-             '"options.settle" = "10 ms"', "[campaign]",
-             f"healthy = {rng.choice((4, 4, 4, 6, 6, 3))}",
-             f"only = {_listed(rng)}"]  # fmt: skip
+    lines = [
+        'bench = "hard-braking"',
+        "[set]",
+        '"options.duration" = "60 ms"',
+        '"options.settle" = "10 ms"',
+        "[campaign]",
+        f"healthy = {rng.choice((4, 4, 4, 6, 6, 3))}",
+        f"only = {_listed(rng)}",
+    ]
     for key in ("onset", "spread", "false_alarms"):
         if rng.random() < 0.4:
             few = _SHARES if key == "false_alarms" else _TIMES
@@ -102,6 +107,11 @@ def campaign_text(rng: Random) -> str:
         signal = rng.choice(("p_pd",) * 8 + ("i", "x"))
         level = "50 %" if sense == "below_share" else "1 A" if signal == "i" else "1 bar"
         level = inputs.value(rng) if rng.random() < 0.1 else level
-        lines += ["[[criteria]]", f'name = "c{k}"', f'signal = "{signal}"',
-                  f"{sense} = {_written(level)}", f'lasting = "{rng.choice(_TIMES)}"']  # fmt: skip
+        lines += [
+            "[[criteria]]",
+            f'name = "c{k}"',
+            f'signal = "{signal}"',
+            f"{sense} = {_written(level)}",
+            f'lasting = "{rng.choice(_TIMES)}"',
+        ]
     return "\n".join(lines) + "\n"

@@ -27,9 +27,12 @@ class Forked:
     """
 
     def __init__(
-        self, words: Sequence[str], errors: Path, folder: Path | None = None,
+        self,
+        words: Sequence[str],
+        errors: Path,
+        folder: Path | None = None,
         temporary: Path | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.returncode: int | None = None
         self._errors = errors
         errors.touch()  # it may be killed before it says anything

@@ -18,16 +18,75 @@ from fuzz import commands, sound
 
 ENDINGS = (".csv", ".tsv", ".nc", ".mat", ".h5", ".parquet", ".mf4")
 _NUMBERS = (
-    "0", "-1", "1", "1e-300", "1e300", "5e-324", "1.7e308", "1e400", "nan", "inf", "-inf",
-    "365.9670339332694", "1.3e19", "0.1234567891234567", "1e-9", "9007199254740993", "3.2e-19",
+    "0",
+    "-1",
+    "1",
+    "1e-300",
+    "1e300",
+    "5e-324",
+    "1.7e308",
+    "1e400",
+    "nan",
+    "inf",
+    "-inf",
+    "365.9670339332694",
+    "1.3e19",
+    "0.1234567891234567",
+    "1e-9",
+    "9007199254740993",
+    "3.2e-19",
     "1" + 400 * "0",
-    "true", "[]", "{}", "[1, 2]", "1979-05-27", '""', '"\\u0000"', "0x10", "1_000",
-)  # fmt: skip
-_UNITS = ("", " s", " mm", " bar", " Pa", " ohm", " V", " A", " %", " N*m", " kg", " rad/s", " Hz",
-          " furlong", " m^3/(s*Pa)", " °C", " ns", " 1/0", " s s", " s**1e9")  # fmt: skip
-_NAMES = ("x" * 400, "", " ", "a.b.c", "motor.R_m ", "motor.r_m", "../../x", "\u202e", "\x1b[31m",
-          "options.duration", "simulation.step", "simulation.record", "simulation.seed",
-          "requirements.overshoot", "stimulus.kind", "parameters", "experiment")  # fmt: skip
+    "true",
+    "[]",
+    "{}",
+    "[1, 2]",
+    "1979-05-27",
+    '""',
+    '"\\u0000"',
+    "0x10",
+    "1_000",
+)
+_UNITS = (
+    "",
+    " s",
+    " mm",
+    " bar",
+    " Pa",
+    " ohm",
+    " V",
+    " A",
+    " %",
+    " N*m",
+    " kg",
+    " rad/s",
+    " Hz",
+    " furlong",
+    " m^3/(s*Pa)",
+    " °C",
+    " ns",
+    " 1/0",
+    " s s",
+    " s**1e9",
+)
+_NAMES = (
+    "x" * 400,
+    "",
+    " ",
+    "a.b.c",
+    "motor.R_m ",
+    "motor.r_m",
+    "../../x",
+    "\u202e",
+    "\x1b[31m",
+    "options.duration",
+    "simulation.step",
+    "simulation.record",
+    "simulation.seed",
+    "requirements.overshoot",
+    "stimulus.kind",
+    "parameters",
+    "experiment",
+)
 DEFECTS = 0.25
 """share of benches and commands with a defect"""
 
@@ -72,17 +131,23 @@ def with_defect(rng: Random, entries: sound.Entries) -> sound.Entries:
     kept = {name: text for name, text in entries.items() if name != key}
     text, unit = entries[key], rng.choice(_UNITS)
     quantity = text.partition(" ")[0]
-    return kept | rng.choice((
-        {key: value(rng)},
-        {key: number(rng) + text.removeprefix(quantity)},
-        {key: quantity + unit},
-        {key: f"-{text}"},
-        {key: text[: rng.randrange(len(text))]},
-        {key: f"{text}, {text}"},
-        {rng.choice(_NAMES): text},
-        {key[: rng.randrange(len(key))] + rng.choice("xR.") + key[rng.randrange(len(key)) :]: text},
-        {key: text, f"simulation.{rng.choice(('step', 'record', 'seed', 'stpe'))}": value(rng)},
-    ))  # fmt: skip
+    return kept | rng.choice(
+        (
+            {key: value(rng)},
+            {key: number(rng) + text.removeprefix(quantity)},
+            {key: quantity + unit},
+            {key: f"-{text}"},
+            {key: text[: rng.randrange(len(text))]},
+            {key: f"{text}, {text}"},
+            {rng.choice(_NAMES): text},
+            {
+                key[: rng.randrange(len(key))]
+                + rng.choice("xR.")
+                + key[rng.randrange(len(key)) :]: text
+            },
+            {key: text, f"simulation.{rng.choice(('step', 'record', 'seed', 'stpe'))}": value(rng)},
+        )
+    )
 
 
 def bench_text(rng: Random) -> tuple[str, bool]:
@@ -104,16 +169,28 @@ def command_line(rng: Random, folder: Path) -> tuple[list[str], bool]:
     if rng.random() > DEFECTS:
         return words, True
     k = rng.randrange(len(words))
-    other = rng.choice((
-        rng.choice(_NAMES), value(rng), "--", "--out", "--json", "-x", "", words[k] + "x",
-        words[k][: len(words[k]) // 2], rng.choice(words),
-    ))  # fmt: skip
+    other = rng.choice(
+        (
+            rng.choice(_NAMES),
+            value(rng),
+            "--",
+            "--out",
+            "--json",
+            "-x",
+            "",
+            words[k] + "x",
+            words[k][: len(words[k]) // 2],
+            rng.choice(words),
+        )
+    )
     kind = rng.randrange(4)
     words = (
-        [*words[:k], other, *words[k + 1 :]] if kind < 2
-        else [*words[:k], other, *words[k:]] if kind == 2
+        [*words[:k], other, *words[k + 1 :]]
+        if kind < 2
+        else [*words[:k], other, *words[k:]]
+        if kind == 2
         else [*words[:k], *words[k + 1 :]]
-    )  # fmt: skip
+    )
     return [word.replace("\x00", "") for word in words], False
 
 
@@ -122,10 +199,12 @@ def sound_file(ending: str, folder: Path) -> bytes:
     """Return a small measurement in a format."""
     time = np.arange(60) * 1e-3
     data = xr.Dataset(
-        {"p_mc": ("time", 1e5 + 1e3 * np.sin(time * 50.0), {"units": "Pa", "long_name": "p"}),
-         "x_mc": ("time", 1e-3 * time, {"units": "m"})},
+        {
+            "p_mc": ("time", 1e5 + 1e3 * np.sin(time * 50.0), {"units": "Pa", "long_name": "p"}),
+            "x_mc": ("time", 1e-3 * time, {"units": "m"}),
+        },
         coords={"time": ("time", time, {"units": "s"})},
-    )  # fmt: skip
+    )
     path = folder / f"sound{ending}"
     formats = {".h5": "mat73"}
     if ending == ".h5":
@@ -168,15 +247,35 @@ def damaged(rng: Random, content: bytes) -> bytes:
 def table(rng: Random) -> bytes:
     """Return a text table of odd cells."""
     separator = rng.choice((",", ";", "\t", " "))
-    cells = ("1", "2.5", "1,5", "", "nan", "inf", '"1"', '"1', "1e999", "x", "1979-05-27", "\u0661",
-             "0" * 300, "-", "1 2")  # fmt: skip
+    cells = (
+        "1",
+        "2.5",
+        "1,5",
+        "",
+        "nan",
+        "inf",
+        '"1"',
+        '"1',
+        "1e999",
+        "x",
+        "1979-05-27",
+        "\u0661",
+        "0" * 300,
+        "-",
+        "1 2",
+    )
     head = separator.join(rng.sample(("time [s]", "pedal [mm]", "p [bar]", "x", "", "t [ms]"), 3))
     rows = [
-        separator.join(f"{k * 0.01:.2f}" if c == 0 and rng.random() < 0.97
-                       else rng.choice(cells) if rng.random() < 0.02 else f"{rng.random():.3f}"
-                       for c in range(3 if rng.random() < 0.99 else 4))
+        separator.join(
+            f"{k * 0.01:.2f}"
+            if c == 0 and rng.random() < 0.97
+            else rng.choice(cells)
+            if rng.random() < 0.02
+            else f"{rng.random():.3f}"
+            for c in range(3 if rng.random() < 0.99 else 4)
+        )
         for k in range(rng.randrange(60))
-    ]  # fmt: skip
+    ]
     end = rng.choice(("\n", "\r\n", ""))
     return ("\n".join([head, *rows]) + end).encode(
         rng.choice(("utf-8", "utf-16", "latin-1")), "replace"

@@ -86,9 +86,11 @@ def judged(words: Sequence[str]) -> Verdict:
     status: Any = None
     try:
         with (
-            limited(), kept_results() as results,
-            contextlib.redirect_stdout(out), contextlib.redirect_stderr(err),
-        ):  # fmt: skip
+            limited(),
+            kept_results() as results,
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(err),
+        ):
             try:
                 main()
             except SystemExit as ended:
@@ -105,10 +107,13 @@ def judged_alone(words: Sequence[str]) -> str:
     """Run a command in a process of its own too, and return what is not the same there."""
     here = judged(words)
     process = subprocess.run(
-        [sys.executable, "-m", "bywire.cli", *words, "--json"], capture_output=True, text=True,
-        timeout=10 * SECONDS, check=False,
+        [sys.executable, "-m", "bywire.cli", *words, "--json"],
+        capture_output=True,
+        text=True,
+        timeout=10 * SECONDS,
+        check=False,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-    )  # fmt: skip
+    )
     out, err = io.StringIO(process.stdout), io.StringIO(process.stderr)
     if process.returncode != here.status:
         return f"status {here.status} here, {process.returncode} in its process: {words}"

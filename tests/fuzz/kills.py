@@ -18,8 +18,16 @@ from fuzz.judge import judged
 
 WRITERS = {
     "run": ["run", "hard-braking", "--set", "options.duration=40 ms", "--out", "{out}"],
-    "ramp": ["run", "friction-ramp", "--set", "options.slope=2 A/s",
-             "--set", "options.i_max=0.1 A", "--out", "{out}"],
+    "ramp": [
+        "run",
+        "friction-ramp",
+        "--set",
+        "options.slope=2 A/s",
+        "--set",
+        "options.i_max=0.1 A",
+        "--out",
+        "{out}",
+    ],
     "stribeck": ["run", "seal-stribeck", "--out", "{out}"],
     "identify": ["identify", "seal-friction", "--synthetic", "1", "--out", "{out}"],
     "study": ["identify", "seal-friction", "--study", "3", "--out", "{out}"],
@@ -33,13 +41,28 @@ WRITERS = {
     "tolerances": ["study", "run", "{folder}/study.toml", "--out", "{out}"],
     "resume": ["study", "resume", "{out}"],
     "reproduce": ["reproduce", "roberts2003", "--out", "{out}"],
-    "replay": ["replay", "{folder}/measured.csv", "--bench", "hard-braking",
-               "--input", "p_set=p_mc", "--out", "{out}"],
+    "replay": [
+        "replay",
+        "{folder}/measured.csv",
+        "--bench",
+        "hard-braking",
+        "--input",
+        "p_set=p_mc",
+        "--out",
+        "{out}",
+    ],
     "agreement": ["agreement", "current", "--frequencies", "100 Hz, 200 Hz", "--out", "{out}"],
-    "compare": ["compare", "hard-braking", "release", "--set", "options.duration=40 ms",
-                "--out", "{out}"],
+    "compare": [
+        "compare",
+        "hard-braking",
+        "release",
+        "--set",
+        "options.duration=40 ms",
+        "--out",
+        "{out}",
+    ],
     "check": ["check", "adc", "--out", "{out}"],
-}  # fmt: skip
+}
 _LONGEST = 120.0
 _CASES = 600  # of a study that goes on: several chunks
 _FORKED = 0.9  # of the commands
@@ -54,9 +77,13 @@ def started(words: list[str], folder: Path, temporary: Path) -> Forked:
 def command(words: list[str], folder: Path, env: dict[str, str]) -> subprocess.Popen[str]:
     """Start a command in a folder."""
     return subprocess.Popen(
-        [sys.executable, "-m", "bywire.cli", *words], cwd=folder, env=env, text=True,
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-    )  # fmt: skip
+        [sys.executable, "-m", "bywire.cli", *words],
+        cwd=folder,
+        env=env,
+        text=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
 
 
 def case(

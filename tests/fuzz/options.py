@@ -55,12 +55,38 @@ signal = "p_mc"
 below = "1 bar"
 lasting = "5 ms"
 """
-_KEYS = ("options.duration", "options.settle", "simulation.step", "simulation.record", "motor.R_m",
-         "simulation.seed", "ecu.T_s", "options.p_to", "p_mc", "p_set", "nrmse", "bandwidth",
-         "i_max")  # fmt: skip
+_KEYS = (
+    "options.duration",
+    "options.settle",
+    "simulation.step",
+    "simulation.record",
+    "motor.R_m",
+    "simulation.seed",
+    "ecu.T_s",
+    "options.p_to",
+    "p_mc",
+    "p_set",
+    "nrmse",
+    "bandwidth",
+    "i_max",
+)
 _SEEN = ("a", "motor.R_m", "options.duration", "parameters")
-_SIZES = ("0", "-1", "1e-9", "1e-300", "5e-324", "1e9", "1e15", "1e300", "1e400", "nan", "inf",
-          "9" * 19, "9" * 400, "0." + "0" * 400 + "1")  # fmt: skip
+_SIZES = (
+    "0",
+    "-1",
+    "1e-9",
+    "1e-300",
+    "5e-324",
+    "1e9",
+    "1e15",
+    "1e300",
+    "1e400",
+    "nan",
+    "inf",
+    "9" * 19,
+    "9" * 400,
+    "0." + "0" * 400 + "1",
+)
 _UNITS = ("", " Hz", " s", " ms", " bar", " ohm", " A", " %", " rad", " m", " N*m")
 
 
@@ -117,10 +143,16 @@ def command_line(rng: Random) -> list[str]:
     command = rng.choice(sorted(set(options()) - {"benchmark", "reproduce"}))
     option = rng.choice(options()[command])
     sizes = [rng.choice(_SIZES) + rng.choice(_UNITS) for _ in range(2)]
-    text = rng.choice((
-        sizes[0], ", ".join(sizes), f"{sizes[0]}:{sizes[1]}:{rng.choice(_SIZES)}",
-        f"{rng.choice(_KEYS)}={sizes[0]}", f"{rng.choice(_KEYS)} <= {sizes[0]}",
-        f"motor.R_m={sizes[0]}:{sizes[1]}:{rng.choice(_SIZES)}", f"{rng.choice(_KEYS)}={sizes[0]}",
-        f"motor.R_m=0.3 ohm:0.4 ohm:{rng.choice(_SIZES)}",
-    ))  # fmt: skip
+    text = rng.choice(
+        (
+            sizes[0],
+            ", ".join(sizes),
+            f"{sizes[0]}:{sizes[1]}:{rng.choice(_SIZES)}",
+            f"{rng.choice(_KEYS)}={sizes[0]}",
+            f"{rng.choice(_KEYS)} <= {sizes[0]}",
+            f"motor.R_m={sizes[0]}:{sizes[1]}:{rng.choice(_SIZES)}",
+            f"{rng.choice(_KEYS)}={sizes[0]}",
+            f"motor.R_m=0.3 ohm:0.4 ohm:{rng.choice(_SIZES)}",
+        )
+    )
     return words_with(command, option, text)

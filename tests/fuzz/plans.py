@@ -29,15 +29,18 @@ def _width(rng: Random) -> str:
 
 def _distribution(rng: Random) -> str:
     """Return what a parameter's section holds."""
-    return rng.choice((
-        f'"+-{_width(rng)}"',
-        f'{{ kind = "normal", sd = "{_width(rng)}" }}',
-        f'{{ kind = "log-normal", sd = "{_width(rng)}" }}',
-        f'{{ kind = "uniform", low = "-{_width(rng)}", high = "+{_width(rng)}" }}',
-        f'{{ kind = "triangular", low = "-{_width(rng)}", high = "+{_width(rng)}" }}',
-        f'{{ kind = "tolerance", tolerance = "{_width(rng)}", shape = "normal" }}',
-        f'{{ kind = "discrete", values = ["+1 %", "-2 %"], weights = [{rng.random():.3g}, 1e3] }}',
-    ))  # fmt: skip
+    return rng.choice(
+        (
+            f'"+-{_width(rng)}"',
+            f'{{ kind = "normal", sd = "{_width(rng)}" }}',
+            f'{{ kind = "log-normal", sd = "{_width(rng)}" }}',
+            f'{{ kind = "uniform", low = "-{_width(rng)}", high = "+{_width(rng)}" }}',
+            f'{{ kind = "triangular", low = "-{_width(rng)}", high = "+{_width(rng)}" }}',
+            f'{{ kind = "tolerance", tolerance = "{_width(rng)}", shape = "normal" }}',
+            '{ kind = "discrete", values = ["+1 %", "-2 %"], '
+            f"weights = [{rng.random():.3g}, 1e3] }}",
+        )
+    )
 
 
 def _varied(rng: Random, names: Sequence[str]) -> list[str]:
@@ -57,10 +60,16 @@ def _broken(rng: Random, text: str) -> str:
     head, sign, _ = parts[part].rpartition("=")
     closing = "".join(c for c in parts[part][-3:] if c in "]}")
     parts[part] = f"{head}{sign} {other} {closing}"
-    lines[k] = rng.choice((
-        f"{name}= {other}", f"{name}={','.join(parts)}", f"{name.strip()[:-1]} ={value}",
-        f"{name}={value}\n{name}={value}", value, f"{name}={value[: len(value) // 2]}",
-    ))  # fmt: skip
+    lines[k] = rng.choice(
+        (
+            f"{name}= {other}",
+            f"{name}={','.join(parts)}",
+            f"{name.strip()[:-1]} ={value}",
+            f"{name}={value}\n{name}={value}",
+            value,
+            f"{name}={value[: len(value) // 2]}",
+        )
+    )
     return "\n".join(lines) + "\n"
 
 

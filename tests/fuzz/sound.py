@@ -19,8 +19,12 @@ from bywire.core.units import convert
 Entries = dict[str, str]
 """what a bench file says beside experiment and parameters: value by dotted key of ``--set``"""
 
-_MOTORCYCLE = ("dardanelli2010", "dardanelli2010-retuned", "dardanelli2010-table1",
-               "dardanelli2010-scheduled")  # fmt: skip
+_MOTORCYCLE = (
+    "dardanelli2010",
+    "dardanelli2010-retuned",
+    "dardanelli2010-table1",
+    "dardanelli2010-scheduled",
+)
 _WEDGE = ("roberts2003",)
 
 
@@ -49,25 +53,50 @@ TRIALS = (
     _trial("motor-open-loop", _MOTORCYCLE, "A", duration="60 ms", settle="10 ms", source="current"),
     _trial("motor-open-loop", _MOTORCYCLE, "V", duration="60 ms", settle="10 ms", source="voltage"),
     _trial("step", ("dardanelli2010",), input="p_set", duration="50 ms"),
-    _trial("moment-pulses", _WEDGE, t_hold="60 ms", t_low="20 ms", t_high="20 ms", pulses="1",
-           settle="10 ms"),
-    _trial("moment-ramp", _WEDGE, t_hold="60 ms", t_low="20 ms", t_ramp="20 ms", t_end="20 ms",
-           settle="10 ms"),
+    _trial(
+        "moment-pulses",
+        _WEDGE,
+        t_hold="60 ms",
+        t_low="20 ms",
+        t_high="20 ms",
+        pulses="1",
+        settle="10 ms",
+    ),
+    _trial(
+        "moment-ramp",
+        _WEDGE,
+        t_hold="60 ms",
+        t_low="20 ms",
+        t_ramp="20 ms",
+        t_end="20 ms",
+        settle="10 ms",
+    ),
     _trial("moment-release", _WEDGE, settle="60 ms", duration="40 ms"),
     _trial("power-off-hold", _WEDGE, settle="60 ms", duration="40 ms"),
-    _trial("gap-adjusting", _WEDGE, applications="1", t_hold="60 ms", t_pause="20 ms",
-           settle="10 ms"),
+    _trial(
+        "gap-adjusting", _WEDGE, applications="1", t_hold="60 ms", t_pause="20 ms", settle="10 ms"
+    ),
     _trial("current-loop", _WEDGE, duration="4 ms"),
     _trial("run-down", _WEDGE, t_spin="20 ms", duration="40 ms"),
     _trial("step", _WEDGE, input="M_set", duration="50 ms"),
-)  # fmt: skip
+)
 
 _UNITS = {
-    "s": ("s", "ms", "us"), "m": ("m", "mm", "um"), "Pa": ("Pa", "bar", "kPa", "MPa"),
-    "A": ("A", "mA"), "V": ("V", "mV"), "N*m": ("N*m", "N*mm"), "Hz": ("Hz", "kHz"),
-    "N": ("N", "kN"), "kg": ("kg", "g"), "m**2": ("m**2", "mm**2"), "rad": ("rad", "mrad", "deg"),
-    "ohm": ("ohm", "mohm"), "H": ("H", "mH", "uH"), "W": ("W", "kW"),
-}  # fmt: skip
+    "s": ("s", "ms", "us"),
+    "m": ("m", "mm", "um"),
+    "Pa": ("Pa", "bar", "kPa", "MPa"),
+    "A": ("A", "mA"),
+    "V": ("V", "mV"),
+    "N*m": ("N*m", "N*mm"),
+    "Hz": ("Hz", "kHz"),
+    "N": ("N", "kN"),
+    "kg": ("kg", "g"),
+    "m**2": ("m**2", "mm**2"),
+    "rad": ("rad", "mrad", "deg"),
+    "ohm": ("ohm", "mohm"),
+    "H": ("H", "mH", "uH"),
+    "W": ("W", "kW"),
+}
 
 
 def text(rng: Random, value: float, symbol: str) -> str:
@@ -157,20 +186,26 @@ def stimulus(rng: Random, unit: str) -> Entries:
     def table() -> Entries:
         count = rng.randrange(2, 6)
         times = sorted(rng.sample(range(60), count))
-        return {"times": ", ".join(f"{t} ms" for t in times),
-                "values": ", ".join(level() for _ in range(count)),
-                "between": rng.choice(("linear", "hold"))}  # fmt: skip
+        return {
+            "times": ", ".join(f"{t} ms" for t in times),
+            "values": ", ".join(level() for _ in range(count)),
+            "between": rng.choice(("linear", "hold")),
+        }
 
     kinds: dict[str, Callable[[], Entries]] = {
         "step": lambda: {"start": level(), "end": level(), "t_step": time()},
         "sine": lambda: {"mean": level(), "amplitude": size(), "f": frequency()},
         "chirp": lambda: {
-            "mean": level(), "amplitude": size(), "f_start": frequency(), "f_end": frequency(),
-            "t_sweep": time(), "sweep": rng.choice(("linear", "logarithmic")),
+            "mean": level(),
+            "amplitude": size(),
+            "f_start": frequency(),
+            "f_end": frequency(),
+            "t_sweep": time(),
+            "sweep": rng.choice(("linear", "logarithmic")),
         },
         "multisine": lambda: {"mean": level(), "amplitude": size(), "f_base": "50 Hz", "n": "7"},
         "table": table,
-    }  # fmt: skip
+    }
     kind = rng.choice(sorted(kinds))
     return {"stimulus.kind": kind} | {f"stimulus.{k}": v for k, v in kinds[kind]().items()}
 

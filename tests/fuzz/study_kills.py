@@ -40,13 +40,14 @@ DESIGNS = {
         limit=25, probability=90, design='kind = "monte-carlo"\ncases = 512'
     ),
     "subset-simulation": _STUDY.format(
-        limit=RARE, probability=99.9,
+        limit=RARE,
+        probability=99.9,
         design='kind = "subset-simulation"\ncases = 3200\ncases_per_level = 640',
     ),
     "importance-sampling": _STUDY.format(
         limit=RARE, probability=99.9, design='kind = "importance-sampling"\ncases = 1280'
     ),
-}  # fmt: skip
+}
 _CLUSTER = """
 import sys
 from bywire.core.unneeded import allow_dask
@@ -66,9 +67,13 @@ _LONGEST = 120.0  # s that a command may take to end
 
 
 def case(
-    rng: Random, folder: Path, kills: int = 0, design: str = "", where: str = "",
+    rng: Random,
+    folder: Path,
+    kills: int = 0,
+    design: str = "",
+    where: str = "",
     forked: bool = False,
-) -> str:  # fmt: skip
+) -> str:
     """Kill a study again and again, finish it, and say what is wrong with what it gave.
 
     ``design``, ``where``: one of `DESIGNS`, and ``pool`` or ``cluster``; drawn where empty.
@@ -99,9 +104,13 @@ def _computing(rng: Random, folder: Path, where: str) -> Iterator[tuple[list[str
     path = folder / "cluster.py"
     path.write_text(_CLUSTER, encoding="utf-8")
     with subprocess.Popen(
-        [sys.executable, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL, text=True, env=_environment(),
-    ) as cluster:  # fmt: skip
+        [sys.executable, str(path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env=_environment(),
+    ) as cluster:
         assert cluster.stdout is not None
         address = cluster.stdout.readline().strip()
         try:
@@ -119,9 +128,12 @@ def _started(words: list[str], errors: Path, forked: bool) -> subprocess.Popen[s
     if forked:
         return Forked(words, errors)
     return subprocess.Popen(
-        [sys.executable, "-m", "bywire.cli", *words], stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE, text=True, env=_environment(),
-    )  # fmt: skip
+        [sys.executable, "-m", "bywire.cli", *words],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=_environment(),
+    )
 
 
 def _killed(

@@ -40,16 +40,27 @@ def test_nothing_goes_wrong_with_generated_input(
 
 
 REPLAYED = {
-    "a divisor is searched": ["run", "hard-braking", "--set", "simulation.step=1 ns",
-                              "--set", "simulation.record=0.1234567891234567 s"],
-    "a period far from any": ["run", "moment-pulses", "--set",
-                              "control.T_fast=365.9670339332694s"],
+    "a divisor is searched": [
+        "run",
+        "hard-braking",
+        "--set",
+        "simulation.step=1 ns",
+        "--set",
+        "simulation.record=0.1234567891234567 s",
+    ],
+    "a period far from any": ["run", "moment-pulses", "--set", "control.T_fast=365.9670339332694s"],
     "a period of ages": ["run", "moment-pulses", "--set", "control.T_fast=1.3e19s"],
     "and its loop": ["margins", "position", "--set", "control.T_fast=1.3e19s"],
-    "an open balance": ["run", "hard-braking", "--set", "pipeline.k_lf=3.2e-19",
-                        "--set", "options.duration=40 ms"],
+    "an open balance": [
+        "run",
+        "hard-braking",
+        "--set",
+        "pipeline.k_lf=3.2e-19",
+        "--set",
+        "options.duration=40 ms",
+    ],
     "a long name": ["run", "hard-braking", "--set", "x" * 400 + "=1"],
-}  # fmt: skip
+}
 
 
 @pytest.mark.filterwarnings("ignore")

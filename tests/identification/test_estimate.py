@@ -36,9 +36,11 @@ def near(bound: float, value: float, deviation: float, scale: float = 1.0) -> di
     """Return where one unknown between some bound and infinity lies at a bound."""
     unknown = Unknown("x", max(bound, 0.0), low=bound, scale=scale)
     return replace(
-        ESTIMATE, unknowns=(unknown,), values=np.array([value]),
+        ESTIMATE,
+        unknowns=(unknown,),
+        values=np.array([value]),
         covariance=np.array([[deviation**2]]),
-    ).at_bounds()  # fmt: skip
+    ).at_bounds()
 
 
 def test_deviations_and_correlation() -> None:
@@ -106,9 +108,11 @@ def test_table() -> None:
 def test_object() -> None:
     shown = as_object(ESTIMATE)
     assert shown["parameters"]["offset.i"] == {  # type: ignore[index]
-        "value": -3.0, "unit": "A", "standard_deviation": pytest.approx(2.0),
+        "value": -3.0,
+        "unit": "A",
+        "standard_deviation": pytest.approx(2.0),
         "interval_95": pytest.approx([-3.0 - 2.0 * T, -3.0 + 2.0 * T]),
-    }  # fmt: skip
+    }
     assert shown["not_identifiable"] == {
         "seal.c": {"kept": 0.2, "unit": "N*s/m", "reason": "1e9 of its size"}
     }

@@ -88,9 +88,7 @@ def test_offset_and_both_dry_frictions_are_only_told_together(
 ) -> None:
     names = (*axis.NAMES, "offset")
     with pytest.raises(ParameterError, match=r"only a combination of T_p, T_n, offset"):
-        inverse_dynamics(
-            equation(axis), axis.TRUTH, parameters_of(axis.TRUTH, names), moving(data)
-        )
+        inverse_dynamics(equation(axis), axis.TRUTH, parameters_of(axis.TRUTH, names), moving(data))
 
 
 def test_a_body_that_hardly_moves_tells_nothing(axis: ModuleType, data: xr.Dataset) -> None:
@@ -104,9 +102,7 @@ def test_a_body_that_hardly_moves_tells_nothing(axis: ModuleType, data: xr.Datas
 def test_a_missing_signal_is_named(axis: ModuleType, data: xr.Dataset) -> None:
     lost = moving(data).rename({"v": "voltage"})
     with pytest.raises(UnknownNameError, match="'v'"):
-        inverse_dynamics(
-            equation(axis), axis.TRUTH, parameters_of(axis.TRUTH, axis.NAMES), lost
-        )
+        inverse_dynamics(equation(axis), axis.TRUTH, parameters_of(axis.TRUTH, axis.NAMES), lost)
 
 
 def test_instruments_take_away_the_bias_of_noise(axis: ModuleType) -> None:
@@ -129,9 +125,11 @@ def test_instruments_take_away_the_bias_of_noise(axis: ModuleType) -> None:
 
 
 def test_the_example_says_what_noise_does_to_its_first_step(
-    axis: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    axis: ModuleType,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+) -> None:
     """On a record of its own; parameters other than the example's are no failure."""
     data, file = axis.measured(seed=3, noise=3e-3), tmp_path / "axis.csv"
     table = data.assign(v=1.5 * data["v"]).to_dataframe()[["theta", "v"]]
@@ -170,9 +168,7 @@ def test_weights_count_samples_by_their_noise(axis: ModuleType) -> None:
     assert error[1] < 0.02
 
 
-def test_output_error_recovers_parameters_and_the_start(
-    axis: ModuleType, data: xr.Dataset
-) -> None:
+def test_output_error_recovers_parameters_and_the_start(axis: ModuleType, data: xr.Dataset) -> None:
     known = axis.TRUTH.replace({"J": 0.03, "d_p": 0.03, "d_n": 0.1, "T_p": 0.4, "T_n": 0.6})
     bench = trial(axis.ServoAxis(), known, data, {"v": "v"}, {"theta": 1e-4})
     unknowns = parameters_of(known, axis.NAMES) + initial_states(bench, ["theta"])
@@ -222,10 +218,17 @@ def test_trials_share_parameters_and_keep_their_own_offsets(
     shift = {"first": 0.3, "second": -0.2}
     parts = {"first": data.isel(time=slice(0, 3000)), "second": data.isel(time=slice(0, 4000))}
     trials = [
-        trial(axis.ServoAxis(), axis.TRUTH, part.assign(theta=part["theta"] + shift[k]),
-              {"v": "v"}, {"theta": 1e-4}, label=k, state=axis.State(0.0, 0.0))
+        trial(
+            axis.ServoAxis(),
+            axis.TRUTH,
+            part.assign(theta=part["theta"] + shift[k]),
+            {"v": "v"},
+            {"theta": 1e-4},
+            label=k,
+            state=axis.State(0.0, 0.0),
+        )
         for k, part in parts.items()
-    ]  # fmt: skip
+    ]
     unknowns = parameters_of(axis.TRUTH, ["J", "T_p"], starts={"J": 0.025})
     unknowns += tuple(Unknown("offset.theta", 0.0, scale=0.1, trial=k) for k in parts)
     found = estimate(output_error(trials, unknowns))
@@ -237,8 +240,9 @@ def test_trials_share_parameters_and_keep_their_own_offsets(
 
 def test_a_wrong_model_is_found_out(axis: ModuleType, data: xr.Dataset) -> None:
     """Friction taken as the same both ways: the residuals say that something is missing."""
-    bench = trial(axis.ServoAxis(), axis.TRUTH.replace({"T_n": 0.6}), data, {"v": "v"},
-                  {"theta": 1e-4})  # fmt: skip
+    bench = trial(
+        axis.ServoAxis(), axis.TRUTH.replace({"T_n": 0.6}), data, {"v": "v"}, {"theta": 1e-4}
+    )
     found = estimate(output_error([bench], parameters_of(axis.TRUTH, ["J", "d_p", "d_n"])))
     assert found.colored
     assert found.rms > 5.0
@@ -270,16 +274,18 @@ def test_a_voltage_that_was_read_and_not_set_acts_when_it_did(axis: ModuleType) 
     fine = axis.TRUTH.replace({"T_s": 1e-4, "T_p": 0.0, "T_n": 0.0, "d_n": 0.05})
     v = lambda t: 4.0 * np.sin(2 * np.pi * 4.0 * t) + 3.0 * np.sin(2 * np.pi * 1.3 * t)  # noqa: E731
     rest = axis.State(0.0, 0.0)
-    run = bywire.Run(axis.ServoAxis(), fine, rest, axis.Voltage(0.0), lambda t: v(t)[:, None],
-                     4.0, record=5e-3)  # fmt: skip
+    run = bywire.Run(
+        axis.ServoAxis(), fine, rest, axis.Voltage(0.0), lambda t: v(t)[:, None], 4.0, record=5e-3
+    )
     theta = bywire.simulate(run)["theta"]
     t = 5e-3 * np.arange(theta.size)
     data = xr.Dataset({"theta": ("time", theta), "v": ("time", v(t))}, {"time": t})
     coarse = fine.replace({"T_s": 5e-3})
     bias = {}
     for between in ("held", "linear"):
-        bench = trial(axis.ServoAxis(), coarse, data, {"v": "v"}, {"theta": 1e-4}, state=rest,
-                      between=between)  # fmt: skip
+        bench = trial(
+            axis.ServoAxis(), coarse, data, {"v": "v"}, {"theta": 1e-4}, state=rest, between=between
+        )
         fit = estimate(output_error([bench], parameters_of(coarse, ["J", "d_p", "d_n"])))
         bias[between] = abs(fit["J"] / fine.J - 1.0)
     assert bias["linear"] < 2e-3
@@ -300,11 +306,25 @@ def test_what_an_equation_leaves_has_its_unit(axis: ModuleType) -> None:
 
 def test_a_second_record_is_predicted(axis: ModuleType, data: xr.Dataset) -> None:
     rest = axis.State(0.0, 0.0)
-    first = trial(axis.ServoAxis(), axis.TRUTH, data.isel(time=slice(0, 4000)), {"v": "v"},
-                  {"theta": 1e-4}, label="first", state=rest)  # fmt: skip
+    first = trial(
+        axis.ServoAxis(),
+        axis.TRUTH,
+        data.isel(time=slice(0, 4000)),
+        {"v": "v"},
+        {"theta": 1e-4},
+        label="first",
+        state=rest,
+    )
     fit = estimate(output_error([first], parameters_of(axis.TRUTH, ["J", "T_p"])))
-    second = trial(axis.ServoAxis(), axis.TRUTH, axis.measured(seed=9), {"v": "v"},
-                   {"theta": 1e-4}, label="second", state=rest)  # fmt: skip
+    second = trial(
+        axis.ServoAxis(),
+        axis.TRUTH,
+        axis.measured(seed=9),
+        {"v": "v"},
+        {"theta": 1e-4},
+        label="second",
+        state=rest,
+    )
     right = predict(second, fit).figures("theta")
     assert right["rmse"] == pytest.approx(1e-4, rel=0.2)
     off = replace(fit, values=fit.values * [1.05, 1.0])
@@ -320,16 +340,23 @@ def test_several_starts_of_a_model_of_ones_own(axis: ModuleType, data: xr.Datase
     assert "4 of 4 starts met the lowest minimum" in found.notes
 
 
-@pytest.mark.parametrize(("change", "said"), [
-    (lambda d: d.rename(theta="phi"), "unknown measured signal 'theta': known are"),
-    (lambda d: d.isel(time=slice(None, None, 10)), "cutoff = 60 Hz is not admissible"),
-    (lambda d: d.assign(theta=-d["theta"]), r"theta goes against v \(J = -0.02 .*negate one"),
-    (None, "none.nc cannot be read"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda d: d.rename(theta="phi"), "unknown measured signal 'theta': known are"),
+        (lambda d: d.isel(time=slice(None, None, 10)), "cutoff = 60 Hz is not admissible"),
+        (lambda d: d.assign(theta=-d["theta"]), r"theta goes against v \(J = -0.02 .*negate one"),
+        (None, "none.nc cannot be read"),
+    ],
+)
 def test_the_example_says_what_is_wrong_with_a_record(
-    axis: ModuleType, data: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    change: Callable[[xr.Dataset], xr.Dataset] | None, said: str,
-) -> None:  # fmt: skip
+    axis: ModuleType,
+    data: xr.Dataset,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    change: Callable[[xr.Dataset], xr.Dataset] | None,
+    said: str,
+) -> None:
     file = tmp_path / "none.nc"
     if change is not None:
         own = data.copy()

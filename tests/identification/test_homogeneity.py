@@ -29,9 +29,7 @@ def joint(masses: dict[str, float], seed: int = 1) -> Estimate:
     W = np.column_stack((a.ravel(), v.ravel()))
     unknowns = (Unknown("m", 1.0, scale=2.0, unit="kg"), Unknown("d", 1.0, scale=3.0))
     parts = tuple(Part("F", label, N, "N", 0.5) for label in masses)
-    return estimate(
-        Problem(unknowns, lambda x: ((W @ x - F.ravel()) / 0.5, W / 0.5), parts=parts)
-    )
+    return estimate(Problem(unknowns, lambda x: ((W @ x - F.ravel()) / 0.5, W / 0.5), parts=parts))
 
 
 def test_the_record_and_the_parameter_that_do_not_fit_are_named() -> None:
@@ -51,8 +49,10 @@ def test_records_that_agree_are_not_warned_of() -> None:
 
 def test_estimates_made_one_by_one_are_compared() -> None:
     """Two records of one axis, each fitted alone: their masses lie 6 deviations apart."""
-    fits = {label: joint({label: mass}, seed) for seed, (label, mass) in
-            enumerate({"monday": 2.0, "tuesday": 2.4}.items())}  # fmt: skip
+    fits = {
+        label: joint({label: mass}, seed)
+        for seed, (label, mass) in enumerate({"monday": 2.0, "tuesday": 2.4}.items())
+    }
     worst, *_ = disagreements(fits)
     assert worst.name == "m"
     assert {worst.value > worst.others, worst.record == "tuesday"} in ({True}, {False})

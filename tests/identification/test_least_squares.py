@@ -223,8 +223,9 @@ def test_an_instrument_that_leads_away_from_the_least_sum_is_left() -> None:
 
     def found(offset: float) -> float:
         slope = (seen + offset)[:, None]
-        return estimate(Problem((Unknown("gain", 2.0),), lambda v: (v[0] * seen - y, slope),
-                                instrument=True))["gain"]  # fmt: skip
+        return estimate(
+            Problem((Unknown("gain", 2.0),), lambda v: (v[0] * seen - y, slope), instrument=True)
+        )["gain"]
 
     assert found(0.0) == pytest.approx(2.0, abs=0.05)
     assert found(0.7) == pytest.approx(2.0, abs=0.05)  # and not 2.7

@@ -30,27 +30,37 @@ def ringing(stiffness: float, damping: float, t: Array = T) -> Array:
 
 
 def fit_of(
-    measured: Array, noise: float = NOISE, start: float = 40.0, size: float = 1.0,
+    measured: Array,
+    noise: float = NOISE,
+    start: float = 40.0,
+    size: float = 1.0,
     finer: Array | None = None,
-) -> Estimate:  # fmt: skip
+) -> Estimate:
     """Return stiffness and damping of what rang off; ``finer``: what half steps change."""
     unknowns = (Unknown("k", start, 1.0, 400.0, 40.0, "N/m"), Unknown("d", 0.1, 0.0, 2.0, 0.1))
 
     def evaluate(values: Array) -> tuple[Array, Array]:
         steps = np.array([1e-5, 1e-7])
-        J = np.column_stack([
-            (ringing(*(values + e)) - ringing(*(values - e))) / (2.0 * h)
-            for e, h in zip(np.diag(steps), steps, strict=True)
-        ])  # fmt: skip
+        J = np.column_stack(
+            [
+                (ringing(*(values + e)) - ringing(*(values - e))) / (2.0 * h)
+                for e, h in zip(np.diag(steps), steps, strict=True)
+            ]
+        )
         return (ringing(*values) - measured) / noise, J / noise
 
     def in_half_steps(values: Array) -> tuple[Array, Array]:
         r, J = evaluate(values)
         return r + finer / noise, J
 
-    return estimate(Problem(unknowns, evaluate, parts=(
-        Part("x", "", T.size, "m", noise, float(np.std(measured)), size),
-    ), finer=None if finer is None else in_half_steps))  # fmt: skip
+    return estimate(
+        Problem(
+            unknowns,
+            evaluate,
+            parts=(Part("x", "", T.size, "m", noise, float(np.std(measured)), size),),
+            finer=None if finer is None else in_half_steps,
+        )
+    )
 
 
 def noise(seed: int, size: float = NOISE) -> Array:

@@ -76,8 +76,10 @@ def test_missing_signals_samples_and_wrong_units_are_refused(tmp_path: Path) -> 
 def test_records_keep_their_own_clocks_where_asked() -> None:
     """Experiments count from what happens at zero, which a joined time does not show."""
     t = 1e-3 * np.arange(50.0)
-    parts = {name: xr.Dataset({"p": ("time", t)}, {"time": np.round(t + begin, 12)})
-             for name, begin in (("a", -0.02), ("b", 3.0))}  # fmt: skip
+    parts = {
+        name: xr.Dataset({"p": ("time", t)}, {"time": np.round(t + begin, 12)})
+        for name, begin in (("a", -0.02), ("b", 3.0))
+    }
     whole = joined(parts)
     for name, one in split(whole, own_clock=True).items():
         np.testing.assert_allclose(one["time"], parts[name]["time"], atol=1e-12)

@@ -28,8 +28,9 @@ def line(seed: int, share: float, loss: Loss) -> Estimate:
 def test_intervals_of_every_loss_are_honest(loss: Loss, share: float) -> None:
     """An M-estimate's covariance has the mean slope of its influence, not its weight."""
     found = [line(seed, share, loss) for seed in range(60)]
-    inside = np.mean([(f.intervals()[:, 0] < [1, 2]) & (f.intervals()[:, 1] > [1, 2])
-                      for f in found])  # fmt: skip
+    inside = np.mean(
+        [(f.intervals()[:, 0] < [1, 2]) & (f.intervals()[:, 1] > [1, 2]) for f in found]
+    )
     assert 0.9 <= inside <= 0.99
     scatter = np.std([f.values for f in found], axis=0)
     claimed = np.mean([f.deviations for f in found], axis=0)

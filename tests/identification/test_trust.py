@@ -27,8 +27,15 @@ class Options(ParameterSet):
     F: Force
 
 
-def level(seen: xr.Dataset, par: None, options: Options, effort: Effort, *, off: float = 0.0,
-          overlap: int = 1) -> Identified:  # fmt: skip
+def level(
+    seen: xr.Dataset,
+    par: None,
+    options: Options,
+    effort: Effort,
+    *,
+    off: float = 0.0,
+    overlap: int = 1,
+) -> Identified:
     """Estimate a level; off adds a bias, overlap counts every sample several times."""
     y = np.repeat(seen["F"].values, overlap)
     unknown = Unknown("F", 1.0, scale=1.0, unit="N")
@@ -49,10 +56,17 @@ def put_in(par: None, options: Options) -> dict[str, float]:
 
 
 METHOD = Method(
-    name="level", assembly="", summary="a level", experiment="", signals={"F": "N"},
-    options=Options, defaults=Options(F=5.0), identify=level, synthetic=made,
+    name="level",
+    assembly="",
+    summary="a level",
+    experiment="",
+    signals={"F": "N"},
+    options=Options,
+    defaults=Options(F=5.0),
+    identify=level,
+    synthetic=made,
     truth=put_in,
-)  # fmt: skip
+)
 SEEDS = range(100, 180)
 
 

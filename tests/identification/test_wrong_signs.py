@@ -17,12 +17,14 @@ def negated(data: xr.Dataset, name: str) -> xr.Dataset:
 
 REFUSED = {
     "seal-friction": {"F": "F goes against p", "p": "F goes against p"},
-    "friction-model": {"friction": "friction goes against speed",
-                       "speed": "friction goes against speed"},
+    "friction-model": {
+        "friction": "friction goes against speed",
+        "speed": "friction goes against speed",
+    },
     "cogging": {"i_1": "i_1 goes against q_1", "q_1": "i_1 goes against q_1"},
     "force-calibration": {"y_F": "i_1 - i_2 of the record goes against y_F"},
     "screw-efficiency": {name: "goes against y_F" for name in ("i_1", "i_2", "q_1", "q_2", "y_F")},
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -36,9 +38,13 @@ def test_signs_that_do_not_fit_together_are_refused(name: str) -> None:
             method.identify(negated(data, signal), par, method.defaults, Effort())
 
 
-@pytest.mark.parametrize(("name", "signals"), [
-    ("run-down", ("i_1", "q_1")), ("force-calibration", ("i_1", "i_2")),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "signals"),
+    [
+        ("run-down", ("i_1", "q_1")),
+        ("force-calibration", ("i_1", "i_2")),
+    ],
+)
 def test_signs_that_only_the_misfit_shows_fail(name: str, signals: tuple[str, ...]) -> None:
     method = METHODS.all()[name]
     par = PARAMETER_SETS.find(main_set(method.assembly)).parameters()
@@ -62,8 +68,10 @@ def test_a_part_of_the_friction_that_drives_fails() -> None:
     t = np.arange(0.0, 8.0, 0.01)
     v = 0.1 * np.sin(np.pi * t)
     F = 20.0 * np.sign(v) - 60.0 * v + 0.1 * np.random.default_rng(1).standard_normal(t.size)
-    data = xr.Dataset({"friction": ("time", F, {"units": "N"}),
-                       "speed": ("time", v, {"units": "m/s"})}, {"time": t})  # fmt: skip
+    data = xr.Dataset(
+        {"friction": ("time", F, {"units": "N"}), "speed": ("time", v, {"units": "m/s"})},
+        {"time": t},
+    )
     method = METHODS.all()["friction-model"]
     viscous = method.defaults.replace({"law": "viscous"})
     checks = {c.name: c for c in method.identify(data, None, viscous, Effort()).checks}

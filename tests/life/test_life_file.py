@@ -69,15 +69,18 @@ def test_stops_that_differ_in_pauses_alone_are_simulated_once(plan_of):
         ('life = "wedge-pads"\n[set]\ncaliper.K = "9 N/m"', r"unknown parameter 'caliper.K'"),
         ('life = "wedge-pads"\n[vary]\n"stop.paus" = "+-5 %"', r"did you mean 'stop.pause'"),
         ('life = "wedge-pads"\n[vary]\n"caliper.clearance" = "+-5 %"', r"follows from what wears"),
-        ('life = "wedge-pads"\n[vary]\n"caliper.law".kind = "discrete"\n'
-         '"caliper.law".values = ["linear", "table"]', r"is a choice"),
+        (
+            'life = "wedge-pads"\n[vary]\n"caliper.law".kind = "discrete"\n'
+            '"caliper.law".values = ["linear", "table"]',
+            r"is a choice",
+        ),
         ('life = "wedge-pads"\n[projection]\nstop = 3', r"did you mean 'stops'"),
         ('life = "wedge-pads"\n[projection]\nstops = 1', r"whole number from 2 to 4096"),
         ('life = "wedge-pads"\n[projection]\nstops = 2.5', r"whole number"),
         ('life = "wedge-pads"\n[projection]\nshare = "90 %"', r"between 0.1 % and 50 %"),
         ('life = "wedge-pads"\n[projection]\nshare = "5 mm"', r"share"),
     ],
-)  # fmt: skip
+)
 def test_what_does_not_fit_is_refused_with_the_files_name(plan_of, text, said):
     with pytest.raises(InputError, match=r"some_life\.toml: .*" + said):
         plan_of(text)

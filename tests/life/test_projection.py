@@ -28,10 +28,20 @@ def _no_change(z, readings, par, wear):
 
 def _life(between=_no_change, left=lambda z, par, wear: {"lining": z["h"]}):
     return Life(
-        "fake", "a pad", "none", Nothing, {}, {"h": Slow("m", "pad"), "n": Slow("1", "count")},
-        {"lining": Slow("m", "lining left")}, lambda par, wear: {"h": 1.0, "n": 0.0},
-        lambda z, par, wear: {}, lambda *_: Effects({}), left, (), between,
-    )  # fmt: skip
+        "fake",
+        "a pad",
+        "none",
+        Nothing,
+        {},
+        {"h": Slow("m", "pad"), "n": Slow("1", "count")},
+        {"lining": Slow("m", "lining left")},
+        lambda par, wear: {"h": 1.0, "n": 0.0},
+        lambda z, par, wear: {},
+        lambda *_: Effects({}),
+        left,
+        (),
+        between,
+    )
 
 
 def _plan(life, **changes):

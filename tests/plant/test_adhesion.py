@@ -84,9 +84,13 @@ def test_formulas_of_surfaces_are_fitted_to_burckhardts(name):
 
 @pytest.mark.parametrize(
     ("changes", "said"),
-    [({"B": 0.5}, "peak below a slip of 1"), ({"C": 3.9}, "be positive there"),
-     ({"C": 0.9}, "must be > 1"), ({"E": 1.1}, "<= 1")],
-)  # fmt: skip
+    [
+        ({"B": 0.5}, "peak below a slip of 1"),
+        ({"C": 3.9}, "be positive there"),
+        ({"C": 0.9}, "must be > 1"),
+        ({"E": 1.1}, "<= 1"),
+    ],
+)
 def test_formulas_without_a_peak_are_refused(changes, said):
     given = {f"vehicle.road.first.{name}": value for name, value in changes.items()}
     with pytest.raises(bywire.BywireError, match=said):

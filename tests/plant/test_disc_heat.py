@@ -13,8 +13,15 @@ from bywire.plant.disc_heat import Input, State
 from run_once import run_once
 
 WARM = PARAMETER_SETS.find("sport600").parameters().front.heat.replace({"law": "lumped"})
-NO_LOSS = {"h_0": 0.0, "h_1": 0.0, "epsilon": 0.0, "G_dp": 0.0, "G_open": 0.0, "G_pf": 0.0,
-           "G_f": 0.0}  # fmt: skip
+NO_LOSS = {
+    "h_0": 0.0,
+    "h_1": 0.0,
+    "epsilon": 0.0,
+    "G_dp": 0.0,
+    "G_open": 0.0,
+    "G_pf": 0.0,
+    "G_f": 0.0,
+}
 ICE, V = 273.15, 100.0 / 3.6
 COLD = [WARM.T_a] * 3
 
@@ -94,10 +101,14 @@ def test_a_warning_says_which_boiling_point_is_passed_and_when():
 
 @pytest.mark.parametrize(
     ("change", "text"),
-    [("T_1=700 degC", "T_1 = 700 degC must be below T_2 = 600 degC"),
-     ("T_a=-300 degC", "it must be > 0 K, got '-300 degC'"), ("T_a=20", "cannot be K"),
-     ("f=1.2", "must be >= 0 and <= 1"), ("C_d=0 J/K", "must be > 0")],
-)  # fmt: skip
+    [
+        ("T_1=700 degC", "T_1 = 700 degC must be below T_2 = 600 degC"),
+        ("T_a=-300 degC", "it must be > 0 K, got '-300 degC'"),
+        ("T_a=20", "cannot be K"),
+        ("f=1.2", "must be >= 0 and <= 1"),
+        ("C_d=0 J/K", "must be > 0"),
+    ],
+)
 def test_impossible_heat_is_refused(change, text):
     name, _, value = change.partition("=")
     with pytest.raises(bywire.BywireError, match=text.replace("(", r"\(")):

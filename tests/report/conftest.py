@@ -24,15 +24,28 @@ LABELS = {
     "sat_duty": ("1", "duty cycle saturated"),
 }
 SHARES = {
-    "E_source": 1.0, "E_supply": 0.04, "E_copper": 0.52, "E_gear": -0.03, "E_seal": 0.15,
-    "E_damping": 0.08, "E_pipeline": 0.06, "E_stop": 0.0, "E_port": 0.0, "E_stored": 0.18,
+    "E_source": 1.0,
+    "E_supply": 0.04,
+    "E_copper": 0.52,
+    "E_gear": -0.03,
+    "E_seal": 0.15,
+    "E_damping": 0.08,
+    "E_pipeline": 0.06,
+    "E_stop": 0.0,
+    "E_port": 0.0,
+    "E_stored": 0.18,
 }
 ROLES = {
-    "E_source": Role("source", "source"), "E_supply": Role("sink", "supply"),
-    "E_copper": Role("sink", "copper"), "E_gear": Role("sink", "gear and screw"),
-    "E_seal": Role("sink", "seal friction"), "E_damping": Role("sink", "fluid damping"),
-    "E_pipeline": Role("sink", "pipeline"), "E_stop": Role("sink", "end stops"),
-    "E_port": Role("sink", "reservoir port"), "E_stored": Role("sink", "stored"),
+    "E_source": Role("source", "source"),
+    "E_supply": Role("sink", "supply"),
+    "E_copper": Role("sink", "copper"),
+    "E_gear": Role("sink", "gear and screw"),
+    "E_seal": Role("sink", "seal friction"),
+    "E_damping": Role("sink", "fluid damping"),
+    "E_pipeline": Role("sink", "pipeline"),
+    "E_stop": Role("sink", "end stops"),
+    "E_port": Role("sink", "reservoir port"),
+    "E_stored": Role("sink", "stored"),
 }
 
 
@@ -49,10 +62,18 @@ def pressure_step(duration: float = 1.2, sample_time: float = 1e-3) -> xr.Datase
     omega = np.gradient(p, sample_time) / 1e5
     power = 0.96 * i**2
     values = {
-        "p_mc": p, "p_pd": 0.98 * p, "p_ref": np.where(time > 0.1, 37e5, 6e5), "i": i,
-        "i_ref": 1.02 * i, "i_star": i - 0.3 * ripple, "omega": omega,
-        "duty": np.clip(0.08 * i + 0.004 * omega, -1.0, 1.0), "P_el": power,
-        "stuck": np.abs(omega) < 8.0, "sat_current": i > 9.5, "sat_duty": np.abs(omega) > 400.0,
+        "p_mc": p,
+        "p_pd": 0.98 * p,
+        "p_ref": np.where(time > 0.1, 37e5, 6e5),
+        "i": i,
+        "i_ref": 1.02 * i,
+        "i_star": i - 0.3 * ripple,
+        "omega": omega,
+        "duty": np.clip(0.08 * i + 0.004 * omega, -1.0, 1.0),
+        "P_el": power,
+        "stuck": np.abs(omega) < 8.0,
+        "sat_current": i > 9.5,
+        "sat_duty": np.abs(omega) > 400.0,
     }
     energy = np.cumsum(power) * sample_time
     energies = {name: ("J", share * energy) for name, share in SHARES.items()}
@@ -62,7 +83,8 @@ def pressure_step(duration: float = 1.2, sample_time: float = 1e-3) -> xr.Datase
     return xr.Dataset(
         {
             name: (
-                "time", np.asarray(value, dtype=float),
+                "time",
+                np.asarray(value, dtype=float),
                 {"units": unit, "long_name": label} | role_attributes(ROLES.get(name)),
             )
             for name, (unit, label, value) in entries.items()
@@ -89,7 +111,9 @@ def curve() -> xr.Dataset:
         coords={
             "p_mc": ("p_mc", [2e5, 20e5], {"units": "Pa"}),
             "omega": (
-                "omega", np.append(-side[::-1], side), {"units": "rad/s", "long_name": "speed"},
+                "omega",
+                np.append(-side[::-1], side),
+                {"units": "rad/s", "long_name": "speed"},
             ),
         },
     )

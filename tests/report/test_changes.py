@@ -39,9 +39,15 @@ def test_signals_that_options_name_are_changes_where_they_are_no_default():
 
 def test_settings_of_the_run_stimulus_and_assembly_are_changes():
     found = changed(
-        "tracking", "dardanelli2010", {"motor.R_m": 0.4}, {"input": "p_set", "duration": 0.1},
-        {"kind": "step", "start": 0.0, "end": 1e6, "t_step": 0.0}, step=10e-6, record=2e-3, seed=7,
-    )  # fmt: skip
+        "tracking",
+        "dardanelli2010",
+        {"motor.R_m": 0.4},
+        {"input": "p_set", "duration": 0.1},
+        {"kind": "step", "start": 0.0, "end": 1e6, "t_step": 0.0},
+        step=10e-6,
+        record=2e-3,
+        seed=7,
+    )
     assert found["motor.R_m"] == ("0.4 Ω", "0.35 Ω")
     assert found["options.duration"] == ("0.1 s", "1 s")
     assert found["stimulus.kind"] == ("step", "the experiment's own")
@@ -64,9 +70,14 @@ def answers(tmp_path):
     over = "motor.L_m=0.1 mH, 0.2 mH"
     yield bywire.run("hard-braking", {**QUICK, **resistance}, over=over, estimate_error=False)
     benches = [
-        bywire.Bench("hard-braking", "dardanelli2010", {"motor.R_m": 0.41, "motor.L_m": inductance},
-                     {"duration": 0.04, "settle": 0.01}) for inductance in (1e-4, 2e-4)
-    ]  # fmt: skip
+        bywire.Bench(
+            "hard-braking",
+            "dardanelli2010",
+            {"motor.R_m": 0.41, "motor.L_m": inductance},
+            {"duration": 0.04, "settle": 0.01},
+        )
+        for inductance in (1e-4, 2e-4)
+    ]
     yield bywire.compare(*benches, estimate_error=False)
     yield bywire.page(benches[0], tmp_path / "page.html")
     for function in (bywire.margins, bywire.linearize):

@@ -42,8 +42,11 @@ def test_few_measured_points_are_not_joined(count: int, joined: bool) -> None:
 
 def test_each_curve_is_shown_where_it_was_read() -> None:
     places = [np.array([3.0, 1.0]), np.array([2.0, 5.0, 4.0]), np.array([0.0, 6.0])]
-    rows = [np.array([[30.0, 10.0], [31.0, 11.0]]), np.array([[2.0, 5.0, 4.0]] * 2),
-            np.array([[np.nan] * 2, [0.0, 6.0]])]  # fmt: skip
+    rows = [
+        np.array([[30.0, 10.0], [31.0, 11.0]]),
+        np.array([[2.0, 5.0, 4.0]] * 2),
+        np.array([[np.nan] * 2, [0.0, 6.0]]),
+    ]
     x, table = at_own_places(places, rows)
     np.testing.assert_array_equal(x, [[1, 3, np.nan], [2, 4, 5], [0, 6, np.nan]])
     np.testing.assert_array_equal(table[:, 0], [[10, 30, np.nan], [11, 31, np.nan]])
@@ -88,18 +91,23 @@ def test_a_gain_over_frequency_is_logarithmic_and_a_phase_is_not() -> None:
 
 def test_a_band_is_named() -> None:
     p = np.linspace(0.0, 1e6, 5)
-    values = {n: (("level", "p"), np.full((2, 5), k), FORCE)
-              for k, n in enumerate(("low", "value", "high"))}  # fmt: skip
+    values = {
+        n: (("level", "p"), np.full((2, 5), k), FORCE)
+        for k, n in enumerate(("low", "value", "high"))
+    }
     coords = {"p": ("p", p, {"units": "Pa"}), "level": ("level", [1.0, 2.0], {"units": "s"})}
     (axes,) = method_curve(Curve("a", "b", xr.Dataset(values, coords), "p")).axes
     said = [text.get_text() for text in axes.get_legend().get_texts()]
     assert said == ["1 s", "2 s", "95 % band (± 1 N at most)"]
 
 
-@pytest.mark.parametrize(("half", "said"), [
-    (0.1, "95 % band (± 0.1 N at most)"),
-    (1e-3, "95 % band (± 0.001 N at most, within the line)"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("half", "said"),
+    [
+        (0.1, "95 % band (± 0.1 N at most)"),
+        (1e-3, "95 % band (± 0.001 N at most, within the line)"),
+    ],
+)
 def test_a_band_that_the_line_hides_is_told(half: float, said: str) -> None:
     x = np.linspace(0.0, 1.0, 41)
     data = {"value": ("x", x, FORCE), "low": ("x", x - half, FORCE), "high": ("x", x + half, FORCE)}

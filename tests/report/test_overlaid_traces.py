@@ -65,11 +65,15 @@ def test_faults_are_marked_once_where_they_are_there_at_the_same_times(
 
     def bars(*starts: float) -> list[tuple[float, float, str]]:
         runs = {
-            str(start): recording.assign(faults=(
-                "time", ((time >= start) & (time < start + 0.1)).astype(float), {"units": "1"}
-            ))
+            str(start): recording.assign(
+                faults=(
+                    "time",
+                    ((time >= start) & (time < start + 0.1)).astype(float),
+                    {"units": "1"},
+                )
+            )
             for start in starts
-        }  # fmt: skip
+        }
         first, *others = overlaid_panels(runs).axes
         assert {len(axes.collections) for axes in others} == {len(first.collections)}
         legend = first.get_legend()
@@ -77,8 +81,9 @@ def test_faults_are_marked_once_where_they_are_there_at_the_same_times(
         assert [text.get_text() for text in legend.get_texts()].count("fault") == 1
         return [
             (float(box.x0), float(box.y0), to_hex(bar.get_facecolor()[0]).upper())
-            for bar in first.collections for box in [bar.get_paths()[0].get_extents()]
-        ]  # fmt: skip
+            for bar in first.collections
+            for box in [bar.get_paths()[0].get_extents()]
+        ]
 
     assert bars(0.2, 0.2) == [(pytest.approx(0.2), 0.0, style.PURPLE)]
     (early, low, blue), (late, high, red) = bars(0.2, 0.5)

@@ -19,11 +19,17 @@ T = np.linspace(0.0, 1.0, 51)
 def recording(**signals: tuple[str, str, Any]) -> xr.Dataset:
     """Return a recording of an unknown model: unit, label and values of each signal."""
     return xr.Dataset(
-        {name: ("time", np.broadcast_to(np.asarray(y, float), T.shape),
-                {"units": unit, "long_name": label}) for name, (unit, label, y) in signals.items()},
+        {
+            name: (
+                "time",
+                np.broadcast_to(np.asarray(y, float), T.shape),
+                {"units": unit, "long_name": label},
+            )
+            for name, (unit, label, y) in signals.items()
+        },
         coords={"time": T},
         attrs={"model": "somebody's axis"},
-    )  # fmt: skip
+    )
 
 
 OWN = recording(
@@ -51,8 +57,11 @@ def test_signals_of_a_unit_share_panels_two_by_two() -> None:
         [("duty", Role.MAIN)],
     ]
     assert [panel.quantity for panel in panels] == [
-        "angle of the motor", "force", "estimate", "duty cycle",
-    ]  # fmt: skip
+        "angle of the motor",
+        "force",
+        "estimate",
+        "duty cycle",
+    ]
     assert len(time_traces(own).axes) == 4
 
 

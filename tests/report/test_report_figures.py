@@ -46,9 +46,7 @@ DRAWN: dict[str, Callable[[xr.Dataset], Figure]] = {
 
 
 @pytest.fixture(params=[*sorted(DRAWN), "seal-stribeck"])
-def figure(
-    request: pytest.FixtureRequest, recording: xr.Dataset, curve: xr.Dataset
-) -> Figure:
+def figure(request: pytest.FixtureRequest, recording: xr.Dataset, curve: xr.Dataset) -> Figure:
     if request.param == "seal-stribeck":
         return stribeck_curve(curve)
     return DRAWN[request.param](recording)
@@ -196,7 +194,8 @@ def test_a_ripple_that_fills_an_area_is_pale_behind_its_average(
     rippled["i_ref"] = ("time", 3.0 + ripple, long_recording["i_ref"].attrs)
     axes = time_traces(rippled).axes[1]
     assert legend_of(axes)[:2] == [
-        "motor current, 100 ms average (pale: ripple)", "current set point, 100 ms average",
+        "motor current, 100 ms average (pale: ripple)",
+        "current set point, 100 ms average",
     ]
     band, average, set_point = axes.lines
     assert np.ptp(np.asarray(band.get_ydata())) == pytest.approx(2.0, rel=1e-3)

@@ -40,12 +40,19 @@ def curve(gain: float) -> LoopCurve:
     S = 1.0 / (1.0 + L)
     k = int(np.flatnonzero(np.abs(L) > 1.0)[-1])
     margins = LoopMargins(
-        gain=2.0 / gain, phase=180.0 + math.degrees(np.unwrap(np.angle(L))[k]),
-        crossover=float(FREQUENCY[k]), delay=0.1, disk=2.0 / float(np.abs(2.0 * S - 1.0).max()),
-        sensitivity=float(np.abs(S).max()), complementary=float(np.abs(1.0 - S).max()),
-        bandwidth=0.2, stable=True, phase_at=float(FREQUENCY[k]),
-        gain_at=1.0 / (2.0 * np.pi), lower_gain=0.0,
-    )  # fmt: skip
+        gain=2.0 / gain,
+        phase=180.0 + math.degrees(np.unwrap(np.angle(L))[k]),
+        crossover=float(FREQUENCY[k]),
+        delay=0.1,
+        disk=2.0 / float(np.abs(2.0 * S - 1.0).max()),
+        sensitivity=float(np.abs(S).max()),
+        complementary=float(np.abs(1.0 - S).max()),
+        bandwidth=0.2,
+        stable=True,
+        phase_at=float(FREQUENCY[k]),
+        gain_at=1.0 / (2.0 * np.pi),
+        lower_gain=0.0,
+    )
     return LoopCurve(FREQUENCY, L, margins)
 
 
@@ -85,9 +92,7 @@ def test_the_nichols_chart_shades_what_the_curve_only_touches() -> None:
     one = curve(1.0)
     phase, size = one.phase, 20.0 * np.log10(np.abs(one.L))
     figure = nichols(Family((one,)))
-    (shaded,) = (
-        c for c in figure.axes[0].collections if c.get_zorder() == pytest.approx(0.9)
-    )  # fmt: skip
+    (shaded,) = (c for c in figure.axes[0].collections if c.get_zorder() == pytest.approx(0.9))
     (area,) = [path for path in shaded.get_paths() if len(path)]
     inside = area.contains_points(np.column_stack([phase, size]), radius=-0.5)
     assert not inside.any()
@@ -115,8 +120,11 @@ def test_a_locus_marks_its_border_and_shows_all_that_grows() -> None:
 def test_differences_below_the_tolerance_are_seen_as_such() -> None:
     f = np.array([1.0, 10.0])
     figure = differences(f, {"limits": (np.array([0.0, np.nan]), f)}, (0.01, 0.1))
-    (line,) = [one for one in figure.axes[0].lines if len(one.get_xdata()) == 2
-               and one.get_label() == "limits"]  # fmt: skip
+    (line,) = [
+        one
+        for one in figure.axes[0].lines
+        if len(one.get_xdata()) == 2 and one.get_label() == "limits"
+    ]
     np.testing.assert_allclose(line.get_ydata(), [1e-4, np.nan])
     with pytest.raises(ParameterError, match="at least one cause"):
         differences(f, {}, (0.01, 0.1))
@@ -128,17 +136,29 @@ def test_the_agreement_table_names_what_has_no_number() -> None:
 
     found = Agreement(
         values(1.0, 2.0),
-        {"": values(0.0, 1e-3), "limits": values(0.0, -3.0), "friction": values(-0.5, np.nan),
-         "all": values(-0.5, np.nan)},
-        {"": values(0.0, 0.01), "limits": values(0.0, 0.0), "friction": values(170.0, np.nan),
-         "all": values(170.0, np.nan)},
-        values(0.0, 0.0), values(0.0, 0.0),
-    )  # fmt: skip
+        {
+            "": values(0.0, 1e-3),
+            "limits": values(0.0, -3.0),
+            "friction": values(-0.5, np.nan),
+            "all": values(-0.5, np.nan),
+        },
+        {
+            "": values(0.0, 0.01),
+            "limits": values(0.0, 0.0),
+            "friction": values(170.0, np.nan),
+            "all": values(170.0, np.nan),
+        },
+        values(0.0, 0.0),
+        values(0.0, 0.0),
+    )
     rows = [[cell.text for cell in row] for row in agreement_table(found).rows]
     assert rows[2] == ["friction", "-0.500 dB +170.00°", "-"]
     assert rows[-1] == ["largest", "friction", "friction"]
-    small = replace(found, gain=dict.fromkeys(found.gain, values(0.0, 0.0)),
-                    phase=dict.fromkeys(found.phase, values(0.0, 0.05)))  # fmt: skip
+    small = replace(
+        found,
+        gain=dict.fromkeys(found.gain, values(0.0, 0.0)),
+        phase=dict.fromkeys(found.phase, values(0.0, 0.05)),
+    )
     assert small.largest == ["", ""]
     assert "agree: largest differences 0.001 dB" in verdict(found)
     assert "DO NOT" in verdict(replace(found, gain=found.gain | {"": values(0.0, 0.02)}))
@@ -167,9 +187,20 @@ def test_poles_that_a_table_leaves_out_are_counted() -> None:
     z = np.array([0.9, -0.5, 1.0, 0.0, 0.0])
     n = len(z)
     model = LinearModel(
-        "chain", np.diag(z), np.ones((n, 1)), np.ones((1, n)), np.zeros((1, 1)), tuple("abcde"),
-        ("u",), ("y",), ("1",) * n, ("1",), ("1",), np.zeros(n), 1e-3,
-    )  # fmt: skip
+        "chain",
+        np.diag(z),
+        np.ones((n, 1)),
+        np.ones((1, n)),
+        np.zeros((1, 1)),
+        tuple("abcde"),
+        ("u",),
+        ("y",),
+        ("1",) * n,
+        ("1",),
+        ("1",),
+        np.zeros(n),
+        1e-3,
+    )
     rows = [[cell.text for cell in row] for row in rate_table(model).rows]
     assert len(rows) == 2
     assert rows[1][2:] == ["500 (f_s/2)", "-"]

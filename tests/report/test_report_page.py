@@ -35,7 +35,7 @@ from bywire.report.time_traces import time_traces
 
 step_figure = partial(step_response, variable="p_mc", set_point="p_ref")
 
-HOSTILE = '"><script>alert(1)</script><img src=http://evil.example/x onerror=\'y\'>\x00\x1b\u202e&'
+HOSTILE = "\"><script>alert(1)</script><img src=http://evil.example/x onerror='y'>\x00\x1b\u202e&"
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 
 
@@ -108,13 +108,21 @@ def test_page_is_valid(page: str) -> None:
 
 def test_page_says_what_it_was_given(page: str) -> None:
     checker = parsed(page)
-    for text in ("Hard braking", "1.2 s at 20 μs", "✓ all requirements hold", "Figure 1. Pressure.",
-                 "Figure 2. Plant.", "Table 1. Values.", "As given.", "second point"):
+    for text in (
+        "Hard braking",
+        "1.2 s at 20 μs",
+        "✓ all requirements hold",
+        "Figure 1. Pressure.",
+        "Figure 2. Plant.",
+        "Table 1. Values.",
+        "As given.",
+        "second point",
+    ):
         assert text in checker.text
     tags = [tag for tag, _ in checker.tags]
     assert tags.count("svg") == 2
     assert tags.count("details") == 1
-    assert '<ul>\n<li>first point</li>\n<li>second point</li>\n</ul>' in page
+    assert "<ul>\n<li>first point</li>\n<li>second point</li>\n</ul>" in page
     assert '<a href="#section-2">Plant</a>' in page
 
 

@@ -55,9 +55,9 @@ def test_copies_draw_the_same():
 
 def test_what_is_long_is_begun_first(tmp_path, monkeypatch):
     monkeypatch.setattr(side_by_side.os, "cpu_count", lambda: 9)
-    monkeypatch.setattr(side_by_side, "processes", lambda _, *rest, **is_copied: processes(
-        1, *rest, **is_copied
-    ))  # fmt: skip
+    monkeypatch.setattr(
+        side_by_side, "processes", lambda _, *rest, **is_copied: processes(1, *rest, **is_copied)
+    )
     begun = tmp_path / "begun"
 
     def noted(k: int) -> Figure:
@@ -84,8 +84,9 @@ def test_a_figure_that_fails_says_why():
     def broken() -> Figure:
         raise ValueError("no such line")
 
-    with pytest.raises(ValueError, match="no such line"), drawn_side_by_side(
-        [*blocks(FEW), FigureBlock(broken, "broken")]
+    with (
+        pytest.raises(ValueError, match="no such line"),
+        drawn_side_by_side([*blocks(FEW), FigureBlock(broken, "broken")]),
     ):
         pass
 

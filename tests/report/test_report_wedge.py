@@ -107,8 +107,11 @@ def test_rigs_get_panels_of_their_own() -> None:
 
 
 def test_a_wedge_brake_under_position_control_shows_angles_and_no_moment() -> None:
-    still = {name: (u, text, 0.0 * y) for name, (u, text, y) in BRAKING.items()
-             if name in ("M_set", "y_M", "M_B", "mode", "sat_rate")}  # fmt: skip
+    still = {
+        name: (u, text, 0.0 * y)
+        for name, (u, text, y) in BRAKING.items()
+        if name in ("M_set", "y_M", "M_B", "mode", "sat_rate")
+    }
     angles = {name: RIG[name] for name in ("theta_1", "theta_2")}
     drawn = panels(time_traces(recording(BRAKING | still | angles)))
     assert "angle" in drawn
@@ -130,10 +133,21 @@ def test_every_kind_of_panels_names_a_variable_once() -> None:
 
 
 def test_energy_of_the_wedge_brake_comes_from_motors_disc_and_run_out() -> None:
-    figure = energy_balance(energies(
-        W_electric=5.0, W_disc=2.0, W_runout=-0.5, E_source=6.5, E_copper=3.0, E_shaft=1.5,
-        E_wedge=0.3, E_damping=0.199, E_heart=0.0005, E_caliper=0.0005, E_stored=1.5,
-    ))  # fmt: skip
+    figure = energy_balance(
+        energies(
+            W_electric=5.0,
+            W_disc=2.0,
+            W_runout=-0.5,
+            E_source=6.5,
+            E_copper=3.0,
+            E_shaft=1.5,
+            E_wedge=0.3,
+            E_damping=0.199,
+            E_heart=0.0005,
+            E_caliper=0.0005,
+            E_stored=1.5,
+        )
+    )
     names = {label.split(":")[0]: label for label in legend(figure.axes[0])}
     assert {"electrical", "disc on wedge", "run-out (takes)", "bearings and screws"} <= set(names)
     assert names["rest"].startswith("rest: 0.001 J")  # two losses too small to be seen

@@ -49,9 +49,15 @@ def test_amounts_are_in_display_units(value: float | None, symbol: str, written:
 
 @pytest.mark.parametrize(
     ("value", "symbol", "like", "written"),
-    [(0.9, "m", 41.0, "0.9 m"), (0.9, "m", 0.9, "900 mm"), (0.06, "s", 0.09, "60 ms"),
-     (0.06, "s", 1.2, "0.06 s"), (0.06, "s", None, "0.06 s"), (2e6, "Pa", 0.0, "20 bar")],
-)  # fmt: skip
+    [
+        (0.9, "m", 41.0, "0.9 m"),
+        (0.9, "m", 0.9, "900 mm"),
+        (0.06, "s", 0.09, "60 ms"),
+        (0.06, "s", 1.2, "0.06 s"),
+        (0.06, "s", None, "0.06 s"),
+        (2e6, "Pa", 0.0, "20 bar"),
+    ],
+)
 def test_a_figure_of_many_values_has_the_unit_of_the_largest(
     value: float, symbol: str, like: float | None, written: str
 ) -> None:

@@ -56,10 +56,11 @@ def page(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[An
     panels = (Panel("pressure", (Trace("p"),)), Panel("current", (Trace("i"),)))
     f = np.geomspace(1.0, 100.0, 50)
     figures = [
-        time_traces(_step(1.0), panels=panels), time_traces(_step(1.0), panels=panels[:1]),
+        time_traces(_step(1.0), panels=panels),
+        time_traces(_step(1.0), panels=panels[:1]),
         time_traces(_step(0.1), panels=panels[:1]),
         bode([Response("lag", f, 1.0 / (1.0 + 1j * f))]),
-    ]  # fmt: skip
+    ]
     blocks = [FigureBlock(figure, "A figure.") for figure in figures]
     path = tmp_path_factory.mktemp("zoom") / "report.html"
     file = write_page(path, "Zoom", "", [Section("Figures", blocks)])
@@ -145,8 +146,10 @@ def test_other_drags_show_a_part_of_the_figure_in_its_proportions(page, seen):
         drag(page, box, (0.3, 0.1), end)
         now = seen()
         share = [now[figure]["viewBox"][k] / before[figure]["viewBox"][k] for k in (2, 3)]
-        wanted = max((end[0] - 0.3) * (box["right"] - box["left"]) / (whole["width"] - FRAME),
-                     (end[1] - 0.1) * (box["bottom"] - box["top"]) / (whole["height"] - FRAME))
+        wanted = max(
+            (end[0] - 0.3) * (box["right"] - box["left"]) / (whole["width"] - FRAME),
+            (end[1] - 0.1) * (box["bottom"] - box["top"]) / (whole["height"] - FRAME),
+        )
         assert share == pytest.approx([wanted, wanted], rel=0.05)
         assert now[0] == before[0]  # time is as it was
     page.locator(".zoom").nth(1).focus()

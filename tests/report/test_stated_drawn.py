@@ -47,8 +47,10 @@ def test_a_level_has_a_band_only_by_its_tolerance():
 
 def test_words_say_values_with_tolerances_ranges_and_bounds():
     assert [stated_level(each, "Pa") for each in (LEVEL, AROUND, RANGE)] == [
-        "27 bar", "27 bar ± 1 bar", "25 bar to 29 bar",
-    ]  # fmt: skip
+        "27 bar",
+        "27 bar ± 1 bar",
+        "25 bar to 29 bar",
+    ]
     bound = StatedFigure("x.bound", "e", "overshoot", 15.0, "section 6", bound="<=")
     assert stated_figure(bound, "%") == "<= 15 %"
     warm = StatedFigure("x.warm", "e", "hottest", 333.15, "section 7", tolerance=2.0)
@@ -63,6 +65,7 @@ def test_key_figures_have_what_is_stated_and_its_place_beside_them():
     at = headings.index("stated")
     assert headings[at + 1] == "stated in"
     assert [tuple(c.text for c in row[at : at + 2]) for row in table.rows] == [
-        ("<= 15 %", "section 6"), ("-", "-"),
-    ]  # fmt: skip
+        ("<= 15 %", "section 6"),
+        ("-", "-"),
+    ]
     assert "stated" not in [column.heading for column in kpi_table(rows[1:]).columns]

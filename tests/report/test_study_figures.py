@@ -48,9 +48,10 @@ def drawn(figure: Figure) -> Figure:
 def labels(axes: Axes) -> list[Text]:
     low, high = axes.get_xlim()
     return [
-        tick.label1 for tick in axes.xaxis.get_major_ticks()
+        tick.label1
+        for tick in axes.xaxis.get_major_ticks()
         if low <= tick.get_loc() <= high and tick.label1.get_visible() and tick.label1.get_text()
-    ]  # fmt: skip
+    ]
 
 
 def assert_readable(figure: Figure) -> None:
@@ -83,14 +84,27 @@ def texts(axes: Axes) -> list[str]:
 
 @pytest.mark.parametrize(
     ("middle", "spread", "unit"),
-    [(0.0115, 1e-3, "s"), (19.0, 1.0, "1"), (3e-7, 2e-7, "1"), (2e6, 3e5, "Pa"), (3e-7, 2e-7, "s"),
-     (0.35, 1e-8, "Pa")],
-)  # fmt: skip
+    [
+        (0.0115, 1e-3, "s"),
+        (19.0, 1.0, "1"),
+        (3e-7, 2e-7, "1"),
+        (2e6, 3e5, "Pa"),
+        (3e-7, 2e-7, "s"),
+        (0.35, 1e-8, "Pa"),
+    ],
+)
 def test_labels_of_a_histogram_never_touch(middle: float, spread: float, unit: str) -> None:
     values = middle + spread * (UNIT - 0.5)
-    assert_readable(drawn(histograms({
-        name: Spread(values, unit, middle) for name in ("share_sat_current", "share_sat_duty")
-    })))  # fmt: skip
+    assert_readable(
+        drawn(
+            histograms(
+                {
+                    name: Spread(values, unit, middle)
+                    for name in ("share_sat_current", "share_sat_duty")
+                }
+            )
+        )
+    )
 
 
 def test_a_histogram_names_a_limit_that_lies_far_off() -> None:
@@ -178,9 +192,18 @@ def test_a_convergence_shows_what_decides() -> None:
 
 @pytest.mark.parametrize(
     ("cases", "share", "wanted"),
-    [(1, 0.0, None), (1, 0.4, 0.5), (1, 1.0, 0.999), (64, 0.0, 0.5), (64, 0.4, 0.999),
-     (64, 1.0, None), (1000, 0.0, 0.999), (1000, 0.4, None), (1000, 1.0, 0.5)],
-)  # fmt: skip
+    [
+        (1, 0.0, None),
+        (1, 0.4, 0.5),
+        (1, 1.0, 0.999),
+        (64, 0.0, 0.5),
+        (64, 0.4, 0.999),
+        (64, 1.0, None),
+        (1000, 0.0, 0.999),
+        (1000, 0.4, None),
+        (1000, 1.0, 0.5),
+    ],
+)
 def test_a_convergence_holds_its_estimate_and_what_is_wanted(
     cases: int, share: float, wanted: float | None
 ) -> None:
@@ -207,9 +230,11 @@ def test_the_outline_of_a_histogram_holds_all_cases() -> None:
 def test_parallel_coordinates_say_what_lines_are_and_where_limits_lie() -> None:
     met = ERROR.values <= 300.0
     rise = CaseAxis("rise_time", "s", 0.06 + 0.01 * UNIT)
-    figure = drawn(parallel_coordinates(
-        [*DRIVERS, ERROR, rise], every(met), {"steady_state_error": 300.0, "rise_time": 0.1}
-    ))  # fmt: skip
+    figure = drawn(
+        parallel_coordinates(
+            [*DRIVERS, ERROR, rise], every(met), {"steady_state_error": 300.0, "rise_time": 0.1}
+        )
+    )
     assert entries(figure) == ["meets all requirements", "misses a requirement", "limit"]
     axes = figure.axes[0]
     assert [t for t in texts(axes) if "limit" in t] == ["limit 100 ↑"]
@@ -268,10 +293,18 @@ def test_curves_of_figures_with_other_units_fill_panels_of_their_own() -> None:
     points = np.linspace(0.0, 1.0, 50)
     probable = 10.0 ** (-3.0 * points)
     curves = [
-        Curve(name, unit, limit, 0.01, limit * (0.5 + 0.6 * points), probable, 0.5 * probable,
-              2.0 * probable)
+        Curve(
+            name,
+            unit,
+            limit,
+            0.01,
+            limit * (0.5 + 0.6 * points),
+            probable,
+            0.5 * probable,
+            2.0 * probable,
+        )
         for name, unit, limit in (("rise_time", "s", 0.07), ("peak_power", "W", 200.0))
-    ]  # fmt: skip
+    ]
     figure = drawn(exceedance(curves))
     assert_readable(figure)
     for axes, shown in zip(figure.axes, ((35.0, 77.0), (100.0, 220.0)), strict=True):

@@ -47,9 +47,11 @@ def test_nothing_names_a_machine_or_a_package_host():
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
         meant = LOOPBACK.get(label(path), set())
         hits = [
-            f"line {k}: {hit}" for k, line in enumerate(lines, 1) for hit in foreign(line)
+            f"line {k}: {hit}"
+            for k, line in enumerate(lines, 1)
+            for hit in foreign(line)
             if hit not in meant
-        ]  # fmt: skip
+        ]
         if hits:
             found[label(path)] = hits[:3]
     assert found == {}

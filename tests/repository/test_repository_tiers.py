@@ -64,7 +64,12 @@ def test_the_newest_python_runs_tests_that_are_there_of_every_room() -> None:
     assert all(path.exists() for path in paths)
     rooms = {path.relative_to(ROOT / "tests").parts[0] for path in paths}
     assert {path.name for path in PACKAGE.iterdir() if path.is_dir()} - rooms <= {
-        "__pycache__", "authoring", "brakes", "control", "export", "template",
+        "__pycache__",
+        "authoring",
+        "brakes",
+        "control",
+        "export",
+        "template",
     }  # declared in the others' tests, or minutes long
 
 

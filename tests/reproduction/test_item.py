@@ -12,10 +12,16 @@ FACT = Fact(10.0, "Hz", "section 6")
 @pytest.mark.parametrize(
     ("computed", "tolerance", "expected"),
     [
-        (10.4, 0.5, True), (9.4, 0.5, False), (9.0, "<=", True), (11.0, "<=", False),
-        (11.0, ">=", True), (9.0, ">=", False), (math.nan, 0.5, False), (math.nan, "<=", False),
+        (10.4, 0.5, True),
+        (9.4, 0.5, False),
+        (9.0, "<=", True),
+        (11.0, "<=", False),
+        (11.0, ">=", True),
+        (9.0, ">=", False),
+        (math.nan, 0.5, False),
+        (math.nan, "<=", False),
     ],
-)  # fmt: skip
+)
 def test_holds(computed: float, tolerance: object, expected: bool) -> None:
     assert holds(10.0, computed, tolerance) is expected  # type: ignore[arg-type]
 

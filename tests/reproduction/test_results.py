@@ -34,14 +34,21 @@ def made_up() -> Reproduction:
         found("t.x", "s", math.inf, "ours"),
     )
     part = Part(
-        "Table 2", "text", items, (Exhibit("fig", figure, "A figure."),), {"run/1 a": recording},
+        "Table 2",
+        "text",
+        items,
+        (Exhibit("fig", figure, "A figure."),),
+        {"run/1 a": recording},
         {"More": text_table(("a",), [("b",)])},
-    )  # fmt: skip
+    )
     return Reproduction(
-        "made-up", "Nobody, 2010", (part,), (RootCause("Tables differ.", ("t.K*",)),),
+        "made-up",
+        "Nobody, 2010",
+        (part,),
+        (RootCause("Tables differ.", ("t.K*",)),),
         (Allowance("gains", 0.05, SHARE, "two digits"), Allowance("time", 0.1, "s", "a guess")),
         {"": "The set"},
-    )  # fmt: skip
+    )
 
 
 def test_json_has_the_promised_keys_and_no_nan(made_up: Reproduction) -> None:

@@ -70,9 +70,9 @@ class Subject:
 
 
 def _page(name: str) -> Callable[[Path], Path]:
-    return lambda folder: bywire.page(
-        BENCHES[name], folder / f"{name}.html", vary=VARIED[name]
-    ).file  # fmt: skip
+    return lambda folder: (
+        bywire.page(BENCHES[name], folder / f"{name}.html", vary=VARIED[name]).file
+    )
 
 
 def _report(folder: Path) -> Path:

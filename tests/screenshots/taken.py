@@ -45,9 +45,14 @@ def _font() -> str:
 
 
 def taken(
-    browser: Any, address: str, width: int = WIDTH, ready: str = "() => true",
-    *, change: str = "", themes: Sequence[str] = THEMES,
-) -> dict[str, np.ndarray]:  # fmt: skip
+    browser: Any,
+    address: str,
+    width: int = WIDTH,
+    ready: str = "() => true",
+    *,
+    change: str = "",
+    themes: Sequence[str] = THEMES,
+) -> dict[str, np.ndarray]:
     """Return a screenshot of a page in each theme, reduced.
 
     Parameters
@@ -69,9 +74,11 @@ def taken(
         Brightness of red, green and blue by theme, shape (rows, columns, 3).
     """
     context = browser.new_context(
-        viewport={"width": width, "height": HEIGHT}, color_scheme=themes[0],
-        device_scale_factor=1, reduced_motion="reduce",
-    )  # fmt: skip
+        viewport={"width": width, "height": HEIGHT},
+        color_scheme=themes[0],
+        device_scale_factor=1,
+        reduced_motion="reduce",
+    )
     shots = {}
     try:
         context.add_init_script(_font())

@@ -102,8 +102,11 @@ def standin(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def started(_: Path) -> subprocess.Popen[bytes]:
         return subprocess.Popen(
-            [sys.executable, "-S", "-E", "-c", STANDIN], start_new_session=True,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
+            [sys.executable, "-S", "-E", "-c", STANDIN],
+            start_new_session=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
 
     monkeypatch.setattr(jobs, "started", started)

@@ -24,10 +24,19 @@ from undrawn import drawn, undrawn_unless_asked
 __all__ = ["drawn", "undrawn_unless_asked"]
 
 CALLED = {
-    "fault": "faults", "input_": "inputs", "output": "outputs", "unknown": "unknowns",
-    "prior": "priors", "start": "states", "option": "options", "map_": "mapping", "set_": "set",
-    "overrides": "set", "tolerance": "tolerances", "name": "study",
-}  # fmt: skip
+    "fault": "faults",
+    "input_": "inputs",
+    "output": "outputs",
+    "unknown": "unknowns",
+    "prior": "priors",
+    "start": "states",
+    "option": "options",
+    "map_": "mapping",
+    "set_": "set",
+    "overrides": "set",
+    "tolerance": "tolerances",
+    "name": "study",
+}
 """options whose fields are called otherwise"""
 ALL = {"out", "json", "help"}
 LEFT_OUT = {
@@ -40,8 +49,11 @@ LEFT_OUT = {
 }
 """options without a field"""
 OWN_WORDS = {
-    ("replay", "segments"), ("page", "bench"), ("page", "case"), ("run", "bench"),
-}  # fmt: skip
+    ("replay", "segments"),
+    ("page", "bench"),
+    ("page", "case"),
+    ("run", "bench"),
+}
 """fields that say it otherwise: a flag in place of a file, and what a page of benches knows"""
 CAMPAIGN = """
 bench = "hard-braking"
@@ -112,8 +124,12 @@ BAD = [
     ("run", {"bench": "hard-braking", "set": "motor.R_mm=1 ohm"}, "set", "motor.R_m"),
     ("run", {"bench": "hard-braking", "set": "motor.R_m"}, "set", "KEY=VALUE"),
     ("run", {"bench": "hard-braking", "faults": "motor.hott"}, "faults", "motor.hot"),
-    ("replay", {"bench": "hard-braking", "measurement": "curve.toml", "set": "options.x=1"},
-     "set", "unknown"),
+    (
+        "replay",
+        {"bench": "hard-braking", "measurement": "curve.toml", "set": "options.x=1"},
+        "set",
+        "unknown",
+    ),
     ("faults", {"campaign": ""}, "campaign", "missing"),
     ("faults", {"campaign": "motorcycl"}, "campaign", "motorcycle"),
     ("faults", {"campaign": "wrong.toml"}, "campaign", "motor.hot"),
@@ -128,8 +144,12 @@ BAD = [
     ("compare", {"runs": "curve.toml\naside"}, "runs", "no finished result"),
     ("compare", {"runs": "curve.toml\nseal-stribek"}, "runs", "seal-stribeck"),
     ("compare", {"runs": "curve.toml\nseal-stribeck", "set": "motor.x=1"}, "set", "motor.x"),
-    ("compare", {"runs": "curve.toml\nseal-stribeck", "error_estimate": "yes"}, "error_estimate",
-     "true or false"),
+    (
+        "compare",
+        {"runs": "curve.toml\nseal-stribeck", "error_estimate": "yes"},
+        "error_estimate",
+        "true or false",
+    ),
     ("size", {"study": "drive-trains"}, "study", "drive-train"),
     ("size", {"study": "drive-train", "parameters": "roberts"}, "parameters", "roberts2003"),
     ("size", {"study": "drive-train", "parameters": "dardanelli2010"}, "parameters", "is for a"),
@@ -169,9 +189,15 @@ def test_what_does_not_fit_stands_beside_its_field(visit, task, given, field, te
 
 @pytest.mark.parametrize(
     ("task", "field"),
-    [("faults", "campaign"), ("life", "life"), ("compare", "runs"), ("run", "bench"),
-     ("identify", "mapping"), ("study", "study")],
-)  # fmt: skip
+    [
+        ("faults", "campaign"),
+        ("life", "life"),
+        ("compare", "runs"),
+        ("run", "bench"),
+        ("identify", "mapping"),
+        ("study", "study"),
+    ],
+)
 def test_no_thing_leads_out_of_the_folder(visit, task, field):
     others = {"method": "m"} if task == "identify" else {}
     outside = "../outside/secret.csv", "/etc/passwd", "/no/such", "way/secret.csv", ".hidden.toml"
@@ -222,13 +248,28 @@ GOOD = [
     ("life", {"life": "two-wheeler-pads", "check": "20", "set": "stop.pause=60 s"}),
     ("compare", {"runs": "curve.toml\nhard-braking", "set": "motor.R_m=0.4 ohm"}),
     ("size", {"study": "drive-train", "set": "t_90=120ms"}),
-    ("linearize", {"loop": "wedge-plant", "friction": "sliding", "speed": "5 rad/s",
-                   "locus": "motor_1.R_ref=0.1ohm:1ohm:3"}),
-    ("frequency-response", {**LOOP, "at": "20 bar", "frequencies": "1 Hz:9 Hz:3",
-                            "amplitudes": "1 bar", "over": "motor.R_m=0.2ohm:0.6ohm:5"}),
+    (
+        "linearize",
+        {
+            "loop": "wedge-plant",
+            "friction": "sliding",
+            "speed": "5 rad/s",
+            "locus": "motor_1.R_ref=0.1ohm:1ohm:3",
+        },
+    ),
+    (
+        "frequency-response",
+        {
+            **LOOP,
+            "at": "20 bar",
+            "frequencies": "1 Hz:9 Hz:3",
+            "amplitudes": "1 bar",
+            "over": "motor.R_m=0.2ohm:0.6ohm:5",
+        },
+    ),
     ("agreement", {**LOOP, "amplitudes": "1 bar, 2 bar"}),
     ("design", {**LOOP, "set": "motor.R_m=0.4 ohm"}),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("task", "given"), GOOD)
@@ -258,10 +299,15 @@ def computed(visit, task: Task, asked: dict[str, Any], out: Path) -> dict[str, A
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(visit.folder)
         patch.setattr(job_process, "tell", lambda **said: told.append(said))
-        job_process._compute({
-            "task": task.name, "asked": asked, "folder": str(visit.folder), "out": str(out),
-            "systems": [],
-        })  # fmt: skip
+        job_process._compute(
+            {
+                "task": task.name,
+                "asked": asked,
+                "folder": str(visit.folder),
+                "out": str(out),
+                "systems": [],
+            }
+        )
     return told[-1]["done"]
 
 

@@ -65,8 +65,11 @@ def test_pages_of_other_sites_are_refused(visit, headers, status):
 
 def test_every_answer_has_a_policy(visit):
     for path, last in {
-        "/": "none", "/nowhere": "self", "/api/jobs": "none", "/assets/serve.js": "none",
-    }.items():  # fmt: skip
+        "/": "none",
+        "/nowhere": "self",
+        "/api/jobs": "none",
+        "/assets/serve.js": "none",
+    }.items():
         headers = visit("GET", path).headers
         policy = headers["Content-Security-Policy"]
         assert policy.startswith("default-src 'none'; ")
@@ -85,10 +88,21 @@ def test_every_answer_has_a_policy(visit):
 
 @pytest.mark.parametrize(
     "path",
-    ["../outside/secret.csv", "%2e%2e/%2e%2e/etc/passwd", "/etc/passwd", "out.csv",
-     "way/secret.csv", ".hidden.toml", "results/../../x", "..%5cx", "curve.toml%00", "",
-     "none.html", "way"],
-)  # fmt: skip
+    [
+        "../outside/secret.csv",
+        "%2e%2e/%2e%2e/etc/passwd",
+        "/etc/passwd",
+        "out.csv",
+        "way/secret.csv",
+        ".hidden.toml",
+        "results/../../x",
+        "..%5cx",
+        "curve.toml%00",
+        "",
+        "none.html",
+        "way",
+    ],
+)
 def test_no_path_leads_out_of_the_folder(visit, path):
     answer = visit("GET", f"/file/{path}")
     assert answer.status == 404

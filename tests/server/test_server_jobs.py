@@ -133,16 +133,25 @@ def test_ctrl_c_ends_it_with_its_jobs(tmp_path):
     (tmp_path / "curve.toml").write_text(text)
     with subprocess.Popen(
         [sys.executable, "-m", "bywire", "serve", "--port", "0"],
-        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as server:  # fmt: skip
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as server:
         assert server.stdout is not None
         address, _, token = server.stdout.readline().strip().partition("/?token=")
         port = int(address.rpartition(":")[2])
         asking = http.client.HTTPConnection(HERE, port, timeout=30)
         order = json.dumps({"task": "run", "form": {"bench": "curve.toml"}})
-        asking.request("POST", "/api/jobs", order, {
-            "Cookie": f"{cookie_name(port)}={token}", "Content-Type": "application/json",
-        })  # fmt: skip
+        asking.request(
+            "POST",
+            "/api/jobs",
+            order,
+            {
+                "Cookie": f"{cookie_name(port)}={token}",
+                "Content-Type": "application/json",
+            },
+        )
         assert asking.getresponse().status == 201
         asking.close()
         server.send_signal(signal.SIGINT)

@@ -41,19 +41,34 @@ cases = 64
 breakaway_apply = "<= 0.5 N*m with 90 %"
 """
 FUNCTIONS = {
-    "agreement": "agreement.agreement", "compare": "compare.compare", "design": "design.design",
+    "agreement": "agreement.agreement",
+    "compare": "compare.compare",
+    "design": "design.design",
     "faults": "run_faults.run_faults",
     "frequency-response": "frequency_response.frequency_response",
-    "identify": "identify.identify", "life": "life.project_life",
-    "linearize": "linearize.linearize", "margins": "margins.margins", "page": "page.page",
-    "replay": "replay.replay", "reproduce": "reproduce.reproduce", "run": "run.run",
-    "size": "study.study", "study": "run_study.run_study",
-}  # fmt: skip
+    "identify": "identify.identify",
+    "life": "life.project_life",
+    "linearize": "linearize.linearize",
+    "margins": "margins.margins",
+    "page": "page.page",
+    "replay": "replay.replay",
+    "reproduce": "reproduce.reproduce",
+    "run": "run.run",
+    "size": "study.study",
+    "study": "run_study.run_study",
+}
 FILLED = {
-    "lines": "a=1\n b=2 \n\n", "pairs": "a = 1\n", "names": "a\nb=2 bar",
-    "changes": "motor.R_m = 0.4 ohm\n", "text": "3", "whole": "3", "file": "x.csv",
-    "files": "x.csv\n", "thing": "b.toml", "things": "x.csv\nb.toml",
-}  # fmt: skip
+    "lines": "a=1\n b=2 \n\n",
+    "pairs": "a = 1\n",
+    "names": "a\nb=2 bar",
+    "changes": "motor.R_m = 0.4 ohm\n",
+    "text": "3",
+    "whole": "3",
+    "file": "x.csv",
+    "files": "x.csv\n",
+    "thing": "b.toml",
+    "things": "x.csv\nb.toml",
+}
 
 
 def filled(field: Field) -> Any:
@@ -132,7 +147,7 @@ def test_live_pages_are_made_again_when_their_bench_changes(place, tmp_path):
     assert pages.file("b.toml", "second") != first
     (place.root / "x.csv").write_text("a file that the bench names")
     changed = pages.file("b.toml", "")
-    (place.root / "b.toml").write_text(text + "\n[set]\n\"motor.R_m\" = 1\n")
+    (place.root / "b.toml").write_text(text + '\n[set]\n"motor.R_m" = 1\n')
     assert len({first, changed, pages.file("b.toml", "")}) == 3
     QuickJobs.state = "failed"
     with pytest.raises(RefusedError, match="seeded"):
@@ -180,8 +195,14 @@ def test_what_a_study_shows_so_far_is_counted_from_its_cases(tmp_path):
     (tmp_path / "study.toml").write_text(STUDY)
     plan = read_study(tmp_path / "study.toml")
     torques = np.append(np.linspace(0.2, 0.6, 63), np.nan)
-    columns = {"breakaway_apply": torques, "breakaway_release": np.full(64, np.nan),
-               CASE: np.arange(64), FAILURE: "", WARNINGS: "", "seal.T_pr": 1.0}  # fmt: skip
+    columns = {
+        "breakaway_apply": torques,
+        "breakaway_release": np.full(64, np.nan),
+        CASE: np.arange(64),
+        FAILURE: "",
+        WARNINGS: "",
+        "seal.T_pr": 1.0,
+    }
     found = Findings(plan, pd.DataFrame(columns), ())
     [row] = so_far(found)
     met = int(np.sum(torques <= 0.5))

@@ -71,9 +71,15 @@ class RoughBelt(System):
 
 PAR = RoughParameters(m=1.0, F=2.0, F_c=1.0, rough=1.3 * H, T_s=2 * H)
 RUN = Run(
-    RoughBelt(), PAR, Place(0.0, PAR.F * 1.1 * H), Held(0.0), lambda t: np.zeros((len(t), 1)),
-    2 * H, H, 2 * H,
-)  # fmt: skip
+    RoughBelt(),
+    PAR,
+    Place(0.0, PAR.F * 1.1 * H),
+    Held(0.0),
+    lambda t: np.zeros((len(t), 1)),
+    2 * H,
+    H,
+    2 * H,
+)
 END = -(PAR.F - PAR.F_c) * 0.9 * H  # it turns a tenth into the second substep, on the smooth part
 
 

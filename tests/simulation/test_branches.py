@@ -71,7 +71,8 @@ def test_text_assigns_in_both_arms() -> None:
     name = f"v{nodes['chosen']}"
     assert lines[:2] == ["double kept_v7 = 0.0;", f"double {name};"]
     assert [line for line in lines if f" {name} = " in line] == [
-        f"  {name} = v{nodes['arm']};", f"  {name} = v1;"
-    ]  # fmt: skip
+        f"  {name} = v{nodes['arm']};",
+        f"  {name} = v1;",
+    ]
     assert lines.index("  kept_v7 = v7;") < lines.index("} else {")
     assert lines.index("  const double v8 = kept_v8;") > lines.index("} else {")

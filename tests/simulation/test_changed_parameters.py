@@ -74,8 +74,12 @@ def test_lanes_change_each_at_its_time():
 
 def test_the_books_of_a_brake_close_over_a_change_of_its_stores():
     def books(**fault):
-        bench = Bench("hard-braking", "dardanelli2010", options={"settle": 0.1, "duration": 0.6},
-                      faults=[{"fault": "caliper.soft", "onset": 0.3, **fault}])  # fmt: skip
+        bench = Bench(
+            "hard-braking",
+            "dardanelli2010",
+            options={"settle": 0.1, "duration": 0.6},
+            faults=[{"fault": "caliper.soft", "onset": 0.3, **fault}],
+        )
         recording = run_bench(bench).recording
         return recording, actuator_ledger(recording)
 

@@ -68,9 +68,12 @@ def test_what_comes_through_the_bindings_is_what_runs_give(tmp_path):
     )
     environment = {"LD_LIBRARY_PATH": str(tmp_path), "EMULATED_KERNEL": str(kernel)}
     done = subprocess.run(
-        [sys.executable, "-c", script], env={**os.environ, **environment}, text=True,
-        capture_output=True, check=False,
-    )  # fmt: skip
+        [sys.executable, "-c", script],
+        env={**os.environ, **environment},
+        text=True,
+        capture_output=True,
+        check=False,
+    )
     assert done.stdout == "CUDA C, emulated below the bindings\n", done.stderr
     there = np.load(tmp_path / "there.npy")
     for k in (0, 69):

@@ -25,14 +25,28 @@ CASES = 70  # two blocks of threads, the second not full
 # What each is varied in, a tenth either way, and what is recorded: velocities turn, so that
 # substeps are cut.
 BRAKES = {
-    "hard-braking": ({"options.settle": "20 ms", "options.duration": "0.5 s"},
-                     "seal.T_pr", ("p_mc", "i", "E_seal", "t_stuck")),
-    "moment-pulses": ({"options.pulses": "1", "options.t_hold": "50 ms", "options.settle": "10 ms",
-                       "options.t_low": "50 ms", "options.t_high": "50 ms"},
-                      "heart.K_S", ("y_M", "F_N", "E_wedge", "t_stuck")),
-    "power-off": ({"options.duration": "0.75 s"},
-                  "friction.C", ("F_cl", "i", "E_friction", "t_stuck")),
-}  # fmt: skip
+    "hard-braking": (
+        {"options.settle": "20 ms", "options.duration": "0.5 s"},
+        "seal.T_pr",
+        ("p_mc", "i", "E_seal", "t_stuck"),
+    ),
+    "moment-pulses": (
+        {
+            "options.pulses": "1",
+            "options.t_hold": "50 ms",
+            "options.settle": "10 ms",
+            "options.t_low": "50 ms",
+            "options.t_high": "50 ms",
+        },
+        "heart.K_S",
+        ("y_M", "F_N", "E_wedge", "t_stuck"),
+    ),
+    "power-off": (
+        {"options.duration": "0.75 s"},
+        "friction.C",
+        ("F_cl", "i", "E_friction", "t_stuck"),
+    ),
+}
 
 
 @pytest.fixture
@@ -118,8 +132,12 @@ def test_a_single_run_is_a_batch_of_one(runs, driver):
 
 
 def test_a_bench_says_that_its_cases_go_there(driver):
-    bench = Bench("hard-braking", "dardanelli2010", engine="cuda",
-                  options={"duration": "40 ms", "settle": "10 ms"})  # fmt: skip
+    bench = Bench(
+        "hard-braking",
+        "dardanelli2010",
+        engine="cuda",
+        options={"duration": "40 ms", "settle": "10 ms"},
+    )
     varied = {"motor.R_m": [0.3, 0.4]}
     there = simulate_ensemble_of_bench(bench, varied)
     here = simulate_ensemble_of_bench(replace(bench, engine="auto"), varied)

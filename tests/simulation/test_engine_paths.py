@@ -101,9 +101,14 @@ def test_virtual_machine(path: Path, compiled: Trajectory) -> None:
 def test_plain_floats(path: Path, compiled: Trajectory) -> None:
     run = path.run
     values, end = plain_stepping.simulate(
-        run.model, run.par, (run.state, run.memory), run.stimulus, run.duration, run.step,
+        run.model,
+        run.par,
+        (run.state, run.memory),
+        run.stimulus,
+        run.duration,
+        run.step,
         run.record,
-    )  # fmt: skip
+    )
     assert (end.repeated, end.unsettled) == (compiled.repeated, compiled.unsettled)
     assert_same(path, compiled, values)
 

@@ -19,17 +19,50 @@ from bywire.simulation.raised import raised
 from bywire.simulation.signs import Interval
 
 RANGES = {("p", 0): (0.0, math.inf), ("p", 1): (-1.0, 2.0), ("p", 2): (-math.inf, 0.0)}
-UNARY = {"neg", "exp", "log", "sqrt", "sin", "cos", "fabs", "floor", "tan", "atan", "tanh", "ceil",
-         "inv", "sq", "twice", "not", "assign", "sign"}  # fmt: skip
+UNARY = {
+    "neg",
+    "exp",
+    "log",
+    "sqrt",
+    "sin",
+    "cos",
+    "fabs",
+    "floor",
+    "tan",
+    "atan",
+    "tanh",
+    "ceil",
+    "inv",
+    "sq",
+    "twice",
+    "not",
+    "assign",
+    "sign",
+}
 VALUES: dict[str, Callable[..., float]] = {
-    "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b,
-    "neg": lambda a: -a, "inv": lambda a: 1.0 / a, "exp": math.exp, "sqrt": math.sqrt,
-    "sin": math.sin, "cos": math.cos, "fabs": abs, "floor": math.floor, "fmax": max, "fmin": min,
-    "lt": lambda a, b: a < b, "le": lambda a, b: a <= b, "eq": lambda a, b: a == b,
-    "ne": lambda a, b: a != b, "not": lambda a: not a, "and": lambda a, b: bool(a) & bool(b),
-    "or": lambda a, b: bool(a) | bool(b), "if_else_zero": lambda c, a: a if c else 0.0,
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "neg": lambda a: -a,
+    "inv": lambda a: 1.0 / a,
+    "exp": math.exp,
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+    "fabs": abs,
+    "floor": math.floor,
+    "fmax": max,
+    "fmin": min,
+    "lt": lambda a, b: a < b,
+    "le": lambda a, b: a <= b,
+    "eq": lambda a, b: a == b,
+    "ne": lambda a, b: a != b,
+    "not": lambda a: not a,
+    "and": lambda a, b: bool(a) & bool(b),
+    "or": lambda a, b: bool(a) | bool(b),
+    "if_else_zero": lambda c, a: a if c else 0.0,
     "select": lambda c, a, b: a if c else b,
-}  # fmt: skip
+}
 
 
 def evaluate(graph: Graph, root: Node, leaves: dict[tuple[str, int], float]) -> float:
@@ -85,10 +118,19 @@ def test_divisions_become_products() -> None:
 def test_folding() -> None:
     graph, roots = built(
         lambda x, y, z, p, q, r: (
-            ca.exp(ca.SX(0.0)) + 2.0 * ca.SX(3.0), 0.0 * x + y, 1.0 * x, x - x, 0.0 - (-x),
-            -1.0 * x, x + (-y), -(x - y), ca.sqrt(ca.SX(2.0)), x**2, x**0.5,
+            ca.exp(ca.SX(0.0)) + 2.0 * ca.SX(3.0),
+            0.0 * x + y,
+            1.0 * x,
+            x - x,
+            0.0 - (-x),
+            -1.0 * x,
+            x + (-y),
+            -(x - y),
+            ca.sqrt(ca.SX(2.0)),
+            x**2,
+            x**0.5,
         )
-    )  # fmt: skip
+    )
     names = [graph.nodes[n].op for n in roots]
     assert names[0] == names[8] == "const"
     assert float(graph.nodes[roots[0]].args[0]) == 7.0
@@ -114,13 +156,24 @@ def test_limits_that_ranges_exclude() -> None:
     """Only where the parameter's range says so."""
     graph, roots = built(
         lambda x, y, z, p, q, r: (
-            ca.fmax(p, 0.0), ca.fmin(r, 0.0), ca.fabs(p * ca.exp(x)), ca.fmax(q, -2.0),
-            ca.fmax(q, 0.0), ca.fmax(x, 0.0), ca.fabs(r),
+            ca.fmax(p, 0.0),
+            ca.fmin(r, 0.0),
+            ca.fabs(p * ca.exp(x)),
+            ca.fmax(q, -2.0),
+            ca.fmax(q, 0.0),
+            ca.fmax(x, 0.0),
+            ca.fabs(r),
         )
-    )  # fmt: skip
+    )
     assert [graph.nodes[n].op for n in roots] == [
-        "leaf", "leaf", "mul", "leaf", "fmax", "fmax", "fabs",
-    ]  # fmt: skip
+        "leaf",
+        "leaf",
+        "mul",
+        "leaf",
+        "fmax",
+        "fmax",
+        "fabs",
+    ]
 
 
 def test_what_is_above_zero_is_told_by_comparisons() -> None:
@@ -144,9 +197,10 @@ def test_fixed_parts_are_gathered() -> None:
     graph, roots = built(lambda x, y, z, p, q, r: ((x + p) + q, p * (x * q), (p * x) * r), True)
     for root in roots:
         moving = [
-            n for n in needed(graph, [root], lambda _: False)
+            n
+            for n in needed(graph, [root], lambda _: False)
             if any(evaluates_x(graph, a) for a in graph.arguments(n))
-        ]  # fmt: skip
+        ]
         assert len(moving) == 1
 
 
@@ -180,16 +234,25 @@ def random_expression(rng: np.random.Generator, leaves: list[Any]) -> Any:
         return pool[rng.integers(len(pool))]
 
     makers: list[Callable[[], Any]] = [
-        lambda: one() + one(), lambda: one() - one(), lambda: one() * one(), lambda: -one(),
-        lambda: one() / (2.0 + ca.fabs(one())), lambda: ca.exp(ca.fmin(one(), 2.0)),
-        lambda: ca.sqrt(1.0 + ca.fabs(one())), lambda: ca.sin(one()), lambda: ca.fabs(one()),
-        lambda: ca.fmax(one(), one()), lambda: ca.fmin(one(), one()), lambda: ca.sign(one()),
+        lambda: one() + one(),
+        lambda: one() - one(),
+        lambda: one() * one(),
+        lambda: -one(),
+        lambda: one() / (2.0 + ca.fabs(one())),
+        lambda: ca.exp(ca.fmin(one(), 2.0)),
+        lambda: ca.sqrt(1.0 + ca.fabs(one())),
+        lambda: ca.sin(one()),
+        lambda: ca.fabs(one()),
+        lambda: ca.fmax(one(), one()),
+        lambda: ca.fmin(one(), one()),
+        lambda: ca.sign(one()),
         lambda: ca.if_else(one() > one(), one(), one()),
         lambda: ca.if_else(one() > 0.0, one(), 0.0),
         lambda: ca.if_else(ca.logic_and(one() > 0.0, one() < 1.0), one(), one()),
         lambda: ca.if_else(one() > 0.0, one() * ca.exp(ca.fmin(one(), 1.0)), 0.0),
-        lambda: one() ** 2, lambda: ca.tanh(ca.fmin(one(), 1.0)) * 0.0 + one(),
-    ]  # fmt: skip
+        lambda: one() ** 2,
+        lambda: ca.tanh(ca.fmin(one(), 1.0)) * 0.0 + one(),
+    ]
     for _ in range(25):
         made = makers[rng.integers(len(makers))]()
         pool.append(made / (1.0 + 0.1 * ca.fabs(made)))  # keeps values small

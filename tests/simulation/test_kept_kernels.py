@@ -71,9 +71,13 @@ CONTACT = rig(0.02, k_wall=5e9, tau_wall=1e-8)
 
 def drive(model: NonlinearDrive) -> Run:
     return Run(
-        model, PARAMETERS, State(0.0, 0.0, 0.0), Memory(6.0),
-        lambda t: np.full((t.size, 1), 6.0), 0.02,
-    )  # fmt: skip
+        model,
+        PARAMETERS,
+        State(0.0, 0.0, 0.0),
+        Memory(6.0),
+        lambda t: np.full((t.size, 1), 6.0),
+        0.02,
+    )
 
 
 SMALL = drive(NonlinearDrive())  # for what any kernel shows: it is built soonest
@@ -85,8 +89,10 @@ def test_a_kept_kernel_needs_no_program_and_gives_the_same_bits(kept: Kept) -> N
     require_equal(kept.run(CONTACT), plain)
     assert (kept.builds, len(kept.entries())) == (1, 1)
     require_equal(kept.run(CONTACT), plain)
-    require_equal(kept.run(replace(CONTACT, par=CONTACT.par.replace({"m_1": 1.1}))),
-                  simulate(replace(CONTACT, par=CONTACT.par.replace({"m_1": 1.1}))))  # fmt: skip
+    require_equal(
+        kept.run(replace(CONTACT, par=CONTACT.par.replace({"m_1": 1.1}))),
+        simulate(replace(CONTACT, par=CONTACT.par.replace({"m_1": 1.1}))),
+    )
     assert kept.builds == 1
 
 
@@ -219,8 +225,13 @@ class Broken(NonlinearDrive):
 
 
 def test_models_are_kept_apart(kept: Kept) -> None:
-    runs = [drive(NonlinearDrive()), drive(Geared(0.0)), drive(Geared(0.1)), CONTACT,
-            rig(0.02, rare=True)]  # fmt: skip
+    runs = [
+        drive(NonlinearDrive()),
+        drive(Geared(0.0)),
+        drive(Geared(0.1)),
+        CONTACT,
+        rig(0.02, rare=True),
+    ]
     plain = [simulate(run) for run in runs]
     for _ in range(2):
         for run, expected in zip(runs, plain, strict=True):
@@ -302,9 +313,12 @@ def start(home: Path, cache: Path, *tick: str) -> subprocess.Popen[str]:
     paths = os.pathsep.join([str(home), *sys.path])
     changes = {"PYTHONPATH": paths, "BYWIRE_CACHE": str(cache)}
     return subprocess.Popen(
-        [sys.executable, "-c", RUN, *tick], env=os.environ | changes, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
+        [sys.executable, "-c", RUN, *tick],
+        env=os.environ | changes,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
 
 
 def answer(process: subprocess.Popen[str]) -> tuple[dict[str, object], str]:

@@ -20,14 +20,23 @@ Array = NDArray[np.float64]
 EPS = np.finfo(float).eps
 WIDTHS = {"native": (), "at most 4": ("-mno-avx512f",), "2": ("-mno-avx512f", "-mno-avx")}
 FUNCTIONS = {
-    "EXP": "EXP(a)", "SIN": "SIN(a)", "COS": "COS(a)", "LOG": "LOG(a)", "SQRT": "SQRT(a)",
-    "FLOOR": "FLOOR(a)", "FABS": "FABS(a)", "INVERSE": "INVERSE(a)", "MAX": "MAX(a, SET(0.3))",
-    "MIN": "MIN(a, SET(0.3))", "SELECT": "SELECT(LT(a, SET(0.3)), a, SET(2.0))",
-    "TAN": "TAN(a)", "POW": "POW(a, SET(1.7))",
+    "EXP": "EXP(a)",
+    "SIN": "SIN(a)",
+    "COS": "COS(a)",
+    "LOG": "LOG(a)",
+    "SQRT": "SQRT(a)",
+    "FLOOR": "FLOOR(a)",
+    "FABS": "FABS(a)",
+    "INVERSE": "INVERSE(a)",
+    "MAX": "MAX(a, SET(0.3))",
+    "MIN": "MIN(a, SET(0.3))",
+    "SELECT": "SELECT(LT(a, SET(0.3)), a, SET(2.0))",
+    "TAN": "TAN(a)",
+    "POW": "POW(a, SET(1.7))",
     "EXP_WHERE": "EXP_WHERE(LE(a, SET(1.0)), a)",
     "EXP_DECAYED": "EXP_DECAYED(LT(-a, SET(40.0)), a)",
     "LOGIC": "SELECT((LT(SET(0.0), a) & NOT(EQ(a, SET(1.0)))) | NE(a, a), SET(1.0), SET(0.0))",
-}  # fmt: skip
+}
 
 
 def source() -> str:
@@ -106,8 +115,12 @@ def test_arithmetic(library: ctypes.CDLL) -> None:
     for name, expected in wanted.items():
         np.testing.assert_array_equal(apply(library, name, steps), expected, err_msg=name)
     positive = np.geomspace(1e-10, 1e10, 8_000)
-    for name, expected in (("SQRT", np.sqrt(positive)), ("LOG", np.log(positive)),
-                           ("POW", positive**1.7), ("TAN", np.tan(positive))):  # fmt: skip
+    for name, expected in (
+        ("SQRT", np.sqrt(positive)),
+        ("LOG", np.log(positive)),
+        ("POW", positive**1.7),
+        ("TAN", np.tan(positive)),
+    ):
         np.testing.assert_allclose(
             apply(library, name, positive), expected, rtol=4.0 * EPS, atol=4.0 * EPS, err_msg=name
         )
@@ -118,9 +131,10 @@ def test_kernels_of_every_width(width: str, monkeypatch: pytest.MonkeyPatch) -> 
     """The heart of a wedge brake in lanes: the same run, whatever the processor offers."""
     monkeypatch.setattr(case_kernels, "VECTOR", (*VECTOR, *WIDTHS[width]))
     monkeypatch.setattr(
-        case_kernels, "lane_kernel",
+        case_kernels,
+        "lane_kernel",
         lambda prepared, *rest: case_kernels.LaneKernel.of(prepared.program, *rest),
-    )  # fmt: skip
+    )
     run, names = heart(0.02), ["X_1", "x", "f_1"]
     result = ensemble.simulate_ensemble(run, {"F_S0": [250.0, 260.0, 270.0]}, names)
     single = simulate(run, names)

@@ -30,9 +30,13 @@ class Tabulated(NonlinearDrive):
 
 def drive(model: NonlinearDrive, R: float = 0.5) -> Run:
     return Run(
-        model, PARAMETERS.replace({"R": R}), State(0.0, 0.0, 0.0), Memory(6.0),
-        lambda t: np.full((t.size, 1), 6.0), 0.05,
-    )  # fmt: skip
+        model,
+        PARAMETERS.replace({"R": R}),
+        State(0.0, 0.0, 0.0),
+        Memory(6.0),
+        lambda t: np.full((t.size, 1), 6.0),
+        0.05,
+    )
 
 
 def test_models_differ_by_what_they_hold() -> None:

@@ -60,8 +60,10 @@ def test_it_is_renewed_where_a_ramp_moved(road) -> None:
 
     ramp = nodes["share"]
     assert declarations([group], name) == [
-        "uint64_t known0 = 0;", f"double at{ramp} = 0.0;", f"double v{nodes['wide']} = 0.0;"
-    ]  # fmt: skip
+        "uint64_t known0 = 0;",
+        f"double at{ramp} = 0.0;",
+        f"double v{nodes['wide']} = 0.0;",
+    ]
     lines = renewal(graph, 0, group, ["computed;"], name)
     assert lines[0] == f"if (__builtin_expect(!(known0 & (v{ramp} == at{ramp})), 0)) {{"
     assert lines[1:] == ["  known0 = 1;", f"  at{ramp} = v{ramp};", "  computed;", "}"]

@@ -87,10 +87,14 @@ def test_the_paper_s_gear_gives_energy() -> None:
 
 @pytest.mark.parametrize(
     ("element", "name", "factor"),
-    [(dc_motor, "power_loss", -1.0), (battery_supply, "power_loss", -1.0),
-     (pipeline, "power_loss", -1.0), (master_cylinder, "power_loss", -1.0),
-     (caliper, "energy", 1.01)],
-)  # fmt: skip
+    [
+        (dc_motor, "power_loss", -1.0),
+        (battery_supply, "power_loss", -1.0),
+        (pipeline, "power_loss", -1.0),
+        (master_cylinder, "power_loss", -1.0),
+        (caliper, "energy", 1.01),
+    ],
+)
 def test_a_wrong_sign_shows(
     element: ModuleType, name: str, factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

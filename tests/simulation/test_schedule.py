@@ -28,9 +28,13 @@ def test_plan_of_two_tasks() -> None:
 
 @pytest.mark.parametrize(
     ("step", "record", "period", "name", "interval"),
-    [(30e-6, 1e-3, 1e-3, "drive", "1000"), (40e-6, 1e-4, 1e-3, "recording", "100"),
-     (3e-3, 3e-3, 1e-3, "drive", "1000"), (20.001e-6, 1e-3, 1e-3, "drive", "1000")],
-)  # fmt: skip
+    [
+        (30e-6, 1e-3, 1e-3, "drive", "1000"),
+        (40e-6, 1e-4, 1e-3, "recording", "100"),
+        (3e-3, 3e-3, 1e-3, "drive", "1000"),
+        (20.001e-6, 1e-3, 1e-3, "drive", "1000"),
+    ],
+)
 def test_a_step_that_does_not_divide(
     step: float, record: float, period: float, name: str, interval: str
 ) -> None:

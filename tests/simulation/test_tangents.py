@@ -38,9 +38,16 @@ def open_loop(
         "dardanelli2010",
         overrides=overrides,
         options=options,
-        stimulus={"kind": "ramp", "start": start, "end": 5.0, "slope": slope, "t_start": 0.0,
-                  "t_hold": 0.0, "after": "stay"},
-    )  # fmt: skip
+        stimulus={
+            "kind": "ramp",
+            "start": start,
+            "end": 5.0,
+            "slope": slope,
+            "t_start": 0.0,
+            "t_hold": 0.0,
+            "after": "stay",
+        },
+    )
     return as_run(bench.cases()[0], bench.step)
 
 
@@ -60,8 +67,17 @@ def test_smooth_run() -> None:
     run = open_loop({"drive.T_source": 1e-3}, options, 1.0, 20.0)
     run = replace(run, state=run.state._replace(omega=20.0))
     signals = ("i", "omega", "p_mc", "p_pd", "E_copper", "E_stored")
-    names = ("motor.R_m", "motor.K_e", "seal.T_pr", "seal.f_cfr_p", "fluid.beta", "caliper.K_pd",
-             "gear.J_mot", "master_cylinder.A_mc", "fluid.nu")  # fmt: skip
+    names = (
+        "motor.R_m",
+        "motor.K_e",
+        "seal.T_pr",
+        "seal.f_cfr_p",
+        "fluid.beta",
+        "caliper.K_pd",
+        "gear.J_mot",
+        "master_cylinder.A_mc",
+        "fluid.nu",
+    )
     result = simulate_with_sensitivities(run, names, signals)
     assert np.all(result.trajectory.values[:, 1] > 10.0)
     for k, name in enumerate(names):
@@ -99,12 +115,14 @@ RIG = (("x_1", "x_2"), ("F_c1", "m_1", "k_wall", "mu", "damping"))
 
 @pytest.mark.parametrize(
     ("run", "signals", "names"),
-    [(heart(0.012, record=1e-3), *HEART),
-     (heart(0.008, record=1e-3, stiffer=300.0, tau=0.0), HEART[0], ("F_S0", "K_S", "M_S")),
-     (rig(0.005, record=1e-3), *RIG),
-     (rig(0.005, record=1e-3, rare=True, k_wall=1.5e9), *RIG)],
+    [
+        (heart(0.012, record=1e-3), *HEART),
+        (heart(0.008, record=1e-3, stiffer=300.0, tau=0.0), HEART[0], ("F_S0", "K_S", "M_S")),
+        (rig(0.005, record=1e-3), *RIG),
+        (rig(0.005, record=1e-3, rare=True, k_wall=1.5e9), *RIG),
+    ],
     ids=["heart", "repeated passes", "rig", "rare contact"],
-)  # fmt: skip
+)
 def test_contacts_and_frictions(run: Run, signals: tuple[str, ...], names: tuple[str, ...]) -> None:
     """Selections of contact sets, sweeps, signs and repetitions are differentiated as taken.
 
@@ -266,8 +284,10 @@ def test_the_lanes_of_a_substep_are_vectorized(tmp_path: Path) -> None:
     flags = (*compiler._COMMON, *compiler.VECTOR, "-fopt-info-vec-optimized")
     done = subprocess.run(
         ["gcc", *flags, str(source), "-o", str(tmp_path / "kernel.so")],
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     lines = source.read_text(encoding="utf-8").splitlines()
     substep = max(k for k, line in enumerate(lines, 1) if "#pragma omp simd" in line)
     told = re.findall(r"kernel\.c:(\d+):\d+: optimized: loop vectorized", done.stderr)

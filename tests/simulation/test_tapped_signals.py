@@ -10,9 +10,10 @@ from bywire.simulation.tapped import DEAD, Tap, Tapped, rests
 from systems.sampled_lag import LAG, Memory, SampledLag, State
 
 TAPS = (
-    Tap("sensor", "reading", "y"), Tap("wish", "demand", "wanted"),
+    Tap("sensor", "reading", "y"),
+    Tap("wish", "demand", "wanted"),
     Tap("actor", "drive", "drive", "law", 3),
-)  # fmt: skip
+)
 STEP, TICKS = 2.5e-4, 60
 
 
@@ -57,9 +58,15 @@ def drive(wanted, seen):
 
 def test_without_a_fault_it_is_the_model_inside():
     inside = Run(
-        SampledLag(), LAG, State(0.0), Memory(0.0, 0.0), lambda t: wish(t.size)[:, None],
-        TICKS * LAG.T_s, STEP, LAG.T_s,
-    )  # fmt: skip
+        SampledLag(),
+        LAG,
+        State(0.0),
+        Memory(0.0, 0.0),
+        lambda t: wish(t.size)[:, None],
+        TICKS * LAG.T_s,
+        STEP,
+        LAG.T_s,
+    )
     plain = simulate(inside)
     np.testing.assert_array_equal(tapped().values, plain.values)
 
@@ -71,15 +78,16 @@ HELD = 20
 @pytest.mark.parametrize(
     ("signals", "law"),
     [
-        ({"tap_sensor_gain": [-0.5], "tap_sensor_offset": [0.2]},
-         lambda k, y: drive(W[k], 0.5 * y + 0.2)),
+        (
+            {"tap_sensor_gain": [-0.5], "tap_sensor_offset": [0.2]},
+            lambda k, y: drive(W[k], 0.5 * y + 0.2),
+        ),
         ({"tap_wish_offset": np.arange(TICKS + 1) * 0.01}, lambda k, y: drive(W[k] + 0.01 * k, y)),
         ({"tap_actor_gain": [-1.0], "tap_actor_offset": [0.7]}, lambda k, y: 0.7),
-        ({"tap_wish_held": np.arange(TICKS + 1) > HELD},
-         lambda k, y: drive(W[min(k, HELD)], y)),
+        ({"tap_wish_held": np.arange(TICKS + 1) > HELD}, lambda k, y: drive(W[min(k, HELD)], y)),
     ],
     ids=["reading", "demand", "drive", "held"],
-)  # fmt: skip
+)
 def test_a_tap_falsifies_as_it_is_told(signals, law):
     np.testing.assert_allclose(tapped(**signals)["y"], expected(law), rtol=0, atol=1e-12)
 

@@ -16,9 +16,16 @@ cases = 64
 
 
 @pytest.mark.parametrize(
-    "asked", [{"cases": 99_999_999_999}, {"cases": 0}, {"cases": 1.5}, {"workers": 0},
-              {"workers": 2000}, {"workers": 2, "cluster": "tcp://host:8786"}],
-)  # fmt: skip
+    "asked",
+    [
+        {"cases": 99_999_999_999},
+        {"cases": 0},
+        {"cases": 1.5},
+        {"workers": 0},
+        {"workers": 2000},
+        {"workers": 2, "cluster": "tcp://host:8786"},
+    ],
+)
 def test_what_cannot_be_leaves_no_folder_and_no_trace_in_one(study, tmp_path, asked):
     path, out = study(FEW), tmp_path / "out"
     with pytest.raises(ParameterError):

@@ -64,8 +64,9 @@ def test_key_figures_are_those_of_single_runs(plan):
 
 def test_cases_of_several_structures_run_in_groups(study, monkeypatch):
     monkeypatch.setattr("bywire.studies.plan.CHUNK", 8)
-    plan = read_study(study('[vary]\n"adc.law" = { values = ["ideal", "quantized"] }\n'
-                            '"motor.R_m" = "+-5 %"\n'))  # fmt: skip
+    plan = read_study(
+        study('[vary]\n"adc.law" = { values = ["ideal", "quantized"] }\n"motor.R_m" = "+-5 %"\n')
+    )
     columns = computed_chunk(plan, 0)
     assert {*columns["adc.law"]} == {"ideal", "quantized"}
     assert np.isfinite(columns["peak_current"]).all()
@@ -85,8 +86,9 @@ def test_key_figures_of_choices_among_the_options_are_those_of_single_runs(
 ):
     monkeypatch.setattr("bywire.studies.plan.CHUNK", 8)
     text = ", ".join(values if "true" in values else map(repr, values))
-    plan = read_study(study(f'[vary]\n"{name}" = {{ values = [{text}] }}\n'
-                            f'"{other}" = "+-5 %"\n', bench))  # fmt: skip
+    plan = read_study(
+        study(f'[vary]\n"{name}" = {{ values = [{text}] }}\n"{other}" = "+-5 %"\n', bench)
+    )
     columns = computed_chunk(plan, 0)
     assert sorted({*columns[name]}) == values
     assert not any(columns["failure"])
@@ -124,8 +126,12 @@ def test_a_case_that_fails_fails_alone(plan, monkeypatch):
 
 
 def test_values_that_contradict_each_other_are_a_failure(study):
-    plan = read_study(study('[vary]\n"master_cylinder.s_mc" = { kind = "discrete", '
-                            'values = ["0.0001 mm", "10 mm"] }\n'))  # fmt: skip
+    plan = read_study(
+        study(
+            '[vary]\n"master_cylinder.s_mc" = { kind = "discrete", '
+            'values = ["0.0001 mm", "10 mm"] }\n'
+        )
+    )
     columns = computed_chunk(plan, 0)
     failed = np.array([bool(text) for text in columns["failure"]])
     assert (failed == (columns["master_cylinder.s_mc"] < 1e-6)).all()

@@ -29,13 +29,19 @@ def read(entry, nominal=0.4, leaf=LEAF):
         ({"kind": "uniform", "low": "0.2 ohm", "high": "+50 %"}, 0.4, 0.4 / math.sqrt(12)),
         ({"kind": "normal", "sd": "5 %"}, 0.4, 0.02),
         ({"kind": "normal", "mean": "500 mohm", "sd": "20 mohm"}, 0.5, 0.02),
-        ({"kind": "normal", "sd": "0.1 ohm", "low": "0.4 ohm"}, 0.4 + 0.1 * math.sqrt(2 / math.pi),
-         0.1 * math.sqrt(1 - 2 / math.pi)),
+        (
+            {"kind": "normal", "sd": "0.1 ohm", "low": "0.4 ohm"},
+            0.4 + 0.1 * math.sqrt(2 / math.pi),
+            0.1 * math.sqrt(1 - 2 / math.pi),
+        ),
         ({"kind": "triangular", "low": "0.1 ohm", "high": "0.7 ohm"}, 0.4, 0.3 / math.sqrt(6)),
-        ({"kind": "discrete", "values": ["0.3 ohm", "0.5 ohm"], "weights": [1, 3]}, 0.45,
-         0.2 * math.sqrt(0.25 * 0.75)),
+        (
+            {"kind": "discrete", "values": ["0.3 ohm", "0.5 ohm"], "weights": [1, 3]},
+            0.45,
+            0.2 * math.sqrt(0.25 * 0.75),
+        ),
     ],
-)  # fmt: skip
+)
 def test_moments_are_those_of_the_closed_form(entry, mean, sd):
     values = read(entry).quantile(MIDDLES)
     assert values.mean() == pytest.approx(mean, rel=1e-4)
@@ -59,14 +65,20 @@ def test_a_normal_tolerance_ends_where_it_says():
     ("entry", "texts"),
     [
         ({"kind": "normal", "sd": "50 %"}, ["> 0 ohm", "probability of 0.023", "'low'"]),
-        ({"kind": "uniform", "low": "-1 ohm", "high": "1 ohm"},
-         ["leaves what is admissible", "give 'low' and 'high' within it"]),
-        ({"kind": "triangular", "low": "-1 ohm", "high": "1 ohm"},
-         ["leaves what is admissible", "'low', 'mode' and 'high'"]),
+        (
+            {"kind": "uniform", "low": "-1 ohm", "high": "1 ohm"},
+            ["leaves what is admissible", "give 'low' and 'high' within it"],
+        ),
+        (
+            {"kind": "triangular", "low": "-1 ohm", "high": "1 ohm"},
+            ["leaves what is admissible", "'low', 'mode' and 'high'"],
+        ),
         ({"kind": "log-normal", "sd": "900 %"}, ["leaves what is admissible", "smaller 'sd'"]),
         ("+-200 %", ["leaves what is admissible", "narrower tolerance"]),
-        ({"kind": "discrete", "values": ["0 ohm", "1 ohm"]},
-         ["leaves what is admissible", "leave out 0 ohm"]),
+        (
+            {"kind": "discrete", "values": ["0 ohm", "1 ohm"]},
+            ["leaves what is admissible", "leave out 0 ohm"],
+        ),
         ("+-100 %", ["its end at 0 ohm is not admissible", "> 0 ohm and <= 10 ohm"]),
         ({"kind": "tolerance", "tolerance": "100 %", "shape": "normal"}, ["its end at 0 ohm"]),
         ({"kind": "uniform", "low": "0 ohm", "high": "1 ohm"}, ["its end at 0 ohm"]),
@@ -77,8 +89,10 @@ def test_a_normal_tolerance_ends_where_it_says():
         ({"kind": "normal", "sd": "1e-18 %"}, ["no wider than the last digit"]),
         ({"kind": "log-normal", "sd": "1e-18 %"}, ["no wider than the last digit"]),
         ({"kind": "discrete", "values": ["0.3 ohm"]}, ["one value alone, 0.3 ohm"]),
-        ({"kind": "discrete", "values": ["0.3 ohm", "1 ohm", "300 mohm"]},
-         ["0.3 ohm stands there twice", "weights"]),
+        (
+            {"kind": "discrete", "values": ["0.3 ohm", "1 ohm", "300 mohm"]},
+            ["0.3 ohm stands there twice", "weights"],
+        ),
         ({"sd": "5 %"}, ["{ sd = '5 %' }: kind is missing", "'normal' or 'log-normal'"]),
         ({"kind": ["normal"], "sd": "5 %"}, ["unknown kind", "'normal'"]),
         ({"kind": "normal", "sd": True}, ["sd = true: one number"]),
@@ -91,8 +105,10 @@ def test_a_normal_tolerance_ends_where_it_says():
         ({"kind": "norml", "sd": "5 %"}, ["'norml'", "'normal'"]),
         ({"kind": "triangular", "low": "0.5 ohm", "high": "0.7 ohm"}, ["must rise"]),
         ({"kind": "discrete", "values": ["0.3 ohm"], "weights": [1, 2]}, ["1 numbers > 0"]),
-        ({"kind": "discrete", "values": ["0.3 ohm", "1 ohm"], "weights": [1, "3"]},
-         ["weights = [1, '3']", "2 numbers > 0"]),
+        (
+            {"kind": "discrete", "values": ["0.3 ohm", "1 ohm"], "weights": [1, "3"]},
+            ["weights = [1, '3']", "2 numbers > 0"],
+        ),
         ({"kind": "normal", "sd": "1 %", "low": "1.5 ohm"}, ["nothing of it is left"]),
         ({"kind": "discrete", "values": []}, ["values = [...]"]),
         ({"kind": "tolerance", "tolerance": "5 %", "shape": "cauchy"}, ["'cauchy'", "normal"]),
@@ -145,9 +161,13 @@ def test_widths_of_a_temperature_are_differences():
 
 
 @pytest.mark.parametrize(
-    "entry", ["+-5 %", {"kind": "normal", "sd": "5 %"},
-              {"kind": "uniform", "low": "-5 %", "high": "60 degC"}],
-)  # fmt: skip
+    "entry",
+    [
+        "+-5 %",
+        {"kind": "normal", "sd": "5 %"},
+        {"kind": "uniform", "low": "-5 %", "high": "60 degC"},
+    ],
+)
 def test_a_temperature_has_no_shares(entry):
     """5 % of 20 degC would be 15 K."""
     leaf = Leaf("motor_heat.T_a", Unit("K"), 200.0, 400.0, False, False)

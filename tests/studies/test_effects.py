@@ -66,17 +66,22 @@ def test_what_takes_the_figure_away_comes_first(findings):
     assert [e.lacking for e in lost.effects("peak_current")] == [1, 0, 0]
     (tornado,) = (b for b in study_figures(lost, dict) if getattr(b, "name", "") == "tornado")
     assert "A triangle: the figure is not defined at some" in tornado.caption
-    assert any(text.get_text() == "not defined at a level"
-               for text in tornado.figure.legends[0].get_texts())  # fmt: skip
+    assert any(
+        text.get_text() == "not defined at a level"
+        for text in tornado.figure.legends[0].get_texts()
+    )
 
 
 def test_effects_are_in_the_json(findings):
     said = findings_data(findings)["kpis"]["peak_current"]["effects"]
     assert list(said) == ["motor.R_m", "adc.law", "motor.K_e"]
     assert said["adc.law"] == {
-        "unit": None, "values": ["ideal", "quantized"], "figures": [21.0, 20.0],
-        "swing": pytest.approx(1.0), "undefined": 0,
-    }  # fmt: skip
+        "unit": None,
+        "values": ["ideal", "quantized"],
+        "figures": [21.0, 20.0],
+        "swing": pytest.approx(1.0),
+        "undefined": 0,
+    }
     assert said["motor.R_m"]["swing"] == pytest.approx(4.0)
     assert len(said["motor.R_m"]["values"]) == len(said["motor.R_m"]["figures"]) == 3
 

@@ -27,8 +27,11 @@ def found(study):
         peaks = np.array(peaks, dtype=float)
         names = plan.bench.definition.kpis_with(plan.bench.chosen_options)
         columns = {name: np.full(peaks.size, math.nan) for name in names}
-        columns |= {CASE: np.arange(peaks.size), "motor.R_m": np.linspace(0.3, 0.4, peaks.size),
-                    "peak_current": peaks}  # fmt: skip
+        columns |= {
+            CASE: np.arange(peaks.size),
+            "motor.R_m": np.linspace(0.3, 0.4, peaks.size),
+            "peak_current": peaks,
+        }
         columns[FAILURE] = np.where(np.isnan(peaks), "it left the numbers", "")
         said = [f"far out; hot: {20 + k} degC" for k in range(peaks.size)]
         columns[WARNINGS] = np.array(said, dtype=object)
@@ -62,9 +65,13 @@ def test_a_case_without_a_result_misses_and_the_worst_is_named(found):
 
 @pytest.mark.parametrize(
     ("peaks", "error", "outcome"),
-    [([19.0] * 5, 0.1, "met"), ([19.0, 21.0], 0.1, "missed"), ([19.0, 19.95], 0.1, "undecided"),
-     ([19.0, math.nan], 0.1, "missed")],
-)  # fmt: skip
+    [
+        ([19.0] * 5, 0.1, "met"),
+        ([19.0, 21.0], 0.1, "missed"),
+        ([19.0, 19.95], 0.1, "undecided"),
+        ([19.0, math.nan], 0.1, "missed"),
+    ],
+)
 def test_without_a_probability_every_case_has_to_meet_it(found, peaks, error, outcome):
     (judgment,) = found(peaks, error, "<= 20 A").judgments
     assert judgment.outcome == outcome
@@ -129,8 +136,10 @@ def test_a_choice_without_influence_seldom_differs_from_none():
     rng = np.random.default_rng(5)
     laws = rng.integers(0, 3, (1000, 40))
     figures = rng.lognormal(size=laws.shape)
-    found = [choice_influence("law", law, y, 0.9)
-             for law, y in zip(laws.astype(str), figures, strict=True)]  # fmt: skip
+    found = [
+        choice_influence("law", law, y, 0.9)
+        for law, y in zip(laws.astype(str), figures, strict=True)
+    ]
     false = sum(each.is_distinct for each in found)
     assert 70 < false < 130  # of 1000 a tenth, within three standard deviations
     same = stats.kruskal(*(figures[0][laws[0] == k] for k in range(3))).pvalue
@@ -139,8 +148,13 @@ def test_a_choice_without_influence_seldom_differs_from_none():
 
 def test_what_a_study_does_not_have_is_named(found):
     findings = found([19.0, 20.0, 21.0])
-    asked = (findings.figure, findings.influences, findings.effects, findings.drivers,
-             findings.sensitivity)  # fmt: skip
+    asked = (
+        findings.figure,
+        findings.influences,
+        findings.effects,
+        findings.drivers,
+        findings.sensitivity,
+    )
     for ask in asked:
         with pytest.raises(UnknownNameError, match="did you mean 'peak_current'"):
             ask("peak_curent")

@@ -22,8 +22,11 @@ def estimate(**changes):
     }
     for name, value in changes.items():
         rows["motor.R_m"][name] = value
-    return {"estimates": {"braking": {"parameters": rows,
-            "correlation": {"names": NAMES, "matrix": MATRIX}}}}  # fmt: skip
+    return {
+        "estimates": {
+            "braking": {"parameters": rows, "correlation": {"names": NAMES, "matrix": MATRIX}}
+        }
+    }
 
 
 @pytest.fixture
@@ -38,10 +41,12 @@ def written(tmp_path):
 
 def test_estimates_come_back_as_they_were(study, written):
     written(estimate())
-    plan = read_study(study(
-        '[measured]\nfile = "id"\n[vary]\n"motor.L_m" = "+-5 %"\n'
-        '[[correlation]]\nof = ["motor.L_m", "motor.R_m"]\nvalue = 0.2\n'
-    ))  # fmt: skip
+    plan = read_study(
+        study(
+            '[measured]\nfile = "id"\n[vary]\n"motor.L_m" = "+-5 %"\n'
+            '[[correlation]]\nof = ["motor.L_m", "motor.R_m"]\nvalue = 0.2\n'
+        )
+    )
     assert [v.name for v in plan.varied] == ["motor.R_m", "motor.K_e", "motor.L_m"]
     columns = [plan.values(k) for k in range(60)]
     R, K, L = (np.concatenate([c[v.name] for c in columns]) for v in plan.varied)
@@ -68,8 +73,9 @@ def test_some_of_them_and_cut_off(study, written):
     refused = r"\[measured\] motor.R_m: .* leaves what is admissible.*truncate = true"
     with pytest.raises(InputError, match=refused):
         read_study(study('[measured]\nfile = "id"\n'))
-    plan = read_study(study('[measured]\nfile = "id/estimate.json"\nof = ["motor.R_m"]\n'
-                            "truncate = true\n"))  # fmt: skip
+    plan = read_study(
+        study('[measured]\nfile = "id/estimate.json"\nof = ["motor.R_m"]\ntruncate = true\n')
+    )
     assert "truncated from 0 ohm" in plan.varied[0].distribution.text
     assert 0.0 < plan.varied[0].distribution.levels(2)[0] < 0.001
     assert plan.correlations == {}
@@ -102,12 +108,16 @@ def test_what_is_no_estimate_is_said(study, written, content, text):
         ('file = "id"\nof = []', "name some of them"),
         ('file = "id"\ntruncate = "yes"', "true or false"),
         ('file = "id"\nonly = ["motor.R_m"]', "'only'"),
-        ('file = "id"\n[vary]\n"motor.K_e" = "+-5 %"',
-         r"motor.K_e varies twice, by \[measured\] and by \[vary\]"),
-        ('file = "id"\n[[correlation]]\nof = ["motor.K_e", "motor.R_m"]\nvalue = 0.1',
-         "stands there twice"),
+        (
+            'file = "id"\n[vary]\n"motor.K_e" = "+-5 %"',
+            r"motor.K_e varies twice, by \[measured\] and by \[vary\]",
+        ),
+        (
+            'file = "id"\n[[correlation]]\nof = ["motor.K_e", "motor.R_m"]\nvalue = 0.1',
+            "stands there twice",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_section_that_does_not_fit_is_said(study, written, lines, text):
     written(estimate())
     with pytest.raises(InputError, match=text):

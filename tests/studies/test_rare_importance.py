@@ -26,9 +26,14 @@ peak_current = "<= 25 A with 99 %"
 def failing(scores) -> FailureProbability:
     estimate = counted(10, 1000, 0.95)
     return FailureProbability(
-        "done", estimate, lambda _: UNKNOWN, (), 1000,
-        center=np.asarray(scores).mean(axis=0), failing=np.asarray(scores),
-    )  # fmt: skip
+        "done",
+        estimate,
+        lambda _: UNKNOWN,
+        (),
+        1000,
+        center=np.asarray(scores).mean(axis=0),
+        failing=np.asarray(scores),
+    )
 
 
 def test_single_values_have_shares_in_whatever_order_they_are_listed(study):

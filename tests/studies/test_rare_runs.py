@@ -121,9 +121,12 @@ def test_a_linear_axis_fails_as_seldom_as_its_closed_form(axis, tmp_path, kind, 
     if kind == "importance-sampling":
         assert rare.failure.runs <= 1280
         assert rare.failure.estimate.variation < 0.08
-    assert study.status == {"met": "passed", "missed": "failed", "undecided": "undecided"}[
-        study.findings.judgments[0].outcome
-    ]
+    assert (
+        study.status
+        == {"met": "passed", "missed": "failed", "undecided": "undecided"}[
+            study.findings.judgments[0].outcome
+        ]
+    )
     assert rare.importance[0].quantity == "d"
     assert rare.importance[0].score < -2.5
     bench = study.worst("overshoot")  # the most probable failing case
@@ -230,10 +233,11 @@ def test_each_requirement_in_turn_shares_the_first_level(study, tmp_path):
         ("cases_per_level = 640", "levels = 3", "levels"),
         (
             'kind = "subset-simulation"\ncases = 3000\ncases_per_level = 640',
-            'kind = "importance-sampling"', "adc.law",
+            'kind = "importance-sampling"',
+            "adc.law",
         ),
     ],
-)  # fmt: skip
+)
 def test_what_does_not_fit_is_refused(study, old, new, why):
     text = BRAKE.replace("[design]", '"adc.law" = { values = ["ideal", "quantized"] }\n[design]')
     with pytest.raises(InputError, match=why):

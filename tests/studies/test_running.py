@@ -22,8 +22,12 @@ def test_what_waits_for_chunks_is_used_meanwhile(study, tmp_path, monkeypatch):
     plan, store = read_study(study()), StudyStore(tmp_path / "out")
     seen: list[int] = []
     complete(
-        plan, store, Origin(tmp_path / "study.toml"), workers=2, progress=silent,
+        plan,
+        store,
+        Origin(tmp_path / "study.toml"),
+        workers=2,
+        progress=silent,
         meanwhile=lambda: seen.append(len(active_children())),
-    )  # fmt: skip
+    )
     assert seen == [2]
     assert len(store.finished()) == plan.chunks

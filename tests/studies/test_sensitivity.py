@@ -34,8 +34,10 @@ cases = {cases}
 """
 KPI = "peak_current"  # stands for any figure: its column is fed
 ISHIGAMI = {  # with a = 7, b = 0.1: first order and total in closed form
-    "motor.R_m": (0.3139, 0.5576), "motor.K_e": (0.4424, 0.4424), "motor.L_m": (0.0, 0.2437)
-}  # fmt: skip
+    "motor.R_m": (0.3139, 0.5576),
+    "motor.K_e": (0.4424, 0.4424),
+    "motor.L_m": (0.0, 0.2437),
+}
 SLOPES = np.array([1.0, -2.0, 3.0])
 SEEDS = 50
 
@@ -117,7 +119,8 @@ def test_a_linear_function_has_its_slopes(planned):
 
 def test_a_step_between_single_values_is_all_they_can_do(study):
     """Whatever their weights, a switch that adds 5 A has an effect of 5 A, and no more."""
-    plan = read_study(study("""
+    plan = read_study(
+        study("""
 [vary]
 "motor.R_m" = "+-5 %"
 "supply.V_bat" = { kind = "discrete", values = ["11 V", "13 V"], weights = [1, 3] }
@@ -125,7 +128,8 @@ def test_a_step_between_single_values_is_all_they_can_do(study):
 [design]
 kind = "morris"
 cases = 64
-"""))  # fmt: skip
+""")
+    )
     chunks = [pd.DataFrame(plan.values(k)) for k in range(plan.chunks)]
     cases = pd.concat(chunks, ignore_index=True)
     ratio = (cases["motor.R_m"] / plan.bench.par.motor.R_m - 1.0) / 0.05
@@ -165,8 +169,11 @@ def test_intervals_cover_from_the_least_number_of_cases_on(planned, kind, cases)
             pairs = [(each.mu_star, true[name]) for name, each in indices.items()]
         else:
             indices = by_name(found(replace(plan, seed=seed), ishigami))
-            pairs = [(index, true) for name, each in indices.items()
-                     for index, true in zip((each.first, each.total), ISHIGAMI[name], strict=True)]
+            pairs = [
+                (index, true)
+                for name, each in indices.items()
+                for index, true in zip((each.first, each.total), ISHIGAMI[name], strict=True)
+            ]
         for estimate, true_value in pairs:
             reach = estimate.high - estimate.value
             held.append(abs(estimate.value - true_value) <= reach)
@@ -178,8 +185,9 @@ def test_intervals_cover_from_the_least_number_of_cases_on(planned, kind, cases)
 def test_the_confidence_of_the_study_is_that_of_its_intervals(planned):
     wide, narrow = (
         by_name(found(replace(planned(kind, 640), confidence=c), curved))["motor.R_m"].strength
-        for kind in ["morris"] for c in (0.99, 0.5)
-    )  # fmt: skip
+        for kind in ["morris"]
+        for c in (0.99, 0.5)
+    )
     ratio = (wide.high - wide.value) / (narrow.high - narrow.value)
     assert ratio == pytest.approx(2.5758 / 0.6745, rel=1e-3)
 
@@ -205,7 +213,8 @@ def test_a_group_of_saltellis_exchanges_one_quantity_at_a_time():
 
 
 def test_trajectories_go_to_the_ends_and_no_further(study):
-    plan = read_study(study("""
+    plan = read_study(
+        study("""
 [vary]
 "motor.R_m" = { kind = "normal", sd = "4 %" }
 "motor.K_e" = "+-5 %"
@@ -213,7 +222,8 @@ def test_trajectories_go_to_the_ends_and_no_further(study):
 [design]
 kind = "morris"
 cases = 127
-"""))  # fmt: skip
+""")
+    )
     assert (plan.total, plan.chunks) == (124, 2)  # 31 trajectories of 4 cases
     last = plan.values(1)
     assert {len(column) for column in last.values()} == {60}  # a shorter chunk

@@ -27,7 +27,8 @@ t_step = "0 s"
 
 
 def test_a_study_says_what_varies_and_how(study):
-    plan = read_study(study("""
+    plan = read_study(
+        study("""
 [vary]
 motor.R_m = "+-5 %"
 "motor.K_e" = { kind = "normal", sd = "2 %", together = ["ecu.est_par.K_e"] }
@@ -44,7 +45,8 @@ confidence = "99 %"
 "seal.T_pr" = "+10%"
 [requirements]
 overshoot = "<= 15 % with 99.9 %"
-"""))  # fmt: skip
+""")
+    )
     assert [v.name for v in plan.varied] == ["motor.R_m", "motor.K_e", "options.p_to"]
     assert (plan.design, plan.seed, plan.confidence) == ("latin-hypercube", 3, 0.99)
     assert (plan.cases, plan.chunks, plan.total) == (100, 2, 128)  # whole hypercubes
@@ -67,81 +69,140 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
     [
         ("", ["[vary] is empty", "motor.R_m"]),
         ('[vary]\n"motor.R_x" = "+-5 %"', ["'motor.R_x'", "'motor.R_m'"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n"motor.K_e" = { kind = "normal", sd = "1 %", '
-         'together = ["motor.R_m"] }', ["motor.R_m varies twice", "[vary] motor.K_e.together"]),
-        ('[vary]\nmotor.R_m = "+-1 %"\n"motor.R_m" = "+-5 %"',
-         ["motor.R_m varies twice", '"motor.R_m" in quotation marks']),
-        ('[vary.motor]\nR_m = "+-1 %"\n[vary.motor.K_e]\nsd = "1 %"',
-         ["[vary] motor.K_e = { sd = '1 %' }: kind is missing"]),
-        ('[vary]\n"motor.K_e" = "+-1 %"\n[set]\nmotor.R_m = "1 ohm"\n"motor.R_m" = "2 ohm"',
-         ["motor.R_m has two values"]),
-        ('[vary]\n"motor.R_m" = { sd = "5 %" }',
-         ["kind is missing", "'normal' or 'log-normal'", "triangular"]),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n"motor.K_e" = { kind = "normal", sd = "1 %", '
+            'together = ["motor.R_m"] }',
+            ["motor.R_m varies twice", "[vary] motor.K_e.together"],
+        ),
+        (
+            '[vary]\nmotor.R_m = "+-1 %"\n"motor.R_m" = "+-5 %"',
+            ["motor.R_m varies twice", '"motor.R_m" in quotation marks'],
+        ),
+        (
+            '[vary.motor]\nR_m = "+-1 %"\n[vary.motor.K_e]\nsd = "1 %"',
+            ["[vary] motor.K_e = { sd = '1 %' }: kind is missing"],
+        ),
+        (
+            '[vary]\n"motor.K_e" = "+-1 %"\n[set]\nmotor.R_m = "1 ohm"\n"motor.R_m" = "2 ohm"',
+            ["motor.R_m has two values"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = { sd = "5 %" }',
+            ["kind is missing", "'normal' or 'log-normal'", "triangular"],
+        ),
         ('[vary]\nmotor.R_m.sd = "5 %"', ["[vary] motor.R_m = { sd = '5 %' }: kind is missing"]),
         ('[vary]\nmotor.R_x = { sd = "5 %" }', ["unknown", "'motor.R_x'", "'motor.R_m'"]),
         ('[vary]\nmoter.R_m = "+-5 %"', ["'moter.R_m'", "'motor.R_m'"]),
-        ('[vary]\nmotor = { R_m = 5 }', ["[vary] motor.R_m = 5: write a tolerance"]),
-        ('[vary]\n"motor.K_e" = { kind = "normal", sd = "1 %", together = [["a"]] }',
-         ["varies together", '"[\'a\']"']),
-        ('[vary]\n"motor.K_e" = { kind = "normal", sd = "1 %", '
-         'together = ["ecu.pedal_map.V_nodes"] }', ["ecu.pedal_map.V_nodes is a table"]),
-        ('[vary]\n"seal.T_pr" = { kind = "tolerance", tolerance = "100 %", '
-         'together = ["motor.R_m"] }',
-         ["[vary] seal.T_pr.together motor.R_m", "its end at 0", "must be > 0"]),
-        ('[vary]\n"motor.R_m" = "+-100 %"',
-         ["its end at 0 ohm is not admissible", "> 0 ohm", "narrower tolerance"]),
-        ('[vary]\n"motor.K_e" = { kind = "normal", sd = "1 %", together = ["ecu.K"] }',
-         ["varies together", "'ecu.K'"]),
+        ("[vary]\nmotor = { R_m = 5 }", ["[vary] motor.R_m = 5: write a tolerance"]),
+        (
+            '[vary]\n"motor.K_e" = { kind = "normal", sd = "1 %", together = [["a"]] }',
+            ["varies together", "\"['a']\""],
+        ),
+        (
+            '[vary]\n"motor.K_e" = { kind = "normal", sd = "1 %", '
+            'together = ["ecu.pedal_map.V_nodes"] }',
+            ["ecu.pedal_map.V_nodes is a table"],
+        ),
+        (
+            '[vary]\n"seal.T_pr" = { kind = "tolerance", tolerance = "100 %", '
+            'together = ["motor.R_m"] }',
+            ["[vary] seal.T_pr.together motor.R_m", "its end at 0", "must be > 0"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = "+-100 %"',
+            ["its end at 0 ohm is not admissible", "> 0 ohm", "narrower tolerance"],
+        ),
+        (
+            '[vary]\n"motor.K_e" = { kind = "normal", sd = "1 %", together = ["ecu.K"] }',
+            ["varies together", "'ecu.K'"],
+        ),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\ncases = 0', ["cases = 0", "from 1"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nkind = "sobl"', ["'sobl'", "'sobol'"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nconfidence = "100 %"', ["below 100 %"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[desing]\ncases = 1', ["'desing'", "'design'"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershot = "<= 15 %"', ["'overshoot'"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 15 % with 120 %"',
-         ["120 %", "between 0"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 15 bar with 90 %"',
-         ["overshoot", "percent"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nkind = "corners"\n[requirements]\n'
-         'overshoot = "<= 15 % with 90 %"', ["draws nothing", "'monte-carlo'"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 10 % with 0.9"',
-         ["overshoot = '<= 10 % with 0.9'", "behind 'with' stands '0.9'", "'with 90 %'"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 10 % with lots"',
-         ["behind 'with' stands 'lots'", "in percent", "'with 99 %'"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 10 % with"',
-         ["behind 'with' stands ''"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 10 % with 9x %"',
-         ["behind 'with' stands '9x %'"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "15 % with 90 %"',
-         ["overshoot = '15 %' cannot be read"]),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 15 % with 120 %"',
+            ["120 %", "between 0"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 15 bar with 90 %"',
+            ["overshoot", "percent"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[design]\nkind = "corners"\n[requirements]\n'
+            'overshoot = "<= 15 % with 90 %"',
+            ["draws nothing", "'monte-carlo'"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 10 % with 0.9"',
+            ["overshoot = '<= 10 % with 0.9'", "behind 'with' stands '0.9'", "'with 90 %'"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 10 % with lots"',
+            ["behind 'with' stands 'lots'", "in percent", "'with 99 %'"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 10 % with"',
+            ["behind 'with' stands ''"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 10 % with 9x %"',
+            ["behind 'with' stands '9x %'"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "15 % with 90 %"',
+            ["overshoot = '15 %' cannot be read"],
+        ),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nvalue = 0.5', ["of is missing"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nof = [["a"], "b"]\nvalue = 0.5',
-         ["quantity of [[correlation]]"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[simulation]\nstep = "10 us"',
-         ["[simulation] is of the bench", "[set]", "requirements"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[simulatoin]\nstep = "10 us"',
-         ["'simulatoin': known are name, bench, vary"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nof = ["motor.R_m", "motor.K_e"]\n'
-         "value = 0.5", ["'motor.K_e'", "correlation"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n"adc.law" = { values = ["ideal", "quantized"] }\n'
-         '[[correlation]]\nof = ["motor.R_m", "adc.law"]\nvalue = 0.5',
-         ["[[correlation]] of motor.R_m and adc.law", "adc.law is a choice"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\ntime = 5',
-         ["[design] time = 5 has the wrong unit", "'1.5 s'"]),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nof = [["a"], "b"]\nvalue = 0.5',
+            ["quantity of [[correlation]]"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[simulation]\nstep = "10 us"',
+            ["[simulation] is of the bench", "[set]", "requirements"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[simulatoin]\nstep = "10 us"',
+            ["'simulatoin': known are name, bench, vary"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nof = ["motor.R_m", "motor.K_e"]\n'
+            "value = 0.5",
+            ["'motor.K_e'", "correlation"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n"adc.law" = { values = ["ideal", "quantized"] }\n'
+            '[[correlation]]\nof = ["motor.R_m", "adc.law"]\nvalue = 0.5',
+            ["[[correlation]] of motor.R_m and adc.law", "adc.law is a choice"],
+        ),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[design]\ntime = 5',
+            ["[design] time = 5 has the wrong unit", "'1.5 s'"],
+        ),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\ntime = 0', ["time = 0 must be above zero"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n"motor.K_e" = "+-5 %"\n[[correlation]]\n'
-         'of = ["motor.R_m", "motor.K_e"]\nvalue = 1.0', ["between -1 and 1"]),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n"motor.K_e" = "+-5 %"\n[[correlation]]\n'
+            'of = ["motor.R_m", "motor.K_e"]\nvalue = 1.0',
+            ["between -1 and 1"],
+        ),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[set]\n"motor.K_e" = 0.3', ["write the value as a text"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nlevels = 3', ["levels", "'monte-carlo'"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nkind = "grid"\ncases = 9', ["'grid' lists"]),
         ('[vary]\n"friction.law" = { values = ["dry"] }', ["friction.law"]),
         ('[vary]\n"adc.law" = { values = ["ideal"] }', ["one value alone, ideal", "[set]"]),
         ('[vary]\n"adc.law" = { values = ["ideal", "ideal"] }', ["ideal stands there twice"]),
-        ('[vary]\n"adc.law" = { values = ["ideal", "quantized"], weigths = [1, 2] }',
-         ["'weigths'", "'weights'"]),
-        ('[vary]\n"adc.law" = { kind = "normal", values = ["ideal", "quantized"] }',
-         ["adc.law is a choice", "'discrete'", "'normal'"]),
+        (
+            '[vary]\n"adc.law" = { values = ["ideal", "quantized"], weigths = [1, 2] }',
+            ["'weigths'", "'weights'"],
+        ),
+        (
+            '[vary]\n"adc.law" = { kind = "normal", values = ["ideal", "quantized"] }',
+            ["adc.law is a choice", "'discrete'", "'normal'"],
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_is_said_with_the_files_name(study, text, texts):
     path = study(text)
     with pytest.raises(InputError) as refused:
@@ -157,10 +218,12 @@ def test_what_is_wrong_is_said_with_the_files_name(study, text, texts):
         ('"options.hwo" = { values = ["controlled", "current-off"] }', "'options.how'"),
         ('"options.how" = "+-5 %"', "a choice varies among values"),
         ('"options.how" = { values = ["current-off"] }', "one value alone"),
-        ('"options.how" = { values = ["controlled", "current-off"], together = ["motor.R_m"] }',
-         "nothing varies by its ratio"),
+        (
+            '"options.how" = { values = ["controlled", "current-off"], together = ["motor.R_m"] }',
+            "nothing varies by its ratio",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_with_a_choice_among_the_options_is_said(study, text, said):
     with pytest.raises(InputError, match=re.escape(said)):
         read_study(study(f"[vary]\n{text}\n", RELEASE))
@@ -169,20 +232,35 @@ def test_what_is_wrong_with_a_choice_among_the_options_is_said(study, text, said
 @pytest.mark.parametrize(
     ("bench", "text", "texts"),
     [
-        (PULSES, '"options.pulses" = { kind = "uniform", low = 1, high = 3 }',
-         ["[vary] options.pulses is a whole number, >= 1 and <= 100", "'uniform'",
-          "kind = 'discrete', values = [2, 3, 4]"]),
+        (
+            PULSES,
+            '"options.pulses" = { kind = "uniform", low = 1, high = 3 }',
+            [
+                "[vary] options.pulses is a whole number, >= 1 and <= 100",
+                "'uniform'",
+                "kind = 'discrete', values = [2, 3, 4]",
+            ],
+        ),
         (PULSES, '"options.pulses" = { sd = "5 %" }', ["kind is missing: add kind = 'discrete' ("]),
         (PULSES, '"options.pulses" = "+-30 %"', ["is a whole number", "'tolerance'"]),
-        (PULSES, '"options.pulses" = { kind = "discrete", values = [1, 2.5] }',
-         ["[vary] options.pulses.values: 2.5 is not", "a whole number, >= 1 and <= 100"]),
+        (
+            PULSES,
+            '"options.pulses" = { kind = "discrete", values = [1, 2.5] }',
+            ["[vary] options.pulses.values: 2.5 is not", "a whole number, >= 1 and <= 100"],
+        ),
         (PULSES, '"options.pulses" = { kind = "discrete", values = [0, 2] }', ["leave out 0"]),
-        (STOPS, '"options.stops" = { kind = "triangular", low = 8, high = 12 }',
-         ["options.stops is a whole number, >= 1 and <= 200", "values = [9, 10, 11]"]),
-        (STOPS, '"options.stops" = { kind = "discrete", values = [10, "+11 %"] }',
-         ["11.1 is not admissible"]),
+        (
+            STOPS,
+            '"options.stops" = { kind = "triangular", low = 8, high = 12 }',
+            ["options.stops is a whole number, >= 1 and <= 200", "values = [9, 10, 11]"],
+        ),
+        (
+            STOPS,
+            '"options.stops" = { kind = "discrete", values = [10, "+11 %"] }',
+            ["11.1 is not admissible"],
+        ),
     ],
-)  # fmt: skip
+)
 def test_whole_numbers_have_single_values(study, bench, text, texts):
     with pytest.raises(InputError) as refused:
         read_study(study(f"[vary]\n{text}\n", bench))
@@ -192,9 +270,15 @@ def test_whole_numbers_have_single_values(study, bench, text, texts):
 
 @pytest.mark.parametrize(
     ("kind", "visited"),
-    [("grid", {1, 3, 11}), ("corners", {1, 3, 11}), ("one-at-a-time", {1, 3, 11}),
-     ("monte-carlo", {1, 11}), ("latin-hypercube", {1, 11}), ("sobol", {1, 11})],
-)  # fmt: skip
+    [
+        ("grid", {1, 3, 11}),
+        ("corners", {1, 3, 11}),
+        ("one-at-a-time", {1, 3, 11}),
+        ("monte-carlo", {1, 11}),
+        ("latin-hypercube", {1, 11}),
+        ("sobol", {1, 11}),
+    ],
+)
 def test_designs_visit_whole_numbers(study, kind, visited):
     text = '[vary]\n"options.pulses" = { kind = "discrete", values = [1, "11"] }\n'
     plan = read_study(study(f'{text}[design]\nkind = "{kind}"\n', PULSES))
@@ -228,24 +312,37 @@ def test_an_option_that_names_a_file_or_a_signal_does_not_vary(tmp_path):
 
 @pytest.mark.parametrize(
     ("kind", "library"),
-    [("corners", ""), ("one-at-a-time", ""), ("grid", ""), ("sobol", ""), ("morris", "SALib"),
-     ("sobol-indices", "SALib")],
-)  # fmt: skip
+    [
+        ("corners", ""),
+        ("one-at-a-time", ""),
+        ("grid", ""),
+        ("sobol", ""),
+        ("morris", "SALib"),
+        ("sobol-indices", "SALib"),
+    ],
+)
 def test_designs_visit_the_choices_of_an_option(study, kind, library):
     if library:
         pytest.importorskip(library)
-    plan = read_study(study(
-        '[vary]\n"options.how" = { values = ["controlled", "current-off"] }\n'
-        '"motor.R_m" = "+-5 %"\n'
-        f'[design]\nkind = "{kind}"\n', RELEASE))  # fmt: skip
+    plan = read_study(
+        study(
+            '[vary]\n"options.how" = { values = ["controlled", "current-off"] }\n'
+            '"motor.R_m" = "+-5 %"\n'
+            f'[design]\nkind = "{kind}"\n',
+            RELEASE,
+        )
+    )
     assert {*plan.values(0)["options.how"].tolist()} == {"controlled", "current-off"}
     assert (plan.varied[0].nominal, plan.varied[0].unit) == ("controlled", "")
 
 
 def test_rare_values_are_levels_too(study):
-    plan = read_study(study(
-        '[vary]\n"adc.law" = { values = ["ideal", "quantized"], weights = [1, 100000] }\n'
-        '[design]\nkind = "grid"\n'))  # fmt: skip
+    plan = read_study(
+        study(
+            '[vary]\n"adc.law" = { values = ["ideal", "quantized"], weights = [1, 100000] }\n'
+            '[design]\nkind = "grid"\n'
+        )
+    )
     assert plan.values(0)["adc.law"].tolist() == ["quantized", "ideal", "quantized"]
 
 
@@ -254,15 +351,20 @@ def test_correlated_single_values_rise_however_they_are_listed(study, kind):
     """An index among them would be correlated else, and its sign be that of the listing."""
 
     def drawn(values: str, correlation: str) -> np.ndarray:
-        plan = read_study(study(
-            '[vary]\n"motor.R_m" = "+-5 %"\n"supply.V_bat" = { kind = "discrete", '
-            f'{values} }}\n{correlation}[design]\nkind = "{kind}"\n'))  # fmt: skip
+        plan = read_study(
+            study(
+                '[vary]\n"motor.R_m" = "+-5 %"\n"supply.V_bat" = { kind = "discrete", '
+                f'{values} }}\n{correlation}[design]\nkind = "{kind}"\n'
+            )
+        )
         chunks = [plan.values(k) for k in range(8)]
         return np.array([np.concatenate([c[n] for c in chunks]) for n in plan.values(0)])
 
     rising = 'values = ["11 V", "12 V", "14 V"], weights = [1, 1, 2]'
-    others = ('values = ["14 V", "11 V", "12 V"], weights = [2, 1, 1]',
-              'values = ["12 V", "11 V", "14 V"], weights = [1, 1, 2]')  # fmt: skip
+    others = (
+        'values = ["14 V", "11 V", "12 V"], weights = [2, 1, 1]',
+        'values = ["12 V", "11 V", "14 V"], weights = [1, 1, 2]',
+    )
     said = '[[correlation]]\nof = ["motor.R_m", "supply.V_bat"]\nvalue = 0.8\n'
     wanted = drawn(rising, said)
     assert 0.6 < np.corrcoef(wanted)[0, 1] < 0.8
@@ -308,9 +410,12 @@ def test_what_figures_depend_on_tells_studies_apart(study):
     same = base + '[design]\ncases = 900\n[requirements]\novershoot = "<= 9 %"'
     assert read_study(study(same)).digest == digest
     others = [
-        base.replace("5", "6"), base + "[design]\nseed = 2", base + '[design]\nkind = "sobol"',
-        base + '[set]\n"motor.K_e" = "+1%"', base.replace("R_m", "L_m"),
-    ]  # fmt: skip
+        base.replace("5", "6"),
+        base + "[design]\nseed = 2",
+        base + '[design]\nkind = "sobol"',
+        base + '[set]\n"motor.K_e" = "+1%"',
+        base.replace("R_m", "L_m"),
+    ]
     digests = {read_study(study(other)).digest for other in others}
     assert len(digests | {digest}) == len(others) + 1
 

@@ -75,12 +75,20 @@ def test_a_linear_axis_has_the_quantiles_of_its_closed_form(tmp_path, spring_axi
 
 
 def test_a_choice_among_the_options_varies_from_the_file_to_the_worst_bench(study, tmp_path):
-    bench = ('experiment = "pressure-release"\nparameters = "dardanelli2010"\n[options]\n'
-             'duration = "40 ms"\nsettle = "10 ms"\n')  # fmt: skip
-    found = bywire.run_study(study(
-        '[vary]\n"options.how" = { values = ["controlled", "current-off"] }\n'
-        '"motor.R_m" = "+-5 %"\n[design]\nkind = "corners"\n[requirements]\n'
-        'peak_current = "<= 1 A"\n', bench), tmp_path / "out", workers=1)  # fmt: skip
+    bench = (
+        'experiment = "pressure-release"\nparameters = "dardanelli2010"\n[options]\n'
+        'duration = "40 ms"\nsettle = "10 ms"\n'
+    )
+    found = bywire.run_study(
+        study(
+            '[vary]\n"options.how" = { values = ["controlled", "current-off"] }\n'
+            '"motor.R_m" = "+-5 %"\n[design]\nkind = "corners"\n[requirements]\n'
+            'peak_current = "<= 1 A"\n',
+            bench,
+        ),
+        tmp_path / "out",
+        workers=1,
+    )
     assert found.cases["options.how"].tolist() == ["controlled"] * 3 + ["current-off"] * 2
     with undrawn():
         found.write(tmp_path / "out")
@@ -127,8 +135,11 @@ def test_a_folder_of_another_study_is_refused(study, tmp_path):
     path, out = study(), tmp_path / "out"
     bywire.run_study(path, out, cases=64)
     path.write_text(path.read_text().replace("4 %", "5 %"))
-    for call in (lambda: bywire.run_study(path, out), lambda: bywire.resume_study(out),
-                 lambda: bywire.study_report(out)):  # fmt: skip
+    for call in (
+        lambda: bywire.run_study(path, out),
+        lambda: bywire.resume_study(out),
+        lambda: bywire.study_report(out),
+    ):
         with pytest.raises(FileError, match="holds another study") as refused:
             call()
         assert "varied motor.R_m: normal, mean" in str(refused.value)
@@ -217,8 +228,11 @@ def test_a_study_is_kept_with_its_changes_and_another_says_how_it_differs(study,
         bywire.run_study(path, out, workers=1)
     with pytest.raises(ParameterError, match=r"study = .*: a text or a path is wanted"):
         bywire.run_study({"bench": "hard-braking"})
-    study(VARY.replace('"+-5 %"', '{ kind = "tolerance", tolerance = "5 %", together = [BOTH] }')
-          .replace("BOTH", '"motor.L_m"'))  # fmt: skip
+    study(
+        VARY.replace(
+            '"+-5 %"', '{ kind = "tolerance", tolerance = "5 %", together = [BOTH] }'
+        ).replace("BOTH", '"motor.L_m"')
+    )
     both = r"\(varied motor\.R_m together: nothing, now motor\.L_m\)"
     with pytest.raises(FileError, match=both):
         bywire.run_study(path, out, {"seal.T_pr": "+10 %"})

@@ -25,8 +25,15 @@ from bywire.studies.findings import Findings
 from bywire.studies.polynomial_chaos import surrogate_of
 from bywire.studies.study_file import read_study
 
-QUANTITIES = ("motor.R_m", "motor.K_e", "motor.L_m", "gear.J_mot", "seal.T_pr", "caliper.K_pd",
-              "supply.V_bat")  # fmt: skip
+QUANTITIES = (
+    "motor.R_m",
+    "motor.K_e",
+    "motor.L_m",
+    "gear.J_mot",
+    "seal.T_pr",
+    "caliper.K_pd",
+    "supply.V_bat",
+)
 CASES = 1000
 BENCH = 'experiment = "hard-braking"\nparameters = "dardanelli2010"\n'
 
@@ -40,8 +47,10 @@ def found(study):
         text = f'[vary]\n{varied}[requirements]\n{name} = "{limit}"\n'
         plan = read_study(study(text, bench=BENCH))
         rng = np.random.default_rng(1)
-        columns = {each: np.full(values.size, math.nan)
-                   for each in plan.bench.definition.kpis_with(plan.bench.chosen_options)}
+        columns = {
+            each: np.full(values.size, math.nan)
+            for each in plan.bench.definition.kpis_with(plan.bench.chosen_options)
+        }
         columns |= {each: values + rng.normal(size=values.size) for each in QUANTITIES}
         columns |= {CASE: np.arange(values.size), name: values}
         columns |= {FAILURE: np.full(values.size, ""), WARNINGS: np.full(values.size, "")}
@@ -93,8 +102,9 @@ def test_captions_say_who_is_drawn_and_who_misses(found):
     values = np.linspace(0.05, 0.07, CASES)
     every = captions(found("rise_time", values, "<= 60 ms with 90 %"))
     assert "crosses miss the limit" in every["scatter-rise_time"]
-    assert every["parallel"].endswith("Drawn are 300 of 500 cases that meet all requirements and "
-                                      "300 of 500 cases that miss one.")  # fmt: skip
+    assert every["parallel"].endswith(
+        "Drawn are 300 of 500 cases that meet all requirements and 300 of 500 cases that miss one."
+    )
     none = captions(found("rise_time", values, "<= 80 ms with 90 %"))
     assert "crosses" not in none["scatter-rise_time"]
     assert "miss" not in none["parallel"]

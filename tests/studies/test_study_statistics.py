@@ -69,9 +69,13 @@ def test_what_follows_exactly_lies_within_its_interval():
 
 @pytest.mark.parametrize(
     ("met", "wanted", "outcome"),
-    [(1000, 0.99, "met"), (1000, 0.999, "undecided"), (980, 0.999, "missed"),
-     (990, 0.99, "undecided")],
-)  # fmt: skip
+    [
+        (1000, 0.99, "met"),
+        (1000, 0.999, "undecided"),
+        (980, 0.999, "missed"),
+        (990, 0.99, "undecided"),
+    ],
+)
 def test_a_verdict_needs_the_whole_interval(met, wanted, outcome):
     found = share(met, 1000, 0.95)
     assert judged(found, found, wanted) == outcome

@@ -31,9 +31,7 @@ SENTENCE = (
 
 
 def test_a_study_says_which_bench_with_which_faults_and_changes_was_tested(study, tmp_path):
-    found = bywire.run_study(
-        study(TEXT, BENCH), tmp_path / "out", {"motor.L_m": "+20%"}, workers=1
-    )
+    found = bywire.run_study(study(TEXT, BENCH), tmp_path / "out", {"motor.L_m": "+20%"}, workers=1)
     document = found.document()
     assert "to 30 bar" in document.summary
     assert "with the fault pressure.stuck-at-last;" in document.summary

@@ -66,8 +66,9 @@ def test_its_error_is_that_of_new_cases(findings):
 
     surrogate = surrogate_of(findings(kinked), "peak_current")
     others = findings(kinked, 40).cases.iloc[4 * 64 :]
-    inside = np.all([others[n].between(surrogate.low[n], surrogate.high[n])
-                     for n in surrogate.nominal], axis=0)  # fmt: skip
+    inside = np.all(
+        [others[n].between(surrogate.low[n], surrogate.high[n]) for n in surrogate.nominal], axis=0
+    )
     others = others[inside]
     told = surrogate({name: others[name].to_numpy() for name in surrogate.nominal})
     rms = np.sqrt(np.mean((told - others["peak_current"]) ** 2))

@@ -32,8 +32,12 @@ from bywire.synthesis.requirement import FIGURES, read
 from bywire.synthesis.trial import Trial
 from bywire.synthesis.verification import Verification, verify
 
-PAPER = ("bandwidth >= 10 Hz", "phase margin >= 60 deg", "overshoot <= 15 %",
-         "steady-state error <= 0 %")  # fmt: skip
+PAPER = (
+    "bandwidth >= 10 Hz",
+    "phase margin >= 60 deg",
+    "overshoot <= 15 %",
+    "steady-state error <= 0 %",
+)
 
 
 MET = {
@@ -104,9 +108,13 @@ def test_one_set_of_gains_meets_the_papers_requirements() -> None:
     assert kpis["steady_state_error"] < 1e3
     own = par.replace(MET)
     sweep = Sweep(
-        loop.inputs, loop.output, (1.0, 2.3, 4.3, 6.7, 8.1, 9.3), (1e5, 3e5), flags=(),
+        loop.inputs,
+        loop.output,
+        (1.0, 2.3, 4.3, 6.7, 8.1, 9.3),
+        (1e5, 3e5),
+        flags=(),
         whole=loop.whole(own),
-    )  # fmt: skip
+    )
     gain = frequency_response(loop.point(own, 20e5).run(), sweep)["gain"].values
     assert gain.min() > math.sqrt(0.5)
 
@@ -162,7 +170,7 @@ def test_a_design_as_a_bench_file() -> None:
         (1.0, math.nan, "are not defined: the loop gain stays below 1"),
         (1.0, math.inf, "sine of 1 bar: phase_margin is not defined: the loop gain stays above 1"),
     ],
-)  # fmt: skip
+)
 def test_what_is_not_defined_says_why(peak: float, crossover: float, why: str) -> None:
     small = Small(1e5, 0.0, 0.0, math.nan, crossover, peak, True)
     step = {"overshoot": math.nan}

@@ -16,8 +16,9 @@ from bywire.synthesis.linear_case import NOMINAL
 from bywire.synthesis.optimizer import Problem
 from bywire.synthesis.requirement import read
 
-REQUIRED = read(["bandwidth >= 10 Hz", "phase margin >= 60 deg", "overshoot <= 15 %",
-                 "disk margin >= 0.5"])  # fmt: skip
+REQUIRED = read(
+    ["bandwidth >= 10 Hz", "phase margin >= 60 deg", "overshoot <= 15 %", "disk margin >= 0.5"]
+)
 BANDWIDTH, PHASE, OVERSHOOT, DISK = (wanted.text for wanted in REQUIRED)
 _CROSSED = 5.0
 

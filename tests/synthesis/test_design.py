@@ -44,10 +44,15 @@ def test_figures_are_those_of_the_margins(name: str) -> None:
     (case,) = cases_of(loop, par, loop.at.default, {})
     found, known = case.figures({}), margins(loop, par, loop.at.default)
     pairs = {
-        "bandwidth": known.bandwidth, "crossover": known.crossover, "phase_margin": known.phase,
-        "gain_margin": known.gain, "delay_margin": known.delay, "disk_margin": known.disk,
-        "sensitivity_peak": known.sensitivity, "complementary_peak": known.complementary,
-    }  # fmt: skip
+        "bandwidth": known.bandwidth,
+        "crossover": known.crossover,
+        "phase_margin": known.phase,
+        "gain_margin": known.gain,
+        "delay_margin": known.delay,
+        "disk_margin": known.disk,
+        "sensitivity_peak": known.sensitivity,
+        "complementary_peak": known.complementary,
+    }
     for figure, value in pairs.items():
         assert getattr(found, figure) == pytest.approx(value, rel=2e-3), figure
 
@@ -99,8 +104,9 @@ def test_step_figures_are_those_of_the_nonlinear_run_without_friction() -> None:
         held = [float(v) for v in point.stimulus]
         held[column] += more
         run = point.run()
-        return simulate(replace(run, stimulus=lambda t: np.repeat([held], t.size, axis=0),
-                                duration=0.6))  # fmt: skip
+        return simulate(
+            replace(run, stimulus=lambda t: np.repeat([held], t.size, axis=0), duration=0.6)
+        )
 
     # The point rests but for a small transient of the contacts: the difference is the step's.
     found, rest = response(rise), response(0.0)
@@ -149,9 +155,11 @@ def test_models_of_the_pressure_loop_are_its_responses() -> None:
 @pytest.mark.trust
 def test_a_pi_on_the_identified_model_reaches_23_degrees_at_10_hz() -> None:
     found = design(
-        PI, read(["crossover >= 10 Hz", "phase margin >= 60 deg"]), [identified()],
+        PI,
+        read(["crossover >= 10 Hz", "phase margin >= 60 deg"]),
+        [identified()],
         {"ecu.pressure.k_p": 1e-5, "ecu.pressure.k_i": 1e-5},
-    )  # fmt: skip
+    )
     assert found.status == "infeasible"
     best = {(one.wanted.figure, one.kept.figure): one for one in found.conflicts}
     margin = best["phase_margin", "crossover"]
@@ -183,9 +191,11 @@ def test_an_interrupt_leaves_the_best_until_then() -> None:
         return inner.build(gains)
 
     found = design(
-        PI, read(["crossover >= 4 Hz", "phase margin >= 30 deg"]), [LinearCase(NOMINAL, build)],
+        PI,
+        read(["crossover >= 4 Hz", "phase margin >= 30 deg"]),
+        [LinearCase(NOMINAL, build)],
         {"ecu.pressure.k_p": 1e-5, "ecu.pressure.k_i": 1e-5},
-    )  # fmt: skip
+    )
     assert found.status == "interrupted"
     assert found.slack > -0.5
 

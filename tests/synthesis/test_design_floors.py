@@ -39,8 +39,10 @@ def texts(found: Any) -> list[str]:
 
 def test_floors_give_way_to_what_the_user_asks() -> None:
     wide = read(["bandwidth >= 10 Hz", "phase margin >= 60 deg"])
-    assert texts(linear_floors(wide, 0.1)) == [f"disk_margin >= {DISK}",
-                                               "steady_state_error <= 5 %"]  # fmt: skip
+    assert texts(linear_floors(wide, 0.1)) == [
+        f"disk_margin >= {DISK}",
+        "steady_state_error <= 5 %",
+    ]
     assert texts(linear_floors(wide, 8.0))[1] == "steady_state_error <= 12 %"
     own = read(["disk margin >= 0.2", "steady-state error <= 20 %"])
     assert linear_floors(own, 0.1) == ()
@@ -89,8 +91,21 @@ def motor(gains: Any) -> tuple[LinearModel, LinearModel]:
 def plain(num: Any, den: Any) -> LinearModel:
     A, B, C, D = signal.tf2ss(num, den)
     n = len(A)
-    return LinearModel("motor", A, B, C, D, tuple(f"x_{k}" for k in range(n)),
-                       ("u",), ("y",), ("1",) * n, ("1",), ("1",), np.zeros(n), 5e-3)  # fmt: skip
+    return LinearModel(
+        "motor",
+        A,
+        B,
+        C,
+        D,
+        tuple(f"x_{k}" for k in range(n)),
+        ("u",),
+        ("y",),
+        ("1",) * n,
+        ("1",),
+        ("1",),
+        np.zeros(n),
+        5e-3,
+    )
 
 
 MOTOR = LinearCase(NOMINAL, motor)
@@ -120,8 +135,9 @@ def test_at_best_is_never_less_than_what_other_gains_have() -> None:
     best = {(one.wanted.figure, one.kept.figure): one.best for one in found.conflicts}
     every = [
         held.figures({"k_p": k_p, "k_i": k_i})
-        for k_p in np.geomspace(0.3, 20.0, 8) for k_i in np.geomspace(0.1, 100.0, 6)
-    ]  # fmt: skip
+        for k_p in np.geomspace(0.3, 20.0, 8)
+        for k_i in np.geomspace(0.1, 100.0, 6)
+    ]
     seen = [one.bandwidth for one in every if one.is_stable and one.phase_margin >= 70.0]
     assert best["bandwidth", "phase_margin"] >= 0.99 * max(seen)
 
@@ -192,11 +208,22 @@ def test_noise_gain_is_that_of_simulated_noise() -> None:
     a = 0.3
     gain, closed = (
         LinearModel(
-            "loop", np.array([[pole]]), np.array([[a]]), np.array([[1.0]]), np.array([[0.0]]),
-            ("y",), ("u",), ("y",), ("1",), ("1",), ("1",), np.zeros(1), 1e-3,
+            "loop",
+            np.array([[pole]]),
+            np.array([[a]]),
+            np.array([[1.0]]),
+            np.array([[0.0]]),
+            ("y",),
+            ("u",),
+            ("y",),
+            ("1",),
+            ("1",),
+            ("1",),
+            np.zeros(1),
+            1e-3,
         )
         for pole in (1.0, 1.0 - a)
-    )  # fmt: skip
+    )
     found = LoopFigures(gain, closed).noise_gain
     assert found == pytest.approx(math.sqrt(a / (2.0 - a)), rel=1e-4)
     noise = np.random.default_rng(1).normal(0.0, 1.0, 200_000)

@@ -20,9 +20,12 @@ REQUIRED = ("phase margin >= 60 deg",)
 def designed(changes=None, **options):
     with few_starts():
         return bywire.design(
-            "pressure", overrides={**SET, **(changes or {})}, require=REQUIRED, linear_only=True,
+            "pressure",
+            overrides={**SET, **(changes or {})},
+            require=REQUIRED,
+            linear_only=True,
             **options,
-        )  # fmt: skip
+        )
 
 
 @pytest.fixture(scope="module")
@@ -38,8 +41,9 @@ def test_the_filter_is_no_faster_than_the_sampling_and_the_set_point_is_not_diff
     assert default.case.par.ecu.pressure.c == 0.0
     assert "kept for an ECU: ecu.pressure.tau_d >= 0.001 s, ecu.pressure.c = 0" in str(default)
     assert default.as_object()["kept_for_the_ecu"] == {
-        "ecu.pressure.tau_d": [1e-3, 1e-2], "ecu.pressure.c": [0.0, 0.0],
-    }  # fmt: skip
+        "ecu.pressure.tau_d": [1e-3, 1e-2],
+        "ecu.pressure.c": [0.0, 0.0],
+    }
     with undrawn():
         default.write(tmp_path)
     bench = tomllib.loads((tmp_path / "pressure-design.toml").read_text(encoding="utf-8"))
@@ -69,8 +73,12 @@ def test_the_filter_follows_the_sample_time():
 
 def test_every_stage_tells_its_share_from_nothing_to_all():
     shown: list[tuple[str, float]] = []
-    bywire.design("moment", require=("crossover >= 5 Hz", "phase margin >= 60 deg"),
-                  linear_only=True, progress=lambda *state: shown.append(state))  # fmt: skip
+    bywire.design(
+        "moment",
+        require=("crossover >= 5 Hz", "phase margin >= 60 deg"),
+        linear_only=True,
+        progress=lambda *state: shown.append(state),
+    )
     stages = {label: [share for name, share in shown if name == label] for label, _ in shown}
     assert stages
     for shares in stages.values():

@@ -54,9 +54,13 @@ def test_gains_hold_as_probably_as_is_wanted(study, monkeypatch):
     monkeypatch.setattr("bywire.api.design_drawn._JUDGES", 48)
     with few_starts():
         found = bywire.design(
-            "current", require=["bandwidth >= 90 Hz", "phase_margin >= 60 deg"], vary=study(),
-            drawn=6, probability="90 %", linear_only=True,
-        )  # fmt: skip
+            "current",
+            require=["bandwidth >= 90 Hz", "phase_margin >= 60 deg"],
+            vary=study(),
+            drawn=6,
+            probability="90 %",
+            linear_only=True,
+        )
     told = found.probability
     assert found.holds
     assert (told.outcome, told.judged.models, len(told.drawn.cases)) == ("met", 48, 6)
@@ -88,8 +92,11 @@ def test_gains_hold_as_probably_as_is_wanted(study, monkeypatch):
 )
 def test_what_does_not_fit_is_refused(study, text, given, message):
     with pytest.raises(ParameterError, match=message):
-        bywire.design("current", require=["bandwidth >= 50 Hz"],
-                      **{"vary": study(text), "linear_only": True, **given})  # fmt: skip
+        bywire.design(
+            "current",
+            require=["bandwidth >= 50 Hz"],
+            **{"vary": study(text), "linear_only": True, **given},
+        )
 
 
 def test_a_study_of_another_brake_is_refused(study):

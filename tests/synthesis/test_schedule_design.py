@@ -57,7 +57,7 @@ def test_a_region_is_designed_and_the_whole_schedule_is_looked_at() -> None:
     assert {one.region for one in found.across} == {"low", "medium", "high"}
     assert {10e5, 35e5, *(p for own in points.values() for p in own)} <= {
         one.at for one in found.across
-    }  # fmt: skip
+    }
     # The gains of medium pressure stayed at 60 degree: the schedule as a whole is not met.
     assert found.status == "infeasible"
     assert found.worst.at > 10e5
@@ -70,9 +70,14 @@ def test_a_region_is_designed_and_the_whole_schedule_is_looked_at() -> None:
     (there,) = bench_figures(loop, par, 5e5, (1e5,), own_bench, None, 5.0)
     assert tried.linear.corners["pressure = 5 bar"] == there
     (off,) = bench_figures(
-        loop, parameters("dardanelli2010-retuned"), 5e5, (1e5,),
-        {"ecu.pressure.b": [1.0]}, None, 5.0,
-    )  # fmt: skip
+        loop,
+        parameters("dardanelli2010-retuned"),
+        5e5,
+        (1e5,),
+        {"ecu.pressure.b": [1.0]},
+        None,
+        5.0,
+    )
     assert there.small[0].crossover < off.small[0].crossover
 
 
@@ -179,8 +184,9 @@ def test_corners_are_the_ends_of_the_ranges_and_the_worst_model() -> None:
     assert len(two) == 4
     assert set(two) == {
         f"wedge.mu_B = {mu:g}, moment = {moment:g} N*m"
-        for mu in (0.25, 0.45) for moment in (100.0, 300.0)
-    }  # fmt: skip
+        for mu in (0.25, 0.45)
+        for moment in (100.0, 300.0)
+    }
     names = ("wedge.mu_B", "motor_1.R_ref", "motor_1.L_M", "motor_1.J_M")
     many = {name: [0.9 * par.leaves()[name], par.leaves()[name]] for name in names}
     assert len(labels(many)) == MOST

@@ -43,7 +43,7 @@ def test_every_study_sizes_an_assembly_that_there_is() -> None:
 def test_a_design_answers_as_it_does_on_the_bench() -> None:
     demand = Demand(
         950.0, 0.1, 0.2, 0.3, (0.35,), known=True, enforced=False, whole=True, phases=(0.0,)
-    )  # fmt: skip
+    )
     found = answer(WEDGE, demand)
     bench = bywire.Bench("moment-pulse-950", "roberts2003", record=2e-4)
     kpis = {one.name: one.value for one in run_once(bench).kpis}
@@ -85,9 +85,7 @@ def test_the_screws_friction_angle_stays_over_the_lead(lead) -> None:
     given = lead_angle(WEDGE.screw.lead)
     friction_angle = math.atan(math.tan(given) / WEDGE.screw.eta_f) - given
     here = lead_angle(lead)
-    assert screw.eta_f == pytest.approx(
-        math.tan(here) / math.tan(here + friction_angle), rel=0.03
-    )  # fmt: skip
+    assert screw.eta_f == pytest.approx(math.tan(here) / math.tan(here + friction_angle), rel=0.03)
 
 
 def test_a_screw_of_little_lead_locks_itself_and_the_efficiency_may_stay() -> None:
@@ -124,8 +122,10 @@ def test_a_small_drive_train_study_marks_what_is_infeasible(
     assert float(weak["current"].max()) == pytest.approx(WEDGE.control.position.i_max)
     assert kpis["optimum_power"] <= float(worst.min()) < kpis["given_power"]
     assert kpis["optimum_t_90"] <= 1.02 * options.t_90
-    labels = [text.get_text() for text in contour(data, found.maps["filtered"]).axes[0]
-              .get_legend().get_texts()]  # fmt: skip
+    labels = [
+        text.get_text()
+        for text in contour(data, found.maps["filtered"]).axes[0].get_legend().get_texts()
+    ]
     assert labels == ["infeasible", "optimum", "given drive train"]
 
 

@@ -68,9 +68,7 @@ class Saturation(System):
 
     def tasks(self, par):
         """Return the source that clips."""
-        return (
-            Task("source", par.T_s, lambda x, m, u, p: Held(ops.clip(u.u, -p.limit, p.limit))),
-        )
+        return (Task("source", par.T_s, lambda x, m, u, p: Held(ops.clip(u.u, -p.limit, p.limit))),)
 
     def mass(self, xe, par):
         """Return the time constant."""

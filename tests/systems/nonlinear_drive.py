@@ -72,9 +72,7 @@ class NonlinearDrive(Model):
         """Return voltage, speed and torque."""
         spring = par.k_1 * x.theta + par.k_3 * x.theta * x.theta * x.theta
         drag = par.d_2 * ops.fabs(x.omega) * x.omega
-        return State(
-            m.v - par.R * x.i - par.K * x.omega, x.omega, par.K * x.i - spring - drag
-        )
+        return State(m.v - par.R * x.i - par.K * x.omega, x.omega, par.K * x.i - spring - drag)
 
     def powers(self, x, xe, rate, m, par, contact, reaction):
         """Return the power of the source and the losses."""

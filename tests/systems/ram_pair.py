@@ -75,8 +75,11 @@ class Ram(Assembly[Parameters, Held]):
     def power(self, w):
         (friction,) = w.reaction
         speed = w.par.gear.k_g * w.gear.x.omega
-        return {"E_source": w.m.v * w.motor.x.i, "W_load": w.load * speed,
-                "E_dry": -friction * w.gear.x.omega}  # fmt: skip
+        return {
+            "E_source": w.m.v * w.motor.x.i,
+            "W_load": w.load * speed,
+            "E_dry": -friction * w.gear.x.omega,
+        }
 
     def tasks(self, par):
         return (Task("source", 1e-3, sampled),)

@@ -101,7 +101,5 @@ class SpringAxis(Model):
 
 
 VALUES = {"m": 2.0, "k": 1e4, "d": 60.0, "F_c": 5.0, "k_c": 200.0, "T_s": 1e-3}
-SET = CitedSet(
-    "spring-axis-one", "spring-axis", "", "a mass on a spring", Parameters, VALUES
-)  # fmt: skip
+SET = CitedSet("spring-axis-one", "spring-axis", "", "a mass on a spring", Parameters, VALUES)
 BRAKE = Brake("spring-axis", "a mass on a spring with dry friction", __name__)

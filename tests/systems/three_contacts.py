@@ -125,10 +125,25 @@ class Output(NamedTuple):
 
 
 PARAMETERS = Parameters(
-    M_S=1184.0, M_W=0.6, K_CAL=4e6, K_S=6e7, K_W=4e7, K_C=2e9, g=20e-6, g_12=30e-6, tau=15e-6,
-    F_S0=250.0, loss=0.54, F_W0=20.0, mu=0.036, k_p=4.2e7, k_d=3.6e5, F_max=6300.0,
-    T_slow=1e-3, T_fast=2e-4,
-)  # fmt: skip
+    M_S=1184.0,
+    M_W=0.6,
+    K_CAL=4e6,
+    K_S=6e7,
+    K_W=4e7,
+    K_C=2e9,
+    g=20e-6,
+    g_12=30e-6,
+    tau=15e-6,
+    F_S0=250.0,
+    loss=0.54,
+    F_W0=20.0,
+    mu=0.036,
+    k_p=4.2e7,
+    k_d=3.6e5,
+    F_max=6300.0,
+    T_slow=1e-3,
+    T_fast=2e-4,
+)
 AT_REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 IDLE = Memory(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 

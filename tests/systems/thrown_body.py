@@ -72,6 +72,12 @@ def thrown(step: float) -> Run:
     """Return 0.1 s from the throw."""
     par = Parameters(m=0.5, T=0.5)
     return Run(
-        ThrownBody(), par, State(0.0, THROWN_AT), Force(FORCE),
-        lambda t: np.full((t.size, 1), FORCE), 0.1, step, 1e-2,
-    )  # fmt: skip
+        ThrownBody(),
+        par,
+        State(0.0, THROWN_AT),
+        Force(FORCE),
+        lambda t: np.full((t.size, 1), FORCE),
+        0.1,
+        step,
+        1e-2,
+    )

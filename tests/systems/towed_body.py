@@ -71,6 +71,12 @@ def towed(step: float) -> Run:
     """Return 40 ms from the moment at which the spring begins to pull; it breaks away after 8."""
     par = Parameters(M=1e6, m=0.5, k=2e4, T_M=0.1, T=32.4)
     return Run(
-        TowedBody(), par, State(0.0, PULL, 0.0, 0.0), Nothing(0.0),
-        lambda t: np.zeros((t.size, 1)), 0.04, step, 1e-2,
-    )  # fmt: skip
+        TowedBody(),
+        par,
+        State(0.0, PULL, 0.0, 0.0),
+        Nothing(0.0),
+        lambda t: np.zeros((t.size, 1)),
+        0.04,
+        step,
+        1e-2,
+    )

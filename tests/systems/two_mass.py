@@ -101,9 +101,22 @@ class Output(NamedTuple):
 
 
 PARAMETERS = Parameters(
-    m_1=0.8, m_2=0.5, k=2e7, s_hard=2e-5, damping=300.0, cogging=5.0, pitch=1e-4,
-    F_c1=30.0, F_r1=20.0, F_c2=10.0, mu=0.3, k_wall=5e7, tau_wall=2e-5, x_wall=2e-4, T_s=1e-3,
-)  # fmt: skip
+    m_1=0.8,
+    m_2=0.5,
+    k=2e7,
+    s_hard=2e-5,
+    damping=300.0,
+    cogging=5.0,
+    pitch=1e-4,
+    F_c1=30.0,
+    F_r1=20.0,
+    F_c2=10.0,
+    mu=0.3,
+    k_wall=5e7,
+    tau_wall=2e-5,
+    x_wall=2e-4,
+    T_s=1e-3,
+)
 AT_REST = State(0.0, 0.0, 0.0, 0.0)
 IDLE = Memory(0.0)
 

@@ -41,8 +41,11 @@ def own_tests(project: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[
     checked = tmp_path_factory.mktemp("checked") / "check.json"
     done = subprocess.run(
         [sys.executable, "-c", OWN_TESTS, str(checked)],
-        capture_output=True, text=True, check=False, cwd=project,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=project,
+    )
     assert done.returncode == 0, done.stdout
     return done.stdout, checked
 
@@ -65,9 +68,13 @@ def said(project: Path, *commands: tuple[str, ...]) -> list[str]:
     """Return what commands print for the new brake, in one process."""
     system = ("--system", str(project / "src" / "front_caliper"))
     done = subprocess.run(
-        [sys.executable, "-c", COMMANDS], input=json.dumps([words + system for words in commands]),
-        capture_output=True, text=True, check=False, cwd=project,
-    )  # fmt: skip
+        [sys.executable, "-c", COMMANDS],
+        input=json.dumps([words + system for words in commands]),
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=project,
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.split("end of a command\n")
 
@@ -95,10 +102,13 @@ def test_it_passes_the_check(own_tests: tuple[str, Path]) -> None:
 
 def test_commands_work_with_it(project: Path, tmp_path: Path) -> None:
     experiments, actuator, _, margins, linear, _ = said(
-        project, ("list", "experiments"), ("list", "front-caliper-actuator"),
+        project,
+        ("list", "experiments"),
+        ("list", "front-caliper-actuator"),
         ("run", "front-caliper-clamp", "--out", str(tmp_path / "out")),
-        ("margins", "front-caliper-force"), ("linearize", "front-caliper-force"),
-    )  # fmt: skip
+        ("margins", "front-caliper-force"),
+        ("linearize", "front-caliper-force"),
+    )
     assert "front-caliper-clamp" in experiments
     assert "clamp force" in actuator
     assert (tmp_path / "out" / "report.html").is_file()
@@ -113,12 +123,19 @@ def test_its_own_tests_pass(own_tests: tuple[str, Path]) -> None:
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("Front", "small letters"), ("1st", "small letters"), ("a--b", "small letters"),
-        ("../x", "small letters"), ("", "small letters"), ("é", "small letters"),
-        ("class", "word of Python"), ("json", "Python has a module"), ("numpy", "installed"),
-        ("wedge", "there is a brake"), ("x" * 41, "at most 40"),
+        ("Front", "small letters"),
+        ("1st", "small letters"),
+        ("a--b", "small letters"),
+        ("../x", "small letters"),
+        ("", "small letters"),
+        ("é", "small letters"),
+        ("class", "word of Python"),
+        ("json", "Python has a module"),
+        ("numpy", "installed"),
+        ("wedge", "there is a brake"),
+        ("x" * 41, "at most 40"),
     ],
-)  # fmt: skip
+)
 def test_bad_names_are_refused(name: str, reason: str, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=reason):
         new(name, tmp_path)
@@ -139,8 +156,11 @@ def test_the_folder_that_it_goes_into_is_made(tmp_path: Path) -> None:
     out = tmp_path / "brakes" / "front"
     done = subprocess.run(
         [sys.executable, "-m", "bywire", "new", NAME, "--out", str(out)],
-        capture_output=True, text=True, check=False, cwd=tmp_path,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+    )
     assert done.returncode == 0, done.stderr
     assert str(out / NAME) in done.stdout
     assert os.listdir(tmp_path) == ["brakes"]

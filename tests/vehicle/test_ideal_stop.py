@@ -20,9 +20,13 @@ def vehicle(surface="dry-asphalt", **changes):
 
 @pytest.mark.parametrize(
     ("surface", "slip", "peak", "locked"),
-    [("dry-asphalt", 0.170, 1.170, 0.760), ("wet-asphalt", 0.131, 0.801, 0.510),
-     ("dry-cobble", 0.400, 1.000, 0.700), ("snow", 0.060, 0.190, 0.130)],
-)  # fmt: skip
+    [
+        ("dry-asphalt", 0.170, 1.170, 0.760),
+        ("wet-asphalt", 0.131, 0.801, 0.510),
+        ("dry-cobble", 0.400, 1.000, 0.700),
+        ("snow", 0.060, 0.190, 0.130),
+    ],
+)
 def test_surfaces_have_their_published_peaks(surface, slip, peak, locked):
     ground, tyre = road.SURFACES[surface], vehicle(surface).vehicle.front_tyre
     c1, c2, c3 = ground[:3]
@@ -37,11 +41,17 @@ def test_surfaces_have_their_published_peaks(surface, slip, peak, locked):
 
 @pytest.mark.parametrize(
     ("surface", "v", "front_only", "distance"),
-    [("dry-asphalt", 100 / 3.6, False, 34.23), ("dry-asphalt", 30.0, False, 39.72),
-     ("wet-asphalt", 100 / 3.6, False, 46.98), ("wet-asphalt", 30.0, False, 54.41),
-     ("wet-asphalt", 100 / 3.6, True, 59.08), ("wet-asphalt", 30.0, True, 68.32),
-     ("snow", 100 / 3.6, False, 175.2), ("snow", 30.0, False, 199.6)],
-)  # fmt: skip
+    [
+        ("dry-asphalt", 100 / 3.6, False, 34.23),
+        ("dry-asphalt", 30.0, False, 39.72),
+        ("wet-asphalt", 100 / 3.6, False, 46.98),
+        ("wet-asphalt", 30.0, False, 54.41),
+        ("wet-asphalt", 100 / 3.6, True, 59.08),
+        ("wet-asphalt", 30.0, True, 68.32),
+        ("snow", 100 / 3.6, False, 175.2),
+        ("snow", 30.0, False, 199.6),
+    ],
+)
 def test_ideal_stops(surface, v, front_only, distance):
     par = vehicle(surface).vehicle
     c1, c2, c3 = road.SURFACES[surface][:3]
@@ -71,10 +81,12 @@ def test_brakes_hold_what_their_discs_say():
 
 @pytest.mark.parametrize(
     ("changes", "said"),
-    [({"vehicle.body.l_f": 1.5}, "between the wheels"),
-     ({"vehicle.road.first.c3": 40.0}, "must rise with slip first"),
-     ({"vehicle.road.x_back": 10.0}, "begins before it ends")],
-)  # fmt: skip
+    [
+        ({"vehicle.body.l_f": 1.5}, "between the wheels"),
+        ({"vehicle.road.first.c3": 40.0}, "must rise with slip first"),
+        ({"vehicle.road.x_back": 10.0}, "begins before it ends"),
+    ],
+)
 def test_impossible_geometry_and_roads_are_refused(changes, said):
     with pytest.raises(bywire.BywireError, match=said):
         vehicle(**changes)

@@ -14,8 +14,9 @@ ACTS = np.ones(81)
 
 def said(first, further=None, place=PLACE, acts=ACTS, slip_set=0.105, **changes):
     par = bywire.parameters("sport600").replace(laid("vehicle.road", first, further) | changes)
-    return far_from_peak(place, acts, slip_set, "slip_set", par.vehicle.front_tyre,
-                         par.vehicle.road)  # fmt: skip
+    return far_from_peak(
+        place, acts, slip_set, "slip_set", par.vehicle.front_tyre, par.vehicle.road
+    )
 
 
 @pytest.mark.parametrize("curve", ["burckhardt", "magic-formula"])
@@ -23,8 +24,10 @@ def test_dry_cobble_is_told_and_where_it_comes_from(curve):
     (text,) = said("dry-cobble", **{"vehicle.front_tyre.curve": curve})
     peak = np.log(1.3713 * 6.4565 / 0.6691) / 6.4565
     Bs = 2.565 * 0.105
-    share = {"burckhardt": 1.3713 * (1 - np.exp(-6.4565 * 0.105)) - 0.6691 * 0.105,
-             "magic-formula": np.sin(2.117 * np.arctan(Bs - 0.4782 * (Bs - np.arctan(Bs))))}[curve]
+    share = {
+        "burckhardt": 1.3713 * (1 - np.exp(-6.4565 * 0.105)) - 0.6691 * 0.105,
+        "magic-formula": np.sin(2.117 * np.arctan(Bs - 0.4782 * (Bs - np.arctan(Bs)))),
+    }[curve]
     assert f"slip of 0.105 (slip_set), but dry-cobble holds most at {peak:.3g}: " in text
     assert f": {100 * share / 0.9999:.0f} % of that" in text
 
@@ -48,8 +51,9 @@ def test_only_where_slip_control_acts():
 
 def test_a_stop_by_pi_on_cobble_says_so_above_its_figures():
     options = {"v_0": 15.0, "surface": "dry-cobble"}
-    result = bywire.run(bywire.Bench("straight-stop", "sport600", options=options),
-                        estimate_error=False)  # fmt: skip
+    result = bywire.run(
+        bywire.Bench("straight-stop", "sport600", options=options), estimate_error=False
+    )
     told = [text for text in result.document().data["remarks"] if "most at 0.4" in text]
     assert ["ecu.front_slip.slip_set" in text for text in told] == [True, False]
     run, par = result.recording, result.bench.par.replace(laid("vehicle.road", "dry-cobble"))

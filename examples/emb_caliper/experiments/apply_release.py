@@ -69,14 +69,27 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     figures |= evaluate("occupation", run, occupation.Setting())
     return (
         Kpi("error_max", float(np.max(np.abs(error))), "N", "Largest error of the clamp force."),
-        Kpi("error_held", float(np.mean(error[holding])), "N",
-            "Mean error in the second half of the hold."),
-        Kpi("current_held", float(np.mean(run["i"].values[holding])), "A",
-            "Mean current in the second half of the hold."),
-        Kpi("time_to_free", last - release if free else float("nan"), "s",
-            "Time from the end of the demand until the pads leave the disc.", note),
+        Kpi(
+            "error_held",
+            float(np.mean(error[holding])),
+            "N",
+            "Mean error in the second half of the hold.",
+        ),
+        Kpi(
+            "current_held",
+            float(np.mean(run["i"].values[holding])),
+            "A",
+            "Mean current in the second half of the hold.",
+        ),
+        Kpi(
+            "time_to_free",
+            last - release if free else float("nan"),
+            "s",
+            "Time from the end of the demand until the pads leave the disc.",
+            note,
+        ),
         *figures.values(),
-    )  # fmt: skip
+    )
 
 
 EXPERIMENT = Experiment(
@@ -87,7 +100,12 @@ EXPERIMENT = Experiment(
     defaults=Options(F_top=25e3, t_ramp=0.5, t_hold=0.5, duration=2.0),
     cases=cases,
     judge=judge,
-    kpis={"error_max": "N", "error_held": "N", "current_held": "A", "time_to_free": "s",
-          **units_of("effort", "occupation")},
+    kpis={
+        "error_max": "N",
+        "error_held": "N",
+        "current_held": "A",
+        "time_to_free": "s",
+        **units_of("effort", "occupation"),
+    },
     figures=("time-traces", "energy-balance"),
-)  # fmt: skip
+)

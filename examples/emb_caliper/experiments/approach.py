@@ -32,8 +32,17 @@ def cases(par: ApproachParameters, options: Options, _: Stimulus | None = None) 
     """Return the one run, from rest."""
     state, memory = at_rest()
     stimulus = step_at_zero("x_set", 0.0, options.x_to)
-    run = Case("run", Approach(), par, state, memory, stimulus, options.duration,
-               start=lambda _: (state, memory), record=1e-4)  # fmt: skip
+    run = Case(
+        "run",
+        Approach(),
+        par,
+        state,
+        memory,
+        stimulus,
+        options.duration,
+        start=lambda _: (state, memory),
+        record=1e-4,
+    )
     return (run,)
 
 

@@ -48,10 +48,15 @@ def cases(
     stimulus = step_at_zero("F_set", options.F_from, options.F_to)
     return (
         case_from_rest(
-            par, "force", options.F_from, stimulus, options.duration,
-            settle=options.settle, keep=min(options.settle, 0.05),
+            par,
+            "force",
+            options.F_from,
+            stimulus,
+            options.duration,
+            settle=options.settle,
+            keep=min(options.settle, 0.05),
         ),
-    )  # fmt: skip
+    )
 
 
 def step(options: Options) -> step_response.Setting:

@@ -35,7 +35,11 @@ def point(par: ParameterSet, F: float, drive: DriveMode, step: float = 20e-6) ->
             "the piston is parked; take for instance '5 kN'"
         )
     state = state_at(F, driven)
-    held = {"force": {"F_set": F}, "speed": {}, "current": {"i_set": state.i},
-            "voltage": {"v_set": driven.motor.R_m * state.i}}[drive]  # fmt: skip
+    held = {
+        "force": {"F_set": F},
+        "speed": {},
+        "current": {"i_set": state.i},
+        "voltage": {"v_set": driven.motor.R_m * state.i},
+    }[drive]
     stimulus = zeros(Stimulus)._replace(**held)
     return Point(EmbCaliper(), driven, state, memory_at(F, driven), stimulus, step)

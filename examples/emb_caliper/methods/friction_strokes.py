@@ -90,8 +90,10 @@ def identify(
         raise ParameterError(
             f"the motor never turns faster than {options.slowest:g} rad/s for long: {_ADVICE}"
         )
-    mean = {n: np.array([moved[n].values[r].mean() for r in rows])
-            for n in ("i", "F_cl", "omega", "alpha")}  # fmt: skip
+    mean = {
+        n: np.array([moved[n].values[r].mean() for r in rows])
+        for n in ("i", "F_cl", "omega", "alpha")
+    }
     _require_spread(mean)
     torque = par.motor.K_e * mean["i"] - travel_per_angle(par) * mean["F_cl"]
     torque = torque - par.rotor.J * mean["alpha"]
@@ -108,18 +110,24 @@ def identify(
     scale = mean["F_cl"] / float(np.max(mean["F_cl"]))
     richer = np.column_stack((W, way * scale**2, way * scale * np.abs(mean["omega"])))
     check = lack_of_fit(
-        "torque_left_over", fitted - torque, np.full(torque.size, 1.0 / scatter), richer,
-        len(_NAMES), "whether the friction bends over the load, or its slope changes with speed",
-    )  # fmt: skip
+        "torque_left_over",
+        fitted - torque,
+        np.full(torque.size, 1.0 / scatter),
+        richer,
+        len(_NAMES),
+        "whether the friction bends over the load, or its slope changes with speed",
+    )
     if scatter < _SMALL * float(np.median(np.abs(torque))):
         # A record without noise: anything shows, and nothing of it matters.
         small = f"less than {100 * _SMALL:g} % of the friction is left over: not judged"
         check = replace(check, limit=None, note=f"{check.note}; {small}")
     return Identified(
-        estimates={"friction": best}, parameters=best.parameters(), checks=(check,),
+        estimates={"friction": best},
+        parameters=best.parameters(),
+        checks=(check,),
         curves=(_curve(mean["F_cl"], torque, fitted),),
         notes=("breakaway is not told by strokes that slide: friction.T_s stays as it is",),
-    )  # fmt: skip
+    )
 
 
 def _windows(moved: xr.Dataset, options: Options) -> Iterator[slice]:
@@ -175,10 +183,16 @@ def synthetic(par: CaliperBrakeParameters, options: Options, seed: int) -> xr.Da
     random = np.random.default_rng(seed)
     units = {"i": "A", "theta": "rad", "F_cl": "N"}
     return xr.Dataset(
-        {n: ("time", computed[n] + random.normal(0.0, s, computed.time.size), {"units": units[n]})
-         for n, s in noise.items()},
+        {
+            n: (
+                "time",
+                computed[n] + random.normal(0.0, s, computed.time.size),
+                {"units": units[n]},
+            )
+            for n, s in noise.items()
+        },
         {"time": ("time", computed.time, {"units": "s", "long_name": "time"})},
-    )  # fmt: skip
+    )
 
 
 METHOD = Method(
@@ -189,11 +203,16 @@ METHOD = Method(
     signals={"i": "A", "theta": "rad", "F_cl": "N"},
     options=Options,
     defaults=Options(
-        slowest=5.0, margin=0.05, window=0.02, cutoff=60.0, sigma_i=0.05, sigma_F=20.0,
+        slowest=5.0,
+        margin=0.05,
+        window=0.02,
+        cutoff=60.0,
+        sigma_i=0.05,
+        sigma_F=20.0,
         sigma_theta=1e-3,
     ),
     identify=identify,
     synthetic=synthetic,
     simulated=("sigma_i", "sigma_F", "sigma_theta"),
     unknowns=_NAMES,
-)  # fmt: skip
+)

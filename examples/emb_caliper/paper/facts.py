@@ -8,11 +8,11 @@ _ABSTRACT = "Line, Manzie, Good (2008), abstract"
 LIMITED = "standard cascaded PI control has limited performance under nonlinear stiffness"
 
 UNEVEN = Fact(
-    1.5, "1",
-    f"{_ABSTRACT}: {LIMITED}; read as: steps of 0.5 kN take 1.5 times as "
-    "long at 1 kN as at 19 kN",
+    1.5,
+    "1",
+    f"{_ABSTRACT}: {LIMITED}; read as: steps of 0.5 kN take 1.5 times as long at 1 kN as at 19 kN",
     "reading",
-)  # fmt: skip
+)
 IMPROVED = Fact(
     1.0,
     "1",
@@ -27,9 +27,11 @@ STICKS = Fact(
     "reading",
 )
 SATURATES = Fact(
-    95.0, "%", f"{_ABSTRACT}: actuator saturation; read as: large steps reach the current's limit",
+    95.0,
+    "%",
+    f"{_ABSTRACT}: actuator saturation; read as: large steps reach the current's limit",
     "reading",
-)  # fmt: skip
+)
 
 _BENCHMARK = "Strathmann, Oehlerking (2015), as in ARCH-COMP's model"
 POLE = Fact(-504.0, "1/s", f"{_BENCHMARK}: middle of the interval of the current's coefficient")

@@ -39,13 +39,27 @@ def _envelope(runs: Runs) -> SourcePart:
     ratio = {name: _rise(runs, name, 1e3) / _rise(runs, name, 19e3) for name in (MAIN, MODIFIED)}
     uneven = {name: abs(float(np.log(value))) for name, value in ratio.items()}
     items = (
-        compared("envelope.rise_ratio", facts.UNEVEN, ratio[MAIN], ">=",
-                 "rise time of a step of 0.5 kN from 1 kN over that from 19 kN"),
-        compared("envelope.scheduled", facts.IMPROVED, uneven[MODIFIED] / uneven[MAIN], "<=",
-                 "logarithm of that ratio with scheduling over that without"),
-    )  # fmt: skip
-    return SourcePart("Small steps over the clamp force", "Fixed gains meet a stiffness that grows "
-                "ninefold; gains that follow it make small steps more alike.", items)  # fmt: skip
+        compared(
+            "envelope.rise_ratio",
+            facts.UNEVEN,
+            ratio[MAIN],
+            ">=",
+            "rise time of a step of 0.5 kN from 1 kN over that from 19 kN",
+        ),
+        compared(
+            "envelope.scheduled",
+            facts.IMPROVED,
+            uneven[MODIFIED] / uneven[MAIN],
+            "<=",
+            "logarithm of that ratio with scheduling over that without",
+        ),
+    )
+    return SourcePart(
+        "Small steps over the clamp force",
+        "Fixed gains meet a stiffness that grows "
+        "ninefold; gains that follow it make small steps more alike.",
+        items,
+    )
 
 
 def _large(runs: Runs) -> SourcePart:
@@ -54,15 +68,27 @@ def _large(runs: Runs) -> SourcePart:
     limit = parameters(MAIN).leaves()["ecu.speed.i_max"]
     least = min(kpis(result)["peak_current"] for result in results)
     items = [
-        compared("steps.saturated", facts.SATURATES, 100.0 * least / limit, ">=",
-                 "least of three steps' peak currents over the limit of the demand")
-    ]  # fmt: skip
+        compared(
+            "steps.saturated",
+            facts.SATURATES,
+            100.0 * least / limit,
+            ">=",
+            "least of three steps' peak currents over the limit of the demand",
+        )
+    ]
     for F, result in zip(STEPS, results, strict=True):
         label = f"steps.{F / 1e3:g}kN"
-        items.append(found(f"{label}.rise_time", "s", kpis(result)["rise_time"],
-                           "10 to 90 %, from the parked piston"))  # fmt: skip
-    recordings = {f"step-{F / 1e3:g}kN": r.recordings["run"]
-                  for F, r in zip(STEPS, results, strict=True)}  # fmt: skip
+        items.append(
+            found(
+                f"{label}.rise_time",
+                "s",
+                kpis(result)["rise_time"],
+                "10 to 90 %, from the parked piston",
+            )
+        )
+    recordings = {
+        f"step-{F / 1e3:g}kN": r.recordings["run"] for F, r in zip(STEPS, results, strict=True)
+    }
     exhibit = Exhibit("steps", _drawn(recordings), "Steps of the force demand, standard cascade.")
     text = "The paper's own steps were not at hand: 5, 15 and 25 kN are chosen."
     return SourcePart("Large steps", text, tuple(items), (exhibit,), recordings)
@@ -70,11 +96,13 @@ def _large(runs: Runs) -> SourcePart:
 
 def _drawn(recordings: dict[str, xr.Dataset]) -> Any:
     figure, (upper, lower) = style.new_figure(4.6, (1.4, 1.0))
-    for color, run in zip((style.BLUE, style.VERMILLION, style.GREEN), recordings.values(),
-                          strict=True):  # fmt: skip
+    for color, run in zip(
+        (style.BLUE, style.VERMILLION, style.GREEN), recordings.values(), strict=True
+    ):
         upper.plot(run["time"], 1e-3 * run["F_cl"], color=color)
-        upper.plot(run["time"], 1e-3 * run["F_ref"], color=style.GRAY, linestyle="--",
-                   linewidth=0.8)  # fmt: skip
+        upper.plot(
+            run["time"], 1e-3 * run["F_ref"], color=style.GRAY, linestyle="--", linewidth=0.8
+        )
         lower.plot(run["time"], run["i"], color=color)
     upper.set_ylabel(style.axis_label("clamp force", "kN"))
     lower.set_ylabel(style.axis_label("current", "A"))
@@ -88,12 +116,21 @@ def _mechanism(runs: Runs) -> SourcePart:
     run, par = strokes.recordings["run"], parameters(MAIN)
     half = [_width(run, F) for F in (5e3, 25e3)]
     items = (
-        compared("friction.grows", facts.STICKS, half[1] / half[0], ">=",
-                 "distance of the branches' currents at 25 kN over that at 5 kN"),
+        compared(
+            "friction.grows",
+            facts.STICKS,
+            half[1] / half[0],
+            ">=",
+            "distance of the branches' currents at 25 kN over that at 5 kN",
+        ),
         found("friction.width", "A", kpis(strokes)["loop_width"], "at 15 kN, at 20 rad/s"),
-        found("friction.held", "kN", 1e-3 * held_force(par),  # type: ignore[arg-type]
-              "largest clamp force that friction holds without current, closed form"),
-    )  # fmt: skip
+        found(
+            "friction.held",
+            "kN",
+            1e-3 * held_force(par),  # type: ignore[arg-type]
+            "largest clamp force that friction holds without current, closed form",
+        ),
+    )
     figure, axes = style.new_figure(3.4)
     n = np.linspace(0.0, par.caliper.n_max, 200)  # type: ignore[attr-defined]
     F = floating_caliper.elastic(n, par.caliper)  # type: ignore[attr-defined, arg-type]
@@ -110,8 +147,10 @@ def _width(run: xr.Dataset, level: float) -> float:
     """Return the distance of the branches' currents at a clamp force, of the slowest stroke."""
     F, i, omega = (run[name].values for name in ("F_cl", "i", "omega"))
     slow = np.abs(omega) < 30.0
-    means = [float(np.mean(i[slow & (np.sign(omega) == way) & (np.abs(F - level) < 500.0)]))
-             for way in (1.0, -1.0)]  # fmt: skip
+    means = [
+        float(np.mean(i[slow & (np.sign(omega) == way) & (np.abs(F - level) < 500.0)]))
+        for way in (1.0, -1.0)
+    ]
     return means[0] - means[1]
 
 
@@ -119,8 +158,11 @@ def reproduce(progress: Progress | None = None) -> Reproduction:
     """Put the abstract's statements beside what the model computes."""
     runs = Runs(progress)
     parts = []
-    for label, part in (("small steps", _envelope), ("large steps", _large),
-                        ("mechanism", _mechanism)):  # fmt: skip
+    for label, part in (
+        ("small steps", _envelope),
+        ("large steps", _large),
+        ("mechanism", _mechanism),
+    ):
         runs.report(label, 0.0)
         parts.append(part(runs))
         runs.report(label, 1.0)

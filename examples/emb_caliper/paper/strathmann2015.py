@@ -26,16 +26,21 @@ def reproduce(progress: Progress | None = None) -> Reproduction:
     runs = Runs(progress)
     runs.report("approach", 0.0)
     state, memory = at_rest()
-    plant = linearize(
-        Approach(), parameters(MAIN), state, memory, inputs=("x_e",), outputs=("x",)
-    )  # fmt: skip
+    plant = linearize(Approach(), parameters(MAIN), state, memory, inputs=("x_e",), outputs=("x",))
     items = [compared("current.pole", facts.POLE, float(min(plant.A.diagonal())), _EXACT)]
     for rate in (501.0, 504.0, 507.0):
         # (R + K^2 / d) / L is the rate; K^2 / d is 4 mohm.
         R = {"motor.R_m": rate * 1e-3 - 4e-3}
         x_max = kpis(runs.bench("approach", MAIN, R))["x_max"]
-        items.append(compared(f"approach.x_max_{rate:g}", facts.TOUCH, 10.0 * x_max, "<=",
-                              f"coefficient of the current -{rate:g} 1/s"))  # fmt: skip
+        items.append(
+            compared(
+                f"approach.x_max_{rate:g}",
+                facts.TOUCH,
+                10.0 * x_max,
+                "<=",
+                f"coefficient of the current -{rate:g} 1/s",
+            )
+        )
     runs.report("approach", 1.0)
     text = "Sampled exactly as stated; the simulation's step is a fifth of the sample time."
     part = SourcePart("Closing the clearance", text, tuple(items))

@@ -20,9 +20,14 @@ def model(par: ParameterSet, at: PlantPoint) -> LinearModel:
         F = at.value * caliper.motor.K_e / travel_per_angle(caliper)
     p = point(par, F, "voltage")
     return linearize(
-        p.model, p.par, p.state._replace(omega=at.speed), p.memory,
-        inputs=("v_source",), outputs=("i", "omega", "F_cl"), friction=at.friction,
-    )  # fmt: skip
+        p.model,
+        p.par,
+        p.state._replace(omega=at.speed),
+        p.memory,
+        inputs=("v_source",),
+        outputs=("i", "omega", "F_cl"),
+        friction=at.friction,
+    )
 
 
 PLANT = Plant(

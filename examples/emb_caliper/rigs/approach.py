@@ -117,15 +117,26 @@ class Approach(Model):
         return State(motor.i, omega / par.i_gear)
 
     def powers(
-        self, x: State, xe: State, rate: State, m: Memory, par: ApproachParameters,
-        contact: tuple[float, ...], reaction: tuple[float, ...],
-    ) -> Flow:  # fmt: skip
+        self,
+        x: State,
+        xe: State,
+        rate: State,
+        m: Memory,
+        par: ApproachParameters,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+    ) -> Flow:
         return Flow(dc_motor.power_loss(dc_motor.State(x.i), par.motor))
 
     def output(
-        self, x: State, m: Memory, par: ApproachParameters, contact: tuple[float, ...],
-        reaction: tuple[float, ...], flow: Flow,
-    ) -> Output:  # fmt: skip
+        self,
+        x: State,
+        m: Memory,
+        par: ApproachParameters,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+        flow: Flow,
+    ) -> Output:
         return Output(x.x, m.x_e + x.x, x.i, flow.E_copper)
 
 

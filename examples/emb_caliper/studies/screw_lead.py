@@ -76,10 +76,12 @@ def compute(par: CaliperBrakeParameters, options: Options, progress: Progress) -
     chosen = clamp_step.EXPERIMENT.defaults.replace({"F_to": options.F_to})
     rows = []
     for k, lead in enumerate(map(float, leads)):
-        rows.append([
-            _applied(par.replace({"screw.lead": lead, "caliper.clearance": float(gap)}), chosen)
-            for gap in gaps
-        ])  # fmt: skip
+        rows.append(
+            [
+                _applied(par.replace({"screw.lead": lead, "caliper.clearance": float(gap)}), chosen)
+                for gap in gaps
+            ]
+        )
         progress("leads", (k + 1) / leads.size)
     values = np.array(rows)
     dims = ("lead", "clearance")
@@ -110,17 +112,24 @@ def compute(par: CaliperBrakeParameters, options: Options, progress: Progress) -
     given = Mark("given brake", par.screw.lead, par.caliper.clearance)
     fastest = Mark("fastest", float(leads[best]), float(nearest["clearance"]))
     kpis = (
-        Kpi("lead_fastest", float(leads[best]), "m",
-            "Lead that applies fastest at the given clearance."),
+        Kpi(
+            "lead_fastest",
+            float(leads[best]),
+            "m",
+            "Lead that applies fastest at the given clearance.",
+        ),
         Kpi("t_apply_fastest", float(nearest["t_apply"][best]), "s", "Its apply time."),
         Kpi("i_hold_fastest", float(held[best]), "A", "Current that then holds the clamp force."),
         Kpi("i_hold_given", holding_current(options.F_to, par), "A", "The same as it is given."),
-    )  # fmt: skip
+    )
     applied = Map(
-        "t_apply", "lead", "clearance",
+        "t_apply",
+        "lead",
+        "clearance",
         "Time from the demand to 90 % of the clamp force over lead and running clearance.",
-        (fastest, given), {"beyond the current limit": ("i_press", par.ecu.speed.i_max)},
-    )  # fmt: skip
+        (fastest, given),
+        {"beyond the current limit": ("i_press", par.ecu.speed.i_max)},
+    )
     names = ("t_apply", "energy", "i_press", "i_hold")
     cut = Cut("at the clearance nearest to the given one", nearest[list(names)], ("lead", *names))
     return Findings(data, kpis, ASSUMPTIONS, {"apply-time": applied}, (cut,))
@@ -147,10 +156,17 @@ STUDY = Study(
     summary="apply time, energy and holding current over the screw's lead and the clearance",
     options=Options,
     defaults=Options(
-        lead_min=4e-3, lead_max=22e-3, leads=10, clearance_min=1e-4, clearance_max=6e-4,
-        clearances=6, F_to=25e3,
+        lead_min=4e-3,
+        lead_max=22e-3,
+        leads=10,
+        clearance_min=1e-4,
+        clearance_max=6e-4,
+        clearances=6,
+        F_to=25e3,
     ),
     compute=compute,
-    ruled={"screw.lead": "the study varies it: set lead_min and lead_max",
-           "caliper.clearance": "the study varies it: set clearance_min and clearance_max"},
-)  # fmt: skip
+    ruled={
+        "screw.lead": "the study varies it: set lead_min and lead_max",
+        "caliper.clearance": "the study varies it: set clearance_min and clearance_max",
+    },
+)

@@ -121,15 +121,24 @@ def agreement(
     gain: dict[str, Array] = {}
     phase: dict[str, Array] = {}
     smooth = loop.smooth(par)
-    left = {NOTHING: smooth, LIMITS: smooth, **{c: loop.smooth(par, c) for c in loop.causes},
-            EVERYTHING: par}  # fmt: skip
+    left = {
+        NOTHING: smooth,
+        LIMITS: smooth,
+        **{c: loop.smooth(par, c) for c in loop.causes},
+        EVERYTHING: par,
+    }
     f = np.zeros(0)
     for k, (cause, variant) in enumerate(left.items()):
         sweep = Sweep(
-            loop.inputs, loop.output, frequencies, (amplitudes[1 if cause else 0],), flags=(),
-            whole=loop.whole(variant), tolerance=1e-3 if cause else 1e-4,
+            loop.inputs,
+            loop.output,
+            frequencies,
+            (amplitudes[1 if cause else 0],),
+            flags=(),
+            whole=loop.whole(variant),
+            tolerance=1e-3 if cause else 1e-4,
             most=_PATIENCE if cause else 60,
-        )  # fmt: skip
+        )
         response = frequency_response(loop.point(variant, value).run(step), sweep)
         f = response["frequency"].values
         gain[cause], phase[cause] = _difference(response, linear.response(f))

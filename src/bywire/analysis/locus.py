@@ -137,9 +137,14 @@ def locus_of(
         for k in map(int, np.flatnonzero(stable[1:] != stable[:-1]))
     ]
     return Locus(
-        name, unit, np.asarray(values, dtype=float), np.array(tracked), models[0].period, stable,
+        name,
+        unit,
+        np.asarray(values, dtype=float),
+        np.array(tracked),
+        models[0].period,
+        stable,
         tuple(borders),
-    )  # fmt: skip
+    )
 
 
 def _followed(before: Complex, poles: Complex) -> Complex:

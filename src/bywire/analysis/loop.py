@@ -49,9 +49,15 @@ class Point:
         """Return a run that rests at the point, with the point's own substep [s] by default."""
         row = [float(value) for value in self.stimulus]
         return Run(
-            self.model, self.par, self.state, self.memory,
-            lambda t: np.repeat([row], t.size, axis=0), 1.0, step or self.step, 1e-3,
-        )  # fmt: skip
+            self.model,
+            self.par,
+            self.state,
+            self.memory,
+            lambda t: np.repeat([row], t.size, axis=0),
+            1.0,
+            step or self.step,
+            1e-3,
+        )
 
 
 @checked
@@ -214,10 +220,16 @@ class Loop:
         p = self.point(self.smooth(par), value)
         with taking(self.side):
             model = closed_loop(
-                p.model, p.par, p.state, p.memory,
-                inputs=self.inputs, outputs=(self.output,), stimulus=p.stimulus,
-                locked=self.locked, step=step,
-            )  # fmt: skip
+                p.model,
+                p.par,
+                p.state,
+                p.memory,
+                inputs=self.inputs,
+                outputs=(self.output,),
+                stimulus=p.stimulus,
+                locked=self.locked,
+                step=step,
+            )
         return model.together(self.inputs)
 
     def gain(self, par: ParameterSet, value: float) -> LinearModel:
@@ -229,9 +241,14 @@ class Loop:
                     p.model, p.par, p.state, p.memory, cut=self.cut, locked=self.locked
                 )
             return open_loop(
-                p.model, p.par, p.state, p.memory,
-                cut=self.cut, stimulus=p.stimulus, locked=self.locked,
-            )  # fmt: skip
+                p.model,
+                p.par,
+                p.state,
+                p.memory,
+                cut=self.cut,
+                stimulus=p.stimulus,
+                locked=self.locked,
+            )
 
     def gain_and_closed(self, par: ParameterSet, value: float) -> tuple[LinearModel, LinearModel]:
         """Return `gain` and `closed` at an operating point, from one model of its plant."""
@@ -240,13 +257,17 @@ class Loop:
         p = self.point(self.smooth(par), value)
         with taking(self.side):
             closed, gain = sampled_models(
-                p.model, p.par, (p.state, p.memory, p.stimulus),
+                p.model,
+                p.par,
+                (p.state, p.memory, p.stimulus),
                 lambda system: (
                     closed_again(p.model, system, self.inputs).together(self.inputs),
                     cut_open(p.model, system, self.cut),
                 ),
-                inputs=self.inputs, outputs=(self.output,), locked=self.locked,
-            )  # fmt: skip
+                inputs=self.inputs,
+                outputs=(self.output,),
+                locked=self.locked,
+            )
         return gain, closed
 
 

@@ -160,8 +160,9 @@ class LoopFigures:
     def delay_margin(self) -> float:
         """Additional dead time that the loop can take [s]; inf where there is no crossover."""
         # What is missing to -1 in the direction of a delay, which turns clockwise.
-        return min((at.margin % 360.0 / 360.0 / at.frequency for at in self.crossings),
-                   default=math.inf)  # fmt: skip
+        return min(
+            (at.margin % 360.0 / 360.0 / at.frequency for at in self.crossings), default=math.inf
+        )
 
     @cached_property
     def factors(self) -> list[GainFactor]:

@@ -24,8 +24,7 @@ def widths(loop: Loop, levels: Array) -> Array:
         Shape (n,); NaN where a branch does not cross the level.
     """
     apply, release = (
-        np.array([_mean_crossing(x, y, float(level)) for level in levels])
-        for x, y in loop.branches
+        np.array([_mean_crossing(x, y, float(level)) for level in levels]) for x, y in loop.branches
     )
     return np.asarray(apply - release)
 

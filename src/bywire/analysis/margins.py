@@ -16,9 +16,15 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.undefined import EqualWhereUndefined
 
 SENSES = {
-    "gain": 1, "lower_gain": -1, "phase": 1, "delay": 1, "disk": 1, "bandwidth": 1,
-    "sensitivity": -1, "complementary": -1,
-}  # fmt: skip
+    "gain": 1,
+    "lower_gain": -1,
+    "phase": 1,
+    "delay": 1,
+    "disk": 1,
+    "bandwidth": 1,
+    "sensitivity": -1,
+    "complementary": -1,
+}
 """figures of `LoopMargins`: 1 where more is better, -1 where less is"""
 _POINTS = 2000
 
@@ -90,9 +96,16 @@ class LoopMargins(EqualWhereUndefined):
 NO_LOOP = "no loop: the loop gain is 0 at all frequencies"
 """sentence on a loop whose gains are 0, or whose valve is shut"""
 UNSTABLE = LoopMargins(
-    gain=math.nan, phase=math.nan, crossover=math.nan, delay=math.nan, disk=math.nan,
-    sensitivity=math.nan, complementary=math.nan, bandwidth=math.nan, stable=False,
-)  # fmt: skip
+    gain=math.nan,
+    phase=math.nan,
+    crossover=math.nan,
+    delay=math.nan,
+    disk=math.nan,
+    sensitivity=math.nan,
+    complementary=math.nan,
+    bandwidth=math.nan,
+    stable=False,
+)
 """what an unstable loop has: no margins"""
 
 

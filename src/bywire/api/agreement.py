@@ -129,12 +129,14 @@ class LoopAgreement(Answer):
                 }
                 for cause in compared.gain
             },
-            "step": {"gain_dB": compared.step_gain.tolist(),
-                     "phase_deg": compared.step_phase.tolist()},
+            "step": {
+                "gain_dB": compared.step_gain.tolist(),
+                "phase_deg": compared.step_phase.tolist(),
+            },
             "largest": [cause or None for cause in compared.largest],
             "tolerance": {"gain_dB": GAIN, "phase_deg": PHASE},
             "holds": compared.holds,
-        }  # fmt: skip
+        }
 
 
 @use_case

@@ -56,8 +56,16 @@ def figures_table(response: xr.Dataset, unit: str) -> Table:
             float(case["phase_margin"]), "deg", _step_error(case, "phase_margin"), 3
         )
         factors = [_factor(case, name) for name in ("gain_margin", "lower_gain_margin")]
-        rows.append([amount(float(size), unit, 3), _frequency(case, "bandwidth"),
-                     _frequency(case, "crossover"), margin, *factors, *most])  # fmt: skip
+        rows.append(
+            [
+                amount(float(size), unit, 3),
+                _frequency(case, "bandwidth"),
+                _frequency(case, "crossover"),
+                margin,
+                *factors,
+                *most,
+            ]
+        )
     return text_table(heading, rows)
 
 
@@ -92,11 +100,15 @@ def over_table(
     """
     sizes = [amount(float(size), unit, 3) for size in response["amplitude"].values]
     rows = [
-        [amount(variant.label, range_[1]),
-         *(_frequency(response.isel(variant=k, amplitude=j), "bandwidth")
-           for j in range(len(sizes)))]
+        [
+            amount(variant.label, range_[1]),
+            *(
+                _frequency(response.isel(variant=k, amplitude=j), "bandwidth")
+                for j in range(len(sizes))
+            ),
+        ]
         for k, variant in enumerate(variants)
-    ]  # fmt: skip
+    ]
     return text_table([range_[0], *sizes], rows)
 
 
@@ -112,9 +124,10 @@ def figures_object(response: xr.Dataset, variant: int) -> list[dict[str, Any]]:
             for name in ("phase_margin", "gain_margin", "lower_gain_margin")
         }
         row |= {
-            key: _or_none(float(case[key])) for key in map("{}_step_error".format, _WIDTHS)
+            key: _or_none(float(case[key]))
+            for key in map("{}_step_error".format, _WIDTHS)
             if key in case
-        }  # fmt: skip
+        }
         row |= {f"largest_{name}": float(case[name].max()) for name in shares(response)}
         rows.append(row)
     return rows
@@ -123,10 +136,14 @@ def figures_object(response: xr.Dataset, variant: int) -> list[dict[str, Any]]:
 def over_object(response: xr.Dataset, variants: Sequence[Variant], name: str) -> dict[str, Any]:
     """Return the figures of all cases of a range, and the worst of every amplitude."""
     cases = [
-        {name: variant.label, "figures": figures_object(response, k),
-         "gain": _listed(response["gain"].values[k]), "phase": _listed(response["phase"].values[k])}
+        {
+            name: variant.label,
+            "figures": figures_object(response, k),
+            "gain": _listed(response["gain"].values[k]),
+            "phase": _listed(response["phase"].values[k]),
+        }
         for k, variant in enumerate(variants)
-    ]  # fmt: skip
+    ]
     worst = []
     for j, size in enumerate(response["amplitude"].values):
         k = narrowest(response, j)

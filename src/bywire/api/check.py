@@ -88,7 +88,7 @@ class Check(Answer):
                 f"does not hold: {f.subject}: {f.contract}: {f.text}; look at {f.place}"
                 for f in self.broken
             ],
-        )  # fmt: skip
+        )
 
     def _data(self) -> dict[str, Any]:
         return {
@@ -98,13 +98,18 @@ class Check(Answer):
             "not_checked": len(self.not_checked),
             "findings": [
                 {
-                    "subject": f.subject, "contract": f.contract, "outcome": f.outcome,
-                    "text": f.text, "figure": f.figure, "limit": f.limit,
-                    "file": f.place.file, "line": f.place.line,
+                    "subject": f.subject,
+                    "contract": f.contract,
+                    "outcome": f.outcome,
+                    "text": f.text,
+                    "figure": f.figure,
+                    "limit": f.limit,
+                    "file": f.place.file,
+                    "line": f.place.line,
                 }
                 for f in self.findings
             ],
-        }  # fmt: skip
+        }
 
 
 @use_case
@@ -171,11 +176,14 @@ def _figures(findings: list[Finding]) -> Table:
     """Return what was measured, one line each."""
     rows = [
         (
-            Cell(clean(f.subject)), Cell(f.contract), Cell(f"{f.figure:.2g}"),
-            Cell(f"{f.limit:g}"), Cell(f.outcome, _VERDICTS[f.outcome]),
+            Cell(clean(f.subject)),
+            Cell(f.contract),
+            Cell(f"{f.figure:.2g}"),
+            Cell(f"{f.limit:g}"),
+            Cell(f.outcome, _VERDICTS[f.outcome]),
         )
         for f in findings
-    ]  # fmt: skip
+    ]
     numeric = ("figure", "limit")
     headings = ("subject", "contract", *numeric, "outcome")
     return Table(tuple(Column(name, name in numeric) for name in headings), tuple(rows))

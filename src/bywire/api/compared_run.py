@@ -29,9 +29,12 @@ from bywire.report.changes import bench_changes
 from bywire.report.document import Change
 
 _BENCH = {
-    "experiment": "experiment", "parameter_set": "parameters", "model": "assembly",
-    "step": "simulation.step", "seed": "simulation.seed",
-}  # fmt: skip
+    "experiment": "experiment",
+    "parameter_set": "parameters",
+    "model": "assembly",
+    "step": "simulation.step",
+    "seed": "simulation.seed",
+}
 """attributes of a recording that bench files set, by what they call them"""
 _PROGRAM = ("bywire_version", "engine")
 
@@ -107,8 +110,11 @@ class ComparedRun:
     def settings(self) -> dict[str, Setting]:
         """Everything that was set, by the names that ``--set`` takes."""
         said = self.attributes
-        settings = {name: Setting(said[key], "s" if key == "step" else "1")
-                 for key, name in _BENCH.items() if key in said}  # fmt: skip
+        settings = {
+            name: Setting(said[key], "s" if key == "step" else "1")
+            for key, name in _BENCH.items()
+            if key in said
+        }
         options = None if self.definition is None else self.definition.options
         settings |= dict(_settings(_object(said, "options"), options, OPTION))
         settings |= dict(self._stimuli())
@@ -148,9 +154,14 @@ def ran(result: Result, label: str, source: str) -> ComparedRun:
     """Return a bench that was run just now."""
     warned = tuple(result.warnings)
     return ComparedRun(
-        label, source, result.recordings, result.kpis, result.verdicts, warned,
+        label,
+        source,
+        result.recordings,
+        result.kpis,
+        result.verdicts,
+        warned,
         bench_changes(result.bench),
-    )  # fmt: skip
+    )
 
 
 def kept(folder: Path) -> ComparedRun:

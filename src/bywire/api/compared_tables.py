@@ -76,9 +76,11 @@ def settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
     """Return settings of all runs, a column each."""
     return Table(
         (Column("setting"), *(Column(label, numeric=True) for label in labels)),
-        tuple((Cell(clean(each.name)), *(_setting(v, each.unit) for v in each.values))
-              for each in rows),
-    )  # fmt: skip
+        tuple(
+            (Cell(clean(each.name)), *(_setting(v, each.unit) for v in each.values))
+            for each in rows
+        ),
+    )
 
 
 def kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
@@ -86,19 +88,22 @@ def kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
     change = "change" if len(labels) == 2 else "spread"
     return Table(
         (
-            Column("name"), *(Column(label, numeric=True) for label in labels),
+            Column("name"),
+            *(Column(label, numeric=True) for label in labels),
             Column(change, numeric=True),
         ),
         tuple(
             (
                 Cell(clean(each.name)),
-                *(Cell(measured_amount(v, each.unit, e), value=v)
-                  for v, e in zip(each.values, each.errors, strict=True)),
+                *(
+                    Cell(measured_amount(v, each.unit, e), value=v)
+                    for v, e in zip(each.values, each.errors, strict=True)
+                ),
                 _change(each),
             )
             for each in rows
         ),
-    )  # fmt: skip
+    )
 
 
 def verdict_table(runs: Sequence[ComparedRun]) -> Table:

@@ -80,16 +80,19 @@ class Comparison(Answer):
         said += self._spans()
         grouped = self._groups
         left_out = [
-            f"{each.label}: {label}" for each in self.runs for label in each.recordings
+            f"{each.label}: {label}"
+            for each in self.runs
+            for label in each.recordings
             if not any(each.recordings[label] is r for g in grouped.values() for r in g)
-        ]  # fmt: skip
+        ]
         if left_out:
             said.append(f"not drawn, for lack of a counterpart over time: {', '.join(left_out)}")
         said += [
             f"{each.label}: its parameter set is not known here, so its values stand without "
             "units; --system PATH loads a brake of your own"
-            for each in self.runs if not each.has_units
-        ]  # fmt: skip
+            for each in self.runs
+            if not each.has_units
+        ]
         return said
 
     def document(self) -> Document:
@@ -152,8 +155,11 @@ class Comparison(Answer):
         differing = [s for s in self.settings if s.differs and s.name not in _NOT_NAMED]
         texts = []
         for k, each in enumerate(self.runs):
-            named = [f"{s.name} = {value_text(s.values[k], s.unit)}" for s in differing
-                     if s.values[k] is not None]  # fmt: skip
+            named = [
+                f"{s.name} = {value_text(s.values[k], s.unit)}"
+                for s in differing
+                if s.values[k] is not None
+            ]
             more = len(named) - _FEW
             shown = named if more <= 0 else [*named[:_FEW], f"{more} more"]
             texts.append(f"{each.label}: {', '.join(shown)}" if shown else each.label)
@@ -178,8 +184,9 @@ class Comparison(Answer):
         labels = [each.label for each in self.runs]
         blocks_of: list[list[Flat]] = []
         for title, shown, rows in (
-            ("Settings", self.settings, settings_table), ("Key figures", self.figures, kpi_table)
-        ):  # fmt: skip
+            ("Settings", self.settings, settings_table),
+            ("Key figures", self.figures, kpi_table),
+        ):
             differing = [each for each in shown if each.differs]
             same = [each for each in shown if not each.differs]
             blocks: list[Flat] = []
@@ -228,26 +235,33 @@ class Comparison(Answer):
         from bywire.report.step_marks import step_limits
 
         steps = [
-            None if each.definition is None or each.options is None
+            None
+            if each.definition is None or each.options is None
             else step_limits(each.definition, each.options, each.verdicts)
             for each in self.runs
-        ]  # fmt: skip
+        ]
         return steps[0] if all(each == steps[0] for each in steps) else None
 
     def _data(self) -> dict[str, Any]:
         def rows(shown: Sequence[Compared]) -> list[dict[str, Any]]:
             return [
                 {
-                    "name": s.name, "unit": s.unit, "values": list(s.values), "differs": s.differs,
+                    "name": s.name,
+                    "unit": s.unit,
+                    "values": list(s.values),
+                    "differs": s.differs,
                     **({"errors": list(s.errors), "distinct": s.is_distinct} if s.errors else {}),
                 }
-                for s in shown if s.differs or self.is_full
-            ]  # fmt: skip
+                for s in shown
+                if s.differs or self.is_full
+            ]
 
         return {
             "runs": [
                 {
-                    "label": each.label, "source": each.source, "assembly": each.model,
+                    "label": each.label,
+                    "source": each.source,
+                    "assembly": each.model,
                     "holds": all(v.met for v in each.verdicts),
                     "requirements": [verdict_record(verdict) for verdict in each.verdicts],
                     "changes": {
@@ -260,7 +274,7 @@ class Comparison(Answer):
             "settings": rows(self.settings),
             "kpis": rows(self.figures),
             "warnings": self.warnings,
-        }  # fmt: skip
+        }
 
 
 _NOT_NAMED = ("experiment", "bywire_version", "engine")

@@ -26,8 +26,12 @@ GOALS: Mapping[tuple[str, str], Mapping[str, int]] = {
     ("Cortex-M4F", "double"): {"instructions": 10_000},
 }
 """what a tick of an ECU should take at most, by processor and precision: bytes, instructions"""
-_HEADINGS = {"rom": "ROM [B]", "ram": "RAM [B]", "stack": "stack [B]",
-             "instructions": "instructions"}  # fmt: skip
+_HEADINGS = {
+    "rom": "ROM [B]",
+    "ram": "RAM [B]",
+    "stack": "stack [B]",
+    "instructions": "instructions",
+}
 
 
 @dataclass(frozen=True)
@@ -68,8 +72,14 @@ class ControllerCheck:
     def table(self) -> TableBlock:
         """Return a row for every trial."""
         figures = (Column(each, True) for each in _HEADINGS.values())
-        columns = [Column("processor"), Column("precision"), Column("differing", True),
-                   Column("breaches", True), Column("bits"), *figures]  # fmt: skip
+        columns = [
+            Column("processor"),
+            Column("precision"),
+            Column("differing", True),
+            Column("breaches", True),
+            Column("bits"),
+            *figures,
+        ]
         rows = tuple(self._row(each) for each in self.trials)
         caption = (
             f"{self.vectors} vectors: values that differ from Python's, breaches of the contract "
@@ -97,8 +107,10 @@ class ControllerCheck:
             "skipped": list(self.skipped),
             "trials": [
                 {
-                    "processor": each.target, "precision": each.precision,
-                    "differing": each.differing, "breaches": each.breaches,
+                    "processor": each.target,
+                    "precision": each.precision,
+                    "differing": each.differing,
+                    "breaches": each.breaches,
                     "identical": self.is_identical(each),
                     **figures_of(each),
                     "goals": dict(GOALS.get((each.target, each.precision), {})),
@@ -106,7 +118,7 @@ class ControllerCheck:
                 }
                 for each in self.trials
             ],
-        }  # fmt: skip
+        }
 
 
 def figures_of(trial: Trial) -> dict[str, int]:

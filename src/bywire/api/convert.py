@@ -91,7 +91,9 @@ class Conversion(Answer):
             "source": str(self.source),
             "format": self.recording.attrs.get("format"),
             "signals": self._signals(),
-            "alignment": None if report is None else {
+            "alignment": None
+            if report is None
+            else {
                 "interval": report.interval,
                 "start": report.start,
                 "stop": report.stop,
@@ -103,7 +105,7 @@ class Conversion(Answer):
             },
             "notes": list(self.remarks),
             "files": [str(self.target)],
-        }  # fmt: skip
+        }
 
 
 @use_case

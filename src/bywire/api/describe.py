@@ -51,8 +51,23 @@ from bywire.synthesis.study import STUDIES, Study
 
 Object = dict[str, Any]
 
-_LINES = ("parts", "assembly", "system", "at", "unit", "range", "experiment", "records", "source",
-          "parameter sets", "experiments", "loops", "plants", "studies", "methods")  # fmt: skip
+_LINES = (
+    "parts",
+    "assembly",
+    "system",
+    "at",
+    "unit",
+    "range",
+    "experiment",
+    "records",
+    "source",
+    "parameter sets",
+    "experiments",
+    "loops",
+    "plants",
+    "studies",
+    "methods",
+)
 _LONGEST = 200  # characters that are looked for
 _TABLES = ("drives", "signals", "found in", "values", "estimates", "kpis")
 
@@ -87,8 +102,9 @@ def described(name: str) -> list[Object]:
     }
     objects: list[Object] = [
         {"kind": kind, "name": name, **describe(known[name])}
-        for kind, (known, describe) in kinds.items() if name in known
-    ]  # fmt: skip
+        for kind, (known, describe) in kinds.items()
+        if name in known
+    ]
     if not objects:
         names = {n for known, _ in kinds.values() for n in known}
         raise unknown_name("name", name, names.union(nearest_words(name)))
@@ -159,8 +175,11 @@ def describe(name: str) -> Description | Mentioned:
 def _blocks(thing: Object) -> list[str | Flat]:
     """Return an object as lines and tables, apart by empty lines."""
     lines = [f"{thing['kind']} {thing['name']}: {thing['summary']}"]
-    lines += [f"  {key}: {unit_text(thing[key]) if key == 'unit' else thing[key]}"
-              for key in _LINES if thing.get(key)]  # fmt: skip
+    lines += [
+        f"  {key}: {unit_text(thing[key]) if key == 'unit' else thing[key]}"
+        for key in _LINES
+        if thing.get(key)
+    ]
     blocks: list[str | Flat] = ["\n".join(lines)]
     for key in _TABLES:
         rows = thing.get(key)
@@ -184,10 +203,11 @@ def _blocks(thing: Object) -> list[str | Flat]:
 def _element(element: Element) -> Object:
     parts = [*element.functions, *(cls.__name__ for cls in parameter_classes(element.module))]
     return {
-        "summary": element.summary, "source": element.module.__file__ or element.name,
+        "summary": element.summary,
+        "source": element.module.__file__ or element.name,
         "parts": ", ".join(parts),
         "see": f"'bywire check {element.name}' puts it to the test",
-    }  # fmt: skip
+    }
 
 
 def _method(method: Method) -> Object:
@@ -224,10 +244,15 @@ def _estimates(method: Method) -> list[Object]:
     if method.assembly and method.unknowns:
         cls = PARAMETER_SETS.find(main_set(method.assembly)).parameter_class
         leaves, notes = leaf_fields(cls), field_notes(cls)
-        rows += [{"name": n, "unit": display_unit(leaves[n].unit.symbol), "meaning": notes[n]}
-                 for n in method.unknowns if n in leaves]  # fmt: skip
-    return rows + [{"name": n, "unit": display_unit(unit) or "any", "meaning": text}
-                   for n, (unit, text) in method.further.items()]  # fmt: skip
+        rows += [
+            {"name": n, "unit": display_unit(leaves[n].unit.symbol), "meaning": notes[n]}
+            for n in method.unknowns
+            if n in leaves
+        ]
+    return rows + [
+        {"name": n, "unit": display_unit(unit) or "any", "meaning": text}
+        for n, (unit, text) in method.further.items()
+    ]
 
 
 def _experiment(experiment: Experiment) -> Object:
@@ -238,7 +263,7 @@ def _experiment(experiment: Experiment) -> Object:
         "kpis": [{"name": n, "unit": readable_units(u)} for n, u in experiment.kpis.items()],
         "options": option_rows(experiment.options, experiment.defaults),
         "changed_with": "--set options.NAME=VALUE",
-    }  # fmt: skip
+    }
 
 
 def _generic(experiment: GenericExperiment) -> Object:
@@ -270,14 +295,21 @@ def _named(experiment: GenericExperiment) -> str:
 
 
 def _study(study: Study) -> Object:
-    return {**_in_short(study), "options": option_rows(study.options, study.defaults),
-            "changed_with": "--set NAME=VALUE"}  # fmt: skip
+    return {
+        **_in_short(study),
+        "options": option_rows(study.options, study.defaults),
+        "changed_with": "--set NAME=VALUE",
+    }
 
 
 def _life(life: Life) -> Object:
     rows = option_rows(life.wear, life.defaults())
-    return {"summary": life.summary, "experiment": life.experiment, "options": rows,
-            "changed_with": "--set wear.NAME=VALUE"}  # fmt: skip
+    return {
+        "summary": life.summary,
+        "experiment": life.experiment,
+        "options": rows,
+        "changed_with": "--set wear.NAME=VALUE",
+    }
 
 
 def _set(cited: Set) -> Object:
@@ -286,18 +318,25 @@ def _set(cited: Set) -> Object:
         known = cited.values.get(row["name"])
         parts = () if known is None else (known.kind, known.where)
         row["provenance"] = ": ".join(part for part in parts if part)
-    return {**_in_short(cited), "source": cited.source, "parameters": rows,
-            "changed_with": "--set NAME=VALUE"}  # fmt: skip
+    return {
+        **_in_short(cited),
+        "source": cited.source,
+        "parameters": rows,
+        "changed_with": "--set NAME=VALUE",
+    }
 
 
 def _campaign(campaign: DeclaredCampaign) -> Object:
-    criteria = [{"name": each["name"], "signal": each["signal"]}
-                for each in campaign.content["criteria"]]  # fmt: skip
+    criteria = [
+        {"name": each["name"], "signal": each["signal"]} for each in campaign.content["criteria"]
+    ]
     return {
-        "summary": campaign.summary, "experiment": campaign.content["bench"], "signals": criteria,
+        "summary": campaign.summary,
+        "experiment": campaign.content["bench"],
+        "signals": criteria,
         "see": f"run by 'bywire faults {campaign.name}'; its faults, criteria and residuals are "
         "listed in the answer",
-    }  # fmt: skip
+    }
 
 
 def _stimulus(stimulus: StimulusKind) -> Object:

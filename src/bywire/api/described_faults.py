@@ -47,6 +47,7 @@ def described_fault(places: list[tuple[str, Mode]]) -> dict[str, Any]:
     return {
         "summary": places[0][1].summary,
         "found in": rows,
-        "see": f"put in by [[faults]] of a bench file, or --fault \"{name}"
-        + ("=VALUE" if places[0][1].unit else "") + '@ONSET"',
-    }  # fmt: skip
+        "see": f'put in by [[faults]] of a bench file, or --fault "{name}'
+        + ("=VALUE" if places[0][1].unit else "")
+        + '@ONSET"',
+    }

@@ -53,9 +53,13 @@ def described_parameter(name: str) -> Object:
                 texts += [] if row[key] in texts else [row[key]]
     said = {key: " or ".join(filter(None, texts)) for key, texts in descriptions.items()}
     return {
-        "summary": said["meaning"], "assembly": ", ".join(assemblies), "unit": said["unit"],
-        "range": said["range"], "values": values, "see": f"changed with --set {name}=VALUE",
-    }  # fmt: skip
+        "summary": said["meaning"],
+        "assembly": ", ".join(assemblies),
+        "unit": said["unit"],
+        "range": said["range"],
+        "values": values,
+        "see": f"changed with --set {name}=VALUE",
+    }
 
 
 def described_group(name: str) -> Object:
@@ -66,15 +70,21 @@ def described_group(name: str) -> Object:
         cited = PARAMETER_SETS.find(main_set(assembly))
         sets.append(cited.name)
         meanings.append(group_meaning(_class_of(cited.parameter_class, name)))
-        new = [row for row in option_rows(cited.parameter_class, cited.parameters())
-               if row["name"].rpartition(".")[0] == name]  # fmt: skip
+        new = [
+            row
+            for row in option_rows(cited.parameter_class, cited.parameters())
+            if row["name"].rpartition(".")[0] == name
+        ]
         if len(assemblies) > 1:
             new = [{**row, "meaning": f"{row['meaning']} ({assembly})".strip()} for row in new]
         rows += new
     about = " or ".join(dict.fromkeys(filter(None, meanings)))
-    return {"summary": f"{about}; parameters with the values of {' and '.join(sets)}",
-            "assembly": ", ".join(assemblies), "parameters": rows,
-            "changed_with": "--set NAME=VALUE"}  # fmt: skip
+    return {
+        "summary": f"{about}; parameters with the values of {' and '.join(sets)}",
+        "assembly": ", ".join(assemblies),
+        "parameters": rows,
+        "changed_with": "--set NAME=VALUE",
+    }
 
 
 def group_meaning(cls: type[ParameterSet]) -> str:
@@ -125,13 +135,15 @@ def option_rows(
         meaning = " ".join(notes[name].split())
         if name.split(".")[0] in simulated and "synthetic" not in meaning:
             meaning += " (simulated experiments)"
-        rows.append({
-            "name": name,
-            "value": value_text(known[name], unit) if name in known else None,
-            "unit": "" if leaf is None else display_unit(unit),
-            "range": _choices(cls, name) if leaf is None else _range(leaf),
-            "meaning": meaning,
-        })  # fmt: skip
+        rows.append(
+            {
+                "name": name,
+                "value": value_text(known[name], unit) if name in known else None,
+                "unit": "" if leaf is None else display_unit(unit),
+                "range": _choices(cls, name) if leaf is None else _range(leaf),
+                "meaning": meaning,
+            }
+        )
     return rows
 
 

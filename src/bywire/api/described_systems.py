@@ -28,32 +28,47 @@ def signals() -> Mapping[str, Sequence[Object]]:
     places: dict[str, list[Object]] = {}
     for system, model in ASSEMBLIES.all().items():
         for name, signal, where in merged_signals(places_of(model).items()):
-            places.setdefault(name, []).append({
-                "system": system, "unit": display_unit(signal.unit), "meaning": signal.label,
-                "where": ", ".join(where),
-            })  # fmt: skip
+            places.setdefault(name, []).append(
+                {
+                    "system": system,
+                    "unit": display_unit(signal.unit),
+                    "meaning": signal.label,
+                    "where": ", ".join(where),
+                }
+            )
     return places
 
 
 def described_system(model: type[Any]) -> Object:
     """Return an assembly, or a rig, with its signals and what there is for it."""
     kinds: Mapping[str, Mapping[str, Any]] = {
-        "parameter sets": PARAMETER_SETS.all(), "experiments": EXPERIMENTS.all(),
-        "loops": LOOPS.all(), "plants": PLANTS.all(), "studies": STUDIES.all(),
+        "parameter sets": PARAMETER_SETS.all(),
+        "experiments": EXPERIMENTS.all(),
+        "loops": LOOPS.all(),
+        "plants": PLANTS.all(),
+        "studies": STUDIES.all(),
         "methods": METHODS.all(),
-    }  # fmt: skip
+    }
     rows = [
-        {"signal": name, "unit": display_unit(signal.unit), "meaning": signal.label,
-         "where": ", ".join(where)}
+        {
+            "signal": name,
+            "unit": display_unit(signal.unit),
+            "meaning": signal.label,
+            "where": ", ".join(where),
+        }
         for name, signal, where in merged_signals(places_of(model).items())
-    ]  # fmt: skip
+    ]
     there = {
         kind: ", ".join(n for n, entry in known.items() if entry.assembly == model.name)
         for kind, known in kinds.items()
     }
     shown = "'bywire list' with the name of a parameter set shows its parameters"
-    return {"summary": system_summary(model), **there, "signals": rows,
-            "see": shown if there["parameter sets"] else ""}  # fmt: skip
+    return {
+        "summary": system_summary(model),
+        **there,
+        "signals": rows,
+        "see": shown if there["parameter sets"] else "",
+    }
 
 
 def system_summary(model: type[Any]) -> str:
@@ -67,10 +82,13 @@ def described_drive(experiment: Experiment) -> Object:
     """Return which signals an experiment drives, of which systems."""
     if experiment.driven_unit is not None:
         unit = display_unit(experiment.driven_unit(experiment.defaults))
-        row = {"signal": "[stimulus]", "unit": unit,
-               "meaning": "what this section of the bench file gives",
-               "system": experiment.assembly}
-        return {"drives": [row], "see": _recorded([experiment.assembly])}  # fmt: skip
+        row = {
+            "signal": "[stimulus]",
+            "unit": unit,
+            "meaning": "what this section of the bench file gives",
+            "system": experiment.assembly,
+        }
+        return {"drives": [row], "see": _recorded([experiment.assembly])}
     par = PARAMETER_SETS.find(main_set(experiment.assembly)).parameters()
     rows: dict[tuple[str, str], Object] = {}
     for case in (experiment.preview or experiment.cases)(par, experiment.defaults, None):
@@ -89,8 +107,11 @@ def _recorded(ran: Sequence[str]) -> str:
 
 def _driven(case: Case) -> list[tuple[str, str, str]]:
     known = signals_of(case.model.Stimulus)
-    return [(name, display_unit(known[name].unit), known[name].label)
-            for name in known if name in case.stimulus(np.zeros(1))]  # fmt: skip
+    return [
+        (name, display_unit(known[name].unit), known[name].label)
+        for name in known
+        if name in case.stimulus(np.zeros(1))
+    ]
 
 
 def described_loop(loop: Loop) -> Object:
@@ -99,17 +120,29 @@ def described_loop(loop: Loop) -> Object:
     model = loop.point(par, loop.at.default).model
     known = {name: (s.unit, s.label) for name, s, _ in merged_signals(places_of(model).items())}
     parts = {
-        "input": loop.inputs, "output": (loop.output,), "cut open at": (loop.cut,),
+        "input": loop.inputs,
+        "output": (loop.output,),
+        "cut open at": (loop.cut,),
         "state": tuple(model.State._fields),
-    }  # fmt: skip
+    }
     rows = [
-        {"signal": name, "unit": display_unit(known.get(name, ("1", ""))[0]),
-         "meaning": known.get(name, ("1", ""))[1], "as": part}
-        for part, names in parts.items() for name in names
-    ]  # fmt: skip
+        {
+            "signal": name,
+            "unit": display_unit(known.get(name, ("1", ""))[0]),
+            "meaning": known.get(name, ("1", ""))[1],
+            "as": part,
+        }
+        for part, names in parts.items()
+        for name in names
+    ]
     at = f"{loop.at.name} [{unit_text(display_unit(loop.at.unit))}]"
-    return {"summary": loop.summary, "assembly": loop.assembly, "system": model.name, "at": at,
-            "signals": rows}  # fmt: skip
+    return {
+        "summary": loop.summary,
+        "assembly": loop.assembly,
+        "system": model.name,
+        "at": at,
+        "signals": rows,
+    }
 
 
 def described_plant(plant: Plant) -> Object:
@@ -120,9 +153,10 @@ def described_plant(plant: Plant) -> Object:
     places = places_of(ASSEMBLIES.all()[plant.assembly]).items()
     meaning = {name: signal.label for name, signal, _ in merged_signals(places)}
     parts = (
-        ("input", model.inputs, model.input_units), ("output", model.outputs, model.output_units),
+        ("input", model.inputs, model.input_units),
+        ("output", model.outputs, model.output_units),
         ("state", model.states, model.state_units),
-    )  # fmt: skip
+    )
     rows = [
         {"signal": name, "unit": display_unit(unit), "meaning": meaning.get(name, ""), "as": part}
         for part, names, units in parts

@@ -120,9 +120,18 @@ def design(
         raise ParameterError("probability needs drawn models: name a study file, --vary FILE")
     if schedule:
         return _scheduled(
-            loop, parameters, at, overrides, requirements_of(requirements, require), over,
-            None if linear_only else amplitudes, free_derivative, seed, progress, side,
-        )  # fmt: skip
+            loop,
+            parameters,
+            at,
+            overrides,
+            requirements_of(requirements, require),
+            over,
+            None if linear_only else amplitudes,
+            free_derivative,
+            seed,
+            progress,
+            side,
+        )
     case = loop_case(loop, parameters, at, overrides, side)
     wanted = requirements_of(requirements, require)
     case, overrides, limits = for_ecu(case, overrides, free_derivative)

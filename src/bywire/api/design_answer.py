@@ -162,15 +162,17 @@ class DesignAnswer(Answer):
         state = self.linear.status if tried is None or tried.met else "not met"
         text = bench_text(
             f"loop {case.loop.name} at {case.loop.at.name} = {self.points}, requirements {state}",
-            case.loop.proof, case.name, self.overrides, case.par, self.gains,
-        )  # fmt: skip
+            case.loop.proof,
+            case.name,
+            self.overrides,
+            case.par,
+            self.gains,
+        )
         return write_bytes(path, text.encode())
 
     @cached_property
     def _curves(self) -> list[DesignCurve]:
-        every: dict[str, Mapping[str, float]] = {
-            "as given": {}, "linear design": self.linear.gains
-        }  # fmt: skip
+        every: dict[str, Mapping[str, float]] = {"as given": {}, "linear design": self.linear.gains}
         if self.tried is not None and self.tried.tuning is not None:
             every["retuned on the bench"] = self.gains
         curves = [_curve(self.case, label, gains) for label, gains in every.items()]

@@ -106,8 +106,10 @@ class Probability:
             text_table(["of other models", "met by", "probability", told, "worst"], rows),
         ]
         if self.judged.unstable:
-            lines.append(f"{self.judged.unstable} of them are unstable, or do not exist: they "
-                         "count as missing every requirement")  # fmt: skip
+            lines.append(
+                f"{self.judged.unstable} of them are unstable, or do not exist: they "
+                "count as missing every requirement"
+            )
         if self.drawn.lacking:
             lines.append(f"{self.drawn.lacking} more that were drawn for the gains do not exist")
         return [*lines, self.verdict] if self.wanted is not None else lines
@@ -120,20 +122,30 @@ class Probability:
 
     def _words(self, told: Share) -> tuple[str, str, str]:
         return (
-            f"{told.count} of {told.cases}", percent(told.value, told),
+            f"{told.count} of {told.cases}",
+            percent(told.value, told),
             f"{percent(told.low, told)} to {percent(told.high, told)}",
-        )  # fmt: skip
+        )
 
     def data(self) -> dict[str, Any]:
         """Return everything as plain data."""
+
         def said(told: Share) -> dict[str, Any]:
-            return {"met": told.count, "probability": told.value, "low": told.low,
-                    "high": told.high}  # fmt: skip
+            return {
+                "met": told.count,
+                "probability": told.value,
+                "low": told.low,
+                "high": told.high,
+            }
 
         return {
-            "study": self.drawn.study, "designed_for": len(self.drawn.cases),
-            "lacking": self.drawn.lacking, "judged_by": self.judged.models,
-            "unstable": self.judged.unstable, "wanted": self.wanted, "outcome": self.outcome,
+            "study": self.drawn.study,
+            "designed_for": len(self.drawn.cases),
+            "lacking": self.drawn.lacking,
+            "judged_by": self.judged.models,
+            "unstable": self.judged.unstable,
+            "wanted": self.wanted,
+            "outcome": self.outcome,
             "all": said(self.together),
             "requirements": [
                 {"requirement": wanted.text, "worst": worst, **said(self._share(count))}
@@ -141,7 +153,7 @@ class Probability:
                     self.requirements, self.judged.met, self.judged.worst, strict=True
                 )
             ],
-        }  # fmt: skip
+        }
 
 
 def drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
@@ -174,7 +186,7 @@ def drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
         for number, (values, k) in enumerate(
             ((values, k) for values in columns for k in range(CHUNK)), 1
         )
-    ]  # fmt: skip
+    ]
     designed = tuple(each for each in models[:count] if each is not None)
     if not designed:
         raise ParameterError(f"{file}: none of {count} models drawn of it exists")
@@ -183,9 +195,12 @@ def drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
 
 
 def probability_of(
-    drawn: DrawnModels, requirements: Sequence[Requirement], gains: Mapping[str, float],
-    wanted: str, progress: Progress | None,
-) -> Probability:  # fmt: skip
+    drawn: DrawnModels,
+    requirements: Sequence[Requirement],
+    gains: Mapping[str, float],
+    wanted: str,
+    progress: Progress | None,
+) -> Probability:
     """Return how probably gains meet requirements over the models that judge."""
     judged = judged_over(drawn.judges, requirements, gains, progress or silent)
     return Probability(drawn, tuple(requirements), judged, probability_wanted(wanted))

@@ -94,8 +94,6 @@ def _from_file(path: Path | None) -> list[str]:
     for figure, limits in section.items():
         for limit in limits if isinstance(limits, list) else [limits]:
             if not isinstance(limit, str):
-                raise ParameterError(
-                    f'{path}: {figure} = {limit}: write a text such as ">= 10 Hz"'
-                )
+                raise ParameterError(f'{path}: {figure} = {limit}: write a text such as ">= 10 Hz"')
             wanted.append(f"{figure} {limit}")
     return wanted

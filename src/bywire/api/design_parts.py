@@ -45,19 +45,27 @@ def as_object(
             "slack": design.slack,
             "kept": [requirement.text for requirement in design.kept],
             "binding": [
-                {"requirement": binding.requirement.text, "at": binding.case,
-                 "value": binding.value, "slack": binding.slack}
+                {
+                    "requirement": binding.requirement.text,
+                    "at": binding.case,
+                    "value": binding.value,
+                    "slack": binding.slack,
+                }
                 for binding in design.binding
             ],
             "unsound": dict(design.unsound),
             "conflicts": [
-                {"requirement": conflict.wanted.text, "best": conflict.best,
-                 "with": conflict.kept.text, "excluded": conflict.excludes}
+                {
+                    "requirement": conflict.wanted.text,
+                    "best": conflict.best,
+                    "with": conflict.kept.text,
+                    "excluded": conflict.excludes,
+                }
                 for conflict in design.conflicts
             ],
         },
         "bench": None if tried is None else verification_object(case, tried),
-    }  # fmt: skip
+    }
 
 
 def as_parts(
@@ -129,10 +137,11 @@ def limit_lines(case: LoopCase, limits: Mapping[str, tuple[float, float]]) -> li
     if not limits:
         return []
     texts = [
-        f"{name} = {gain_text(case, name, low)}" if low == high
+        f"{name} = {gain_text(case, name, low)}"
+        if low == high
         else f"{name} >= {gain_text(case, name, low)}"
         for name, (low, high) in limits.items()
-    ]  # fmt: skip
+    ]
     return [f"kept for an ECU: {', '.join(texts)} (--free-derivative does not)"]
 
 

@@ -28,8 +28,11 @@ if TYPE_CHECKING:
     from bywire.export.fmu.archive import Unit
 
 _KINDS: dict[Causality, str] = {
-    "input": "inputs", "output": "outputs", "parameter": "parameters", "local": "others",
-}  # fmt: skip
+    "input": "inputs",
+    "output": "outputs",
+    "parameter": "parameters",
+    "local": "others",
+}
 _NO_START = (
     "the start at rest of this experiment is not known for other parameters: with changed "
     "parameters the unit begins where the exported ones rest, and settles"
@@ -71,11 +74,15 @@ class ExportedFmu(Answer):
         unit = self.unit
         schedule = unit.made.schedule
         table = TableBlock(self._table())
-        steps = Paragraph(_EXCHANGED if unit.faces.kind == "model-exchange" else (
-            f"internal step {shown(schedule.step, 's')}, communication steps are multiples of "
-            f"{shown(schedule.frame, 's')}; the start time is {shown(unit.made.case.settle, 's')} "
-            "before time zero of the bench"
-        ))  # fmt: skip
+        steps = Paragraph(
+            _EXCHANGED
+            if unit.faces.kind == "model-exchange"
+            else (
+                f"internal step {shown(schedule.step, 's')}, communication steps are multiples of "
+                f"{shown(schedule.frame, 's')}; the start time is "
+                f"{shown(unit.made.case.settle, 's')} before time zero of the bench"
+            )
+        )
         written = f"written: {self.path}"
         return Document(
             f"FMU {unit.identifier}",

@@ -55,8 +55,10 @@ class ExportedWasm(Answer):
 
     def _data(self) -> dict[str, Any]:
         return {
-            "case": self.made.case.label, "bytes": self.size, "files": [str(p) for p in self.files],
-        }  # fmt: skip
+            "case": self.made.case.label,
+            "bytes": self.size,
+            "files": [str(p) for p in self.files],
+        }
 
 
 @use_case

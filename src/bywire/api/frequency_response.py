@@ -95,9 +95,14 @@ def frequency_response(
     point = variants[0].point
     flags = [n for n in point.model.Output._fields if n == "stuck" or n.startswith("sat_")]
     sweep = Sweep(
-        case.loop.inputs, case.loop.output, wanted, sizes, flags=flags,
-        whole=case.loop.whole(point.par), saturations=case.loop.saturations,
-    )  # fmt: skip
+        case.loop.inputs,
+        case.loop.output,
+        wanted,
+        sizes,
+        flags=flags,
+        whole=case.loop.whole(point.par),
+        saturations=case.loop.saturations,
+    )
     response = _measured(variants, sweep, excitation, progress or silent)
     response = with_widths(response, widths(variants, response))
     if estimate_error:
@@ -126,9 +131,7 @@ def _sustained(case: LoopCase, changes: Mapping[str, Any]) -> tuple[Variant, str
     return Variant(loop, par, case.value), note if texts else ""
 
 
-def _variants(
-    base: Variant, case: LoopCase, range_: str
-) -> tuple[list[Variant], tuple[str, str]]:
+def _variants(base: Variant, case: LoopCase, range_: str) -> tuple[list[Variant], tuple[str, str]]:
     """Return the cases of a range, or the one without, and name and unit of what varies.
 
     Raises

@@ -114,9 +114,7 @@ class FrequencyResponse(Answer):
             ],
             brief=self._brief(table),
             data=self._data(),
-            attachments=[
-                recording_file(f"{loop.name}-frequency-response.nc", response)
-            ],
+            attachments=[recording_file(f"{loop.name}-frequency-response.nc", response)],
             heed=[self.note] if self.note else [],
             changes=self.case.subject.changes,
         )
@@ -131,10 +129,14 @@ class FrequencyResponse(Answer):
         excitation = response.attrs["excitation"]
         peaks = [f"excitation: {excitation}, amplitudes are its peaks"]
         return [
-            f"{head}: gain and phase by amplitude", *(peaks if excitation != "sine" else []),
-            table, *filter(None, [purity(response), largest(response)]), "",
-            TableBlock(figures_table(response, self.unit)), NOTE,
-        ]  # fmt: skip
+            f"{head}: gain and phase by amplitude",
+            *(peaks if excitation != "sine" else []),
+            table,
+            *filter(None, [purity(response), largest(response)]),
+            "",
+            TableBlock(figures_table(response, self.unit)),
+            NOTE,
+        ]
 
     def _bandwidths(self) -> list[Block]:
         """Return what a page says of bandwidths."""

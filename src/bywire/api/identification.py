@@ -94,8 +94,9 @@ class Identification(Answer):
         return [
             f"check failed: {check.name}: {check.note}"
             + (f"; next, {check.next_step}" if check.next_step else "")
-            for check in self.identified.checks if not check.holds
-        ]  # fmt: skip
+            for check in self.identified.checks
+            if not check.holds
+        ]
 
     @property
     def holds(self) -> bool:
@@ -113,8 +114,9 @@ class Identification(Answer):
         lines = [
             f"CHECK FAILED, do not use it as it is: {c.name} = {c.value:.4g} "
             f"(limit {'>=' if c.at_least else '<='} {c.limit:g}): {c.note}"
-            for c in self.identified.checks if not c.holds
-        ]  # fmt: skip
+            for c in self.identified.checks
+            if not c.holds
+        ]
         lines.append(f"identified by {method.name} from {self.source}")
         for estimate in self.identified.estimates.values():
             lines += [f"not told by the data: {k.unknown.label}" for k in estimate.kept]
@@ -165,8 +167,9 @@ class Identification(Answer):
     def _parameters(self) -> Iterator[Flat]:
         for name, estimate in self.identified.estimates.items():
             table = estimate_table(estimate, self.start, self.put_in)
-            texts = [f"{k.unknown.label} is not told by the data: {k.reason}"
-                     for k in estimate.kept]  # fmt: skip
+            texts = [
+                f"{k.unknown.label} is not told by the data: {k.reason}" for k in estimate.kept
+            ]
             yield TableBlock(table, f"{name[:1].upper()}{name[1:]}.", title=name)
             if texts or estimate.notes:
                 yield Listing([*texts, *estimate.notes])
@@ -182,8 +185,9 @@ class Identification(Answer):
 
         return [
             FigureBlock(partial(residual_figure, estimate), _residual_caption(name, estimate), key)
-            for key, name, estimate in self._keyed("residuals") if estimate.residuals.size > 1
-        ]  # fmt: skip
+            for key, name, estimate in self._keyed("residuals")
+            if estimate.residuals.size > 1
+        ]
 
     def _correlations(self) -> list[Block]:
         from bywire.report.correlation_matrix import correlation_matrix
@@ -195,8 +199,9 @@ class Identification(Answer):
                 "combination of the two rather than either.",
                 key,
             )
-            for key, name, estimate in self._keyed("correlation") if len(estimate.unknowns) > 1
-        ]  # fmt: skip
+            for key, name, estimate in self._keyed("correlation")
+            if len(estimate.unknowns) > 1
+        ]
         return blocks or [Paragraph("One unknown alone has no correlations.")]
 
     def _keyed(self, kind: str) -> Iterator[tuple[str, str, Estimate]]:
@@ -242,13 +247,20 @@ class Identification(Answer):
                 for name, (value, unit) in identified.figures.items()
             },
             "checks": [
-                {"name": c.name, "value": c.value, "unit": c.unit, "limit": c.limit,
-                 "at_least": c.at_least, "holds": c.holds, "note": c.note,
-                 "next_step": c.next_step}
+                {
+                    "name": c.name,
+                    "value": c.value,
+                    "unit": c.unit,
+                    "limit": c.limit,
+                    "at_least": c.at_least,
+                    "holds": c.holds,
+                    "note": c.note,
+                    "next_step": c.next_step,
+                }
                 for c in identified.checks
             ],
             "notes": [*self.data_notes, *identified.notes],
-        }  # fmt: skip
+        }
 
     def _of_estimates(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return those values that an estimate, or an unknown that is not told, stands beside."""
@@ -273,10 +285,11 @@ class Identification(Answer):
             return [f"parameters.toml: {method.bench_note}"] if method.bench_note else []
         asked = self.chosen.par is not None and method.unknowns
         reason = (
-            "no estimate is fit for use" if asked
+            "no estimate is fit for use"
+            if asked
             else f"{method.name} gives no parameters of an assembly; take its figures from "
             "estimate.json"
-        )  # fmt: skip
+        )
         return [f"no parameters.toml is written: {reason}"]
 
     def _prepare(self, folder: Path) -> None:

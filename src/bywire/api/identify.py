@@ -110,9 +110,16 @@ def identify(
     sources = [measurements] if isinstance(measurements, Source) else list(measurements)
     shown = no_progress if progress is None else progress
     chosen = choose(
-        method, parameters, overrides, options, question, measurements=sources, mapping=mapping,
-        time=time, progress=shown,
-    )  # fmt: skip
+        method,
+        parameters,
+        overrides,
+        options,
+        question,
+        measurements=sources,
+        mapping=mapping,
+        time=time,
+        progress=shown,
+    )
     named = columns_of(chosen.method, question, time)
     _require_one_source(chosen, sources, synthetic, mapping, time)
     place = None if folder is None else Path(folder)
@@ -138,9 +145,16 @@ def identify(
         except ParameterError as error:
             notes.append(str(error))
     return Identification(
-        chosen, identified, data.data, source, _begun_at(chosen, start, identified), truth,
-        tuple(notes), synthetic is not None, files,
-    )  # fmt: skip
+        chosen,
+        identified,
+        data.data,
+        source,
+        _begun_at(chosen, start, identified),
+        truth,
+        tuple(notes),
+        synthetic is not None,
+        files,
+    )
 
 
 def far_off(estimates: Mapping[str, float], before: Mapping[str, float]) -> list[str]:
@@ -192,10 +206,15 @@ def _data(
     method = chosen.method
     if synthetic is None:
         read = measured(
-            sources, mapping, method.signals, optional=method.optional, gaps=method.gaps,
-            multiple=None if method.bench is None else method.bench.step, named=named,
+            sources,
+            mapping,
+            method.signals,
+            optional=method.optional,
+            gaps=method.gaps,
+            multiple=None if method.bench is None else method.bench.step,
+            named=named,
             progress=progress,
-        )  # fmt: skip
+        )
         return read, ", ".join(name_of(source) for source in sources)
     progress("simulated experiment", 0.0)
     data = method.synthetic(chosen.par, chosen.options, synthetic)

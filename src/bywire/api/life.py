@@ -104,15 +104,21 @@ class LifeResult(Answer):
         """Return how long it lasts, what ends it, slow states, and how it was stepped."""
         plan = self.projection.plan
         subject = Subject.of_bench(
-            plan.bench, plan.name, plan.life.summary, [each.name for each in plan.varied],
+            plan.bench,
+            plan.name,
+            plan.life.summary,
+            [each.name for each in plan.varied],
             wear_changes(plan),
         )
         kpis, states = TableBlock(kpi_table(self._rows())), TableBlock(self._states(), width=110)
         warned = [Listing([f"Warning: {text}." for text in self.warnings])] if self.warnings else []
-        wear = Details("Parameters of wear", [
-            TableBlock(parameter_table(parameter_rows(plan.wear, plan.life.values))),
-            TableBlock(parameter_table(parameter_rows(plan.conditions))),
-        ])  # fmt: skip
+        wear = Details(
+            "Parameters of wear",
+            [
+                TableBlock(parameter_table(parameter_rows(plan.wear, plan.life.values))),
+                TableBlock(parameter_table(parameter_rows(plan.conditions))),
+            ],
+        )
         return Document(
             f"Life {plan.name}",
             subject.line,
@@ -123,7 +129,9 @@ class LifeResult(Answer):
                 subject.provenance(),
             ],
             brief=[
-                f"life {plan.name}: {plan.life.summary}", Listing(self._population()), "",
+                f"life {plan.name}: {plan.life.summary}",
+                Listing(self._population()),
+                "",
                 *spaced([kpis, states]),
             ],
             data=self._data(),
@@ -147,18 +155,26 @@ class LifeResult(Answer):
         end = "ended by: " + life.limits[made.ended_by].label if made.ended_by else "no limit met"
         rows = [
             KpiRow("stops", float(made.stops), "1", f"Stops until the end of life; {end}."),
-            KpiRow("interval", made.error, "1",
-                   f"Half the width of its {100 * CONFIDENCE:g} % interval, by the sample of "
-                   f"{made.plan.count} stop{'s' * (made.plan.count > 1)}."),
+            KpiRow(
+                "interval",
+                made.error,
+                "1",
+                f"Half the width of its {100 * CONFIDENCE:g} % interval, by the sample of "
+                f"{made.plan.count} stop{'s' * (made.plan.count > 1)}.",
+            ),
             KpiRow("runs", float(runs), "1", "Stops that were simulated for it."),
-        ]  # fmt: skip
+        ]
         for name, each in life.states.items():
             if not math.isnan(share := self.deviation(name)):
-                rows.append(KpiRow(
-                    f"deviation_{name}", 100.0 * share, "%",
-                    f"Projected change of the {each.label} against "
-                    f"{len(self.checked[name]) - 1} stops run one by one.",
-                ))  # fmt: skip
+                rows.append(
+                    KpiRow(
+                        f"deviation_{name}",
+                        100.0 * share,
+                        "%",
+                        f"Projected change of the {each.label} against "
+                        f"{len(self.checked[name]) - 1} stops run one by one.",
+                    )
+                )
         return rows
 
     def _states(self) -> Table:
@@ -167,13 +183,20 @@ class LifeResult(Answer):
         for name, each in made.plan.life.states.items():
             path = made.states[name]
             rate = (path[-1] - path[0]) / made.stops
-            rows.append((
-                name, each.label, amount(path[0], each.unit), amount(path[-1], each.unit),
-                amount(float(path.min()), each.unit), amount(float(path.max()), each.unit),
-                amount(rate, difference_unit(each.unit)),
-            ))  # fmt: skip
-        return text_table(("state", "meaning", "new", "at end", "least", "largest", "per stop"),
-                          rows)  # fmt: skip
+            rows.append(
+                (
+                    name,
+                    each.label,
+                    amount(path[0], each.unit),
+                    amount(path[-1], each.unit),
+                    amount(float(path.min()), each.unit),
+                    amount(float(path.max()), each.unit),
+                    amount(rate, difference_unit(each.unit)),
+                )
+            )
+        return text_table(
+            ("state", "meaning", "new", "at end", "least", "largest", "per stop"), rows
+        )
 
     def _population(self) -> list[str]:
         plan = self.projection.plan
@@ -192,7 +215,7 @@ class LifeResult(Answer):
         ] + [
             Course(each.label, each.unit, made.left[name], is_left=True)
             for name, each in life.limits.items()
-        ]  # fmt: skip
+        ]
         return life_figure(courses, [*(step.first for step in made.steps), made.stops])
 
     def _data(self) -> dict[str, Any]:
@@ -206,8 +229,10 @@ class LifeResult(Answer):
             "ended_by": made.ended_by,
             "states": {
                 name: {
-                    "unit": each.unit, "label": each.label,
-                    "new": float(made.states[name][0]), "end": float(made.states[name][-1]),
+                    "unit": each.unit,
+                    "label": each.label,
+                    "new": float(made.states[name][0]),
+                    "end": float(made.states[name][-1]),
                     "deviation": self.deviation(name),
                 }
                 for name, each in made.plan.life.states.items()
@@ -216,7 +241,7 @@ class LifeResult(Answer):
             "steps": [{"first": each.first, "stops": each.count} for each in made.steps],
             "population": self._population(),
             "warnings": self.warnings,
-        }  # fmt: skip
+        }
 
 
 _CAPTION = (
@@ -237,9 +262,10 @@ def wear_changes(plan: LifePlan) -> tuple[Change, ...]:
         *value_changes(plan.conditions, CONDITIONS.flat(), defaults_of("lives"), CONDITION),
         *(
             Change(f"projection.{name}", f"{chosen[name]:g}", f"{default:g}", defaults_of("lives"))
-            for name, default in settings.items() if chosen[name] != default
+            for name, default in settings.items()
+            if chosen[name] != default
         ),
-    )  # fmt: skip
+    )
 
 
 @use_case

@@ -52,12 +52,18 @@ def state_space(model: LinearModel) -> dict[str, Any]:
     """Return matrices, names, units and poles of a model."""
     return {
         "period": model.period,
-        "A": model.A.tolist(), "B": model.B.tolist(), "C": model.C.tolist(), "D": model.D.tolist(),
-        "states": list(model.states), "inputs": list(model.inputs), "outputs": list(model.outputs),
-        "state_units": list(model.state_units), "input_units": list(model.input_units),
+        "A": model.A.tolist(),
+        "B": model.B.tolist(),
+        "C": model.C.tolist(),
+        "D": model.D.tolist(),
+        "states": list(model.states),
+        "inputs": list(model.inputs),
+        "outputs": list(model.outputs),
+        "state_units": list(model.state_units),
+        "input_units": list(model.input_units),
         "output_units": list(model.output_units),
         "poles": pairs(model.poles()),
-    }  # fmt: skip
+    }
 
 
 def transfers(model: LinearModel) -> list[dict[str, Any]]:
@@ -66,10 +72,16 @@ def transfers(model: LinearModel) -> list[dict[str, Any]]:
     for output in model.outputs:
         for input in model.inputs:
             path = model.transfer(input, output)
-            rows.append({
-                "input": input, "output": output, "unit": path.unit, "factor": path.factor,
-                "zeros": pairs(path.zeros), "poles": pairs(path.poles),
-            })  # fmt: skip
+            rows.append(
+                {
+                    "input": input,
+                    "output": output,
+                    "unit": path.unit,
+                    "factor": path.factor,
+                    "zeros": pairs(path.zeros),
+                    "poles": pairs(path.poles),
+                }
+            )
     return rows
 
 

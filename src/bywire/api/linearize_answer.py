@@ -177,10 +177,13 @@ class LinearizedLoop(Answer):
         shown = texts.matrices(self.model)
         transfers = shown.pop("transfer_functions")
         return {
-            **self.case.heading, **shown, "rates": texts.pairs(rates(self.model)),
-            "stable": self.model.is_stable, "has_loop": self.state != NO_LOOP,
+            **self.case.heading,
+            **shown,
+            "rates": texts.pairs(rates(self.model)),
+            "stable": self.model.is_stable,
+            "has_loop": self.state != NO_LOOP,
             "transfer_functions": transfers,
-        }  # fmt: skip
+        }
 
     def _data(self) -> dict[str, Any]:
         shown = self._model_data()

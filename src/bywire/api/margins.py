@@ -33,15 +33,26 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 UNITS = {
-    "gain": "1", "lower_gain": "1", "phase": "deg", "crossover": "Hz", "delay": "s", "disk": "1",
-    "sensitivity": "1", "complementary": "1", "bandwidth": "Hz",
-}  # fmt: skip
+    "gain": "1",
+    "lower_gain": "1",
+    "phase": "deg",
+    "crossover": "Hz",
+    "delay": "s",
+    "disk": "1",
+    "sensitivity": "1",
+    "complementary": "1",
+    "bandwidth": "Hz",
+}
 """unit of each margin"""
 TITLES = {
-    "gain": "gain margin", "lower_gain": "lower gain margin", "phase": "phase margin",
-    "delay": "delay margin", "disk": "disk margin",
-    "sensitivity": "max |S|", "complementary": "max |T|",
-}  # fmt: skip
+    "gain": "gain margin",
+    "lower_gain": "lower gain margin",
+    "phase": "phase margin",
+    "delay": "delay margin",
+    "disk": "disk margin",
+    "sensitivity": "max |S|",
+    "complementary": "max |T|",
+}
 """headings that say more than the margin's name"""
 LEGEND = (
     "Linear loop as it is sampled, dry friction left out. Gain margins: factors by which the loop "
@@ -109,10 +120,12 @@ class Margins(Answer):
         figures += [
             FigureBlock(
                 lambda kind=kind: _drawn(kind, self.family),  # type: ignore[misc]
-                caption + (ranged if self.name else ""), f"{loop.name}-{kind}",
+                caption + (ranged if self.name else ""),
+                f"{loop.name}-{kind}",
             )
-            for kind, caption in _CAPTIONS.items() if is_drawn
-        ]  # fmt: skip
+            for kind, caption in _CAPTIONS.items()
+            if is_drawn
+        ]
         head = f"loop {loop.name} of {self.case.name} at {self.case.point}, cut at {loop.cut}"
         none = [] if self.name or self.margins[0].has_loop else [NO_LOOP]
         worst_line = ["worst: " + "; ".join(texts)] if self.name else []
@@ -246,10 +259,9 @@ def margins_table(
     """
     heading = [*(TITLES.get(k, k) for k in UNITS), "stable"]
     rows = [
-        (*(_cell(getattr(margins, k), unit, 3) for k, unit in UNITS.items()),
-         _state_cell(margins))
+        (*(_cell(getattr(margins, k), unit, 3) for k, unit in UNITS.items()), _state_cell(margins))
         for margins in margins_at
-    ]  # fmt: skip
+    ]
     if name:
         heading = [clean(name), *heading]
         rows = [(_cell(v, unit), *row) for v, row in zip(values, rows, strict=True)]

@@ -67,14 +67,19 @@ class Mentioned(Answer):
         left = [f"and {more} more: ask with more words"] if more > 0 else []
         head = f"nothing is called {quoted(self.words)}; it is mentioned by"
         return Document(
-            self.words, head, sections=[Section("Mentioned by", [TableBlock(table)])],
+            self.words,
+            head,
+            sections=[Section("Mentioned by", [TableBlock(table)])],
             brief=[head, TableBlock(start, width=0), *left],
-            data={"name": self.words, "found": [
-                {"kind": kind, "name": name, "summary": meaning, "unit": unit}
-                for kind, name, meaning, unit in self.mentions
-            ]},
+            data={
+                "name": self.words,
+                "found": [
+                    {"kind": kind, "name": name, "summary": meaning, "unit": unit}
+                    for kind, name, meaning, unit in self.mentions
+                ],
+            },
             has_files=False,
-        )  # fmt: skip
+        )
 
 
 def mentions(words: str) -> list[Mention]:
@@ -122,10 +127,14 @@ def _known() -> Iterator[Mention]:
     for name, model in ASSEMBLIES.all().items():
         yield Mention("assembly", name, system_summary(model))
     kinds: dict[str, tuple[Any, ...]] = {
-        "parameter set": (PARAMETER_SETS,), "experiment": (EXPERIMENTS, GENERIC_EXPERIMENTS),
-        "loop": (LOOPS,), "plant": (PLANTS,), "study": (STUDIES,),
-        "method": (METHODS, BENCH_METHODS), "stimulus": (STIMULI,),
-    }  # fmt: skip
+        "parameter set": (PARAMETER_SETS,),
+        "experiment": (EXPERIMENTS, GENERIC_EXPERIMENTS),
+        "loop": (LOOPS,),
+        "plant": (PLANTS,),
+        "study": (STUDIES,),
+        "method": (METHODS, BENCH_METHODS),
+        "stimulus": (STIMULI,),
+    }
     for title, several in kinds.items():
         for kind in several:
             for thing in kind.all().values():

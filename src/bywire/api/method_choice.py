@@ -251,7 +251,13 @@ def _on_bench(
     if question.holdout is None:
         return on_bench
     held = measured(
-        [question.holdout], mapping, on_bench.signals, optional=on_bench.optional, gaps=True,
-        multiple=bench.step, named=columns_of(on_bench, question, time), progress=progress,
-    )  # fmt: skip
+        [question.holdout],
+        mapping,
+        on_bench.signals,
+        optional=on_bench.optional,
+        gaps=True,
+        multiple=bench.step,
+        named=columns_of(on_bench, question, time),
+        progress=progress,
+    )
     return method.on(bench, replace(question, holdout=held.data))

@@ -65,9 +65,11 @@ class NewBrake(Answer):
 
     def _data(self, steps: list[str]) -> dict[str, Any]:
         return {
-            "name": self.name, "folder": str(self.folder), "package": str(self.package),
+            "name": self.name,
+            "folder": str(self.folder),
+            "package": str(self.package),
             "next": steps,
-        }  # fmt: skip
+        }
 
 
 @checked

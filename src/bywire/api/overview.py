@@ -17,10 +17,24 @@ from bywire.report.document import Document, Section, TableBlock
 from bywire.report.tables import Table, text_table
 
 TOPICS = (
-    "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "elements",
-    "loops", "plants", "studies", "lives", "methods", "stimuli", "faults", "campaigns", "residuals",
-    "kpis", "kpis_of_experiments",
-)  # fmt: skip
+    "brakes",
+    "assemblies",
+    "parameter_sets",
+    "experiments",
+    "generic_experiments",
+    "elements",
+    "loops",
+    "plants",
+    "studies",
+    "lives",
+    "methods",
+    "stimuli",
+    "faults",
+    "campaigns",
+    "residuals",
+    "kpis",
+    "kpis_of_experiments",
+)
 """kinds of things that have a name"""
 _WIDTH = 80  # characters of a line of the index
 _NAME = 21  # columns of a topic
@@ -61,16 +75,20 @@ class Overview(Answer):
         tables = {key.replace("_", " "): _table(content) for key, content in shown.items()}
         brief = next(iter(tables.items())) if self.topic else None
         return Document(
-            "What there is", _HINT.replace("\n", " "),
+            "What there is",
+            _HINT.replace("\n", " "),
             sections=[Section(title, [TableBlock(table)]) for title, table in tables.items()],
             brief=[brief[0], TableBlock(brief[1], width=0)] if brief else [self._index()],
-            data=shown, has_files=False,
-        )  # fmt: skip
+            data=shown,
+            has_files=False,
+        )
 
     def _index(self) -> str:
         """Return a line for each kind, and what to do next: a screen of 80 by 24."""
-        heads = {f"{key.replace('_', ' '):<{_NAME}}{len(content):>3}  ": content
-                 for key, content in self.things.items()}  # fmt: skip
+        heads = {
+            f"{key.replace('_', ' '):<{_NAME}}{len(content):>3}  ": content
+            for key, content in self.things.items()
+        }
         lines = [f"{head}{_first(names, _WIDTH - len(head))}" for head, names in heads.items()]
         return "\n".join([*lines, "", _HINT])
 

@@ -49,11 +49,15 @@ class BenchPage(Answer):
             f"written: {self.file}",
             sections=[Section("File", [listing])],
             brief=[listing],
-            data={"file": str(self.file), "case": self.made.case.label, "bytes": self.size,
-                  "compressed": self.compressed},
+            data={
+                "file": str(self.file),
+                "case": self.made.case.label,
+                "bytes": self.size,
+                "compressed": self.compressed,
+            },
             is_paged=False,
             changes=bench_changes(self.made.bench),
-        )  # fmt: skip
+        )
 
 
 @use_case
@@ -123,4 +127,3 @@ def page(
     content = page_text(made, panels, result, vary).encode()
     file = write_bytes(out, content)
     return BenchPage(file, made, len(content), len(gzip.compress(content, mtime=0)))
-

@@ -105,7 +105,11 @@ def replay(
     read = measured([measurement], mapping, gaps=True, named=named, progress=shown)
     shown("replay", 0.0)
     replayed = bench_replay.replay(
-        driven, read.data, inputs or None, list(outputs) or None, case,
+        driven,
+        read.data,
+        inputs or None,
+        list(outputs) or None,
+        case,
         estimate_error=estimate_error,
     )
     shown("replay", 1.0)
@@ -147,9 +151,7 @@ def columns_of_bench(
     return NamedColumns({**{c: c for c in driving}, **columns}, time, units, driving)
 
 
-def _units_of(
-    model: Model, inputs: Mapping[str, str], outputs: Iterable[str]
-) -> dict[str, str]:
+def _units_of(model: Model, inputs: Mapping[str, str], outputs: Iterable[str]) -> dict[str, str]:
     """Return the SI units of the signals that a replay may need, by name."""
     stimuli, known = signals_of(model.Stimulus), signals_of(model.Output)
     units = {name: signal.unit for name, signal in {**known, **stimuli}.items()}
@@ -184,9 +186,7 @@ def driven_bench(bench: Bench | str | Path, changes: Mapping[str, Any]) -> Bench
     return bench_file.read(bench, {**silent, **changes})
 
 
-def _segments(
-    wanted: str | Path, inputs: xr.Dataset, limits: Mapping[str, str]
-) -> list[Segment]:
+def _segments(wanted: str | Path, inputs: xr.Dataset, limits: Mapping[str, str]) -> list[Segment]:
     if not wanted:
         return whole_record(inputs["time"].values, limits)
     if wanted == "auto":

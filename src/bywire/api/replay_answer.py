@@ -93,8 +93,10 @@ class Replay(Answer):
                 Section("How well it fits", [table, Listing(definitions)]),
                 Section("Measured and simulated", self._figures()),
                 *([Section("Tracked parameters", self._track_figures())] if self.tracks else []),
-                subject.provenance(f"Measurement: {self.source}.",
-                             *(f"{note[:1].upper()}{note[1:]}." for note in self.notes)),
+                subject.provenance(
+                    f"Measurement: {self.source}.",
+                    *(f"{note[:1].upper()}{note[1:]}." for note in self.notes),
+                ),
             ],
             brief=spaced([head, table, *self._tracked_texts()]),
             data=self._data(),
@@ -102,21 +104,26 @@ class Replay(Answer):
             attachments=[Attachment("replay.nc", self._write_signals)],
             record="replay.json",
             changes=subject.changes,
-        )  # fmt: skip
+        )
 
     def _figures(self) -> list[FigureBlock]:
         from bywire.report.replay_figure import replay_figure
 
         return [
             FigureBlock(
-                partial(replay_figure, name, pair, self.replayed.inputs,
-                        [fit for fit in self.fits if fit.signal == name]),
+                partial(
+                    replay_figure,
+                    name,
+                    pair,
+                    self.replayed.inputs,
+                    [fit for fit in self.fits if fit.signal == name],
+                ),
                 f"{name}: measured (solid), simulated (dashed), and their difference; the demand "
                 "above.",
                 name,
             )
             for name, pair in self.replayed.outputs.items()
-        ]  # fmt: skip
+        ]
 
     def _track_figures(self) -> list[FigureBlock]:
         from bywire.report.track_figure import track_figure
@@ -164,24 +171,35 @@ class Replay(Answer):
             "holds": self.holds,
             "segments": [
                 {
-                    "name": fit.segment.name, "signal": fit.signal,
-                    "start": fit.segment.start, "stop": fit.segment.stop,
+                    "name": fit.segment.name,
+                    "signal": fit.signal,
+                    "start": fit.segment.start,
+                    "stop": fit.segment.stop,
                     "figures": {
                         k.name: {
-                            "value": k.value, "unit": k.unit, "error": k.error,
+                            "value": k.value,
+                            "unit": k.unit,
+                            "error": k.error,
                             "converges": k.converges,
                         }
                         for k in fit.kpis
                     },
                     "tolerances": [
-                        {"figure": v.kpi, "limit": v.limit, "value": v.value, "met": v.met,
-                         "outcome": v.outcome, "error": v.error} for v in fit.verdicts
+                        {
+                            "figure": v.kpi,
+                            "limit": v.limit,
+                            "value": v.value,
+                            "met": v.met,
+                            "outcome": v.outcome,
+                            "error": v.error,
+                        }
+                        for v in fit.verdicts
                     ],
                 }
                 for fit in self.fits
             ],
             "tracked": {each.relation.parameter: _tracked(each) for each in self.tracks},
-        }  # fmt: skip
+        }
 
     def _write_signals(self, path: Path) -> Path:
         from bywire.data.netcdf import write_recording
@@ -197,21 +215,25 @@ def fit_table(fits: Sequence[SegmentFit]) -> Table:
         failed = {
             word: [
                 f"{v.kpi} {v.limit}{' (not defined)' if math.isnan(v.value) else ''}"
-                for v in fit.verdicts if v.outcome == word
-            ] for word in ("missed", "undecided")
-        }  # fmt: skip
+                for v in fit.verdicts
+                if v.outcome == word
+            ]
+            for word in ("missed", "undecided")
+        }
         said = "; ".join(f"{word}: {', '.join(each)}" for word, each in failed.items() if each)
         verdict = Cell("-")
         if fit.verdicts:
             verdict = Cell(said, "bad") if said else Cell("ok", "good")
         rows.append(
-            (Cell(clean(fit.segment.name)), Cell(clean(fit.signal)),
-             *(_figure(by_name[n]) for n in _SHOWN), verdict)
-        )  # fmt: skip
+            (
+                Cell(clean(fit.segment.name)),
+                Cell(clean(fit.signal)),
+                *(_figure(by_name[n]) for n in _SHOWN),
+                verdict,
+            )
+        )
     numbers = (Column(name.replace("_", " "), numeric=True) for name in _SHOWN)
-    return Table(
-        (Column("segment"), Column("signal"), *numbers, Column("tolerances")), tuple(rows)
-    )
+    return Table((Column("segment"), Column("signal"), *numbers, Column("tolerances")), tuple(rows))
 
 
 def _figure(kpi: Kpi) -> Cell:

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from bywire.report.bench_figures import Shown
 
 _SCATTERED = (
-    "Errors \"up to\" belong to figures that do not converge: over double, single and half steps, "
+    'Errors "up to" belong to figures that do not converge: over double, single and half steps, '
     "their differences do not shrink as the scheme's order 2 demands. Their errors are not known: "
     "what is given bounds 95 % of such errors, by the scatter of the figure over all steps."
 )
@@ -74,7 +74,9 @@ class BenchResult(Result, Answer):
         verdicts, stated = {v.kpi: v for v in self.verdicts}, stated_figures(self.bench)
         return [
             KpiRow(
-                kpi.name, kpi.value, kpi.unit,
+                kpi.name,
+                kpi.value,
+                kpi.unit,
                 f"{kpi.definition} ({kpi.note})" if kpi.note else kpi.definition,
                 verdicts[kpi.name].limit if kpi.name in verdicts else "",
                 verdicts[kpi.name].outcome if kpi.name in verdicts else "",
@@ -84,7 +86,7 @@ class BenchResult(Result, Answer):
                 kpi.converges,
             )
             for kpi in self.kpis
-        ]  # fmt: skip
+        ]
 
     def ledgers(self) -> dict[str, Ledger]:
         """Return the books of every run from time zero on, further ones apart, by label."""
@@ -120,7 +122,8 @@ class BenchResult(Result, Answer):
                 how_it_was_made(self, self._step_errors()),
             ],
             brief=[
-                *([Listing(said)] if said else []), *([narrow] if self.kpis else []),
+                *([Listing(said)] if said else []),
+                *([narrow] if self.kpis else []),
                 *self._scatter(),
             ],
             data={**self._data(), "remarks": said},
@@ -128,12 +131,13 @@ class BenchResult(Result, Answer):
             attachments=[
                 recording_file(f"{label}.nc", recording)
                 for label, recording in self.recordings.items()
-            ] + self._animations(),
+            ]
+            + self._animations(),
             record="result.json",
             remarks=[_remark(v) for v in self.verdicts if not v.met],
             is_paged=self.status != "interrupted",
             changes=bench_changes(bench),
-        )  # fmt: skip
+        )
 
     def _scatter(self) -> list[Paragraph]:
         """Return what the errors of figures that do not converge are; nothing without any."""
@@ -171,10 +175,11 @@ class BenchResult(Result, Answer):
                     "max": signal.attrs["step_error_max"],
                     "unit": signal.attrs.get("units", "1"),
                 }
-                for name, signal in recording.items() if "step_error_rms" in signal.attrs
+                for name, signal in recording.items()
+                if "step_error_rms" in signal.attrs
             }
             for label, recording in self.recordings.items()
-        }  # fmt: skip
+        }
 
     def _banner(self) -> Banner:
         if not self.verdicts:

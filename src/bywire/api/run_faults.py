@@ -108,32 +108,50 @@ class FaultCampaign(Answer):
             record="report.json",
             changes=subject.changes,
             headline=_sentences(self.warnings),
-        )  # fmt: skip
+        )
 
     def _banner(self) -> Banner:
         coverage, harm = self.findings.coverage, self.warnings
         text = (
-            "no fault is dangerous in this maneuver" if math.isnan(coverage)
+            "no fault is dangerous in this maneuver"
+            if math.isnan(coverage)
             else f"diagnostic coverage {100 * coverage:.3g} % ({coverage_class(coverage)})"
-        )  # fmt: skip
+        )
         return Banner(_sentences([*harm, text]) if harm else text, "bad" if harm else "none")
 
     def _table(self) -> Table:
         plan = self.findings.plan
         signals = signals_of(plan.case(0).model.Output)
-        heads = ["fault", "off the healthy run", "violates", "within", "seen within", "first by",
-                 "class", *self._further]  # fmt: skip
+        heads = [
+            "fault",
+            "off the healthy run",
+            "violates",
+            "within",
+            "seen within",
+            "first by",
+            "class",
+            *self._further,
+        ]
         rows = []
         for each in self.findings.faults:
-            effects = [f"{name} {_range(sides[0], sides[1], signals[name].unit)}"
-                       for name, sides in each.extremes.items()]  # fmt: skip
+            effects = [
+                f"{name} {_range(sides[0], sides[1], signals[name].unit)}"
+                for name, sides in each.extremes.items()
+            ]
             violated = ", ".join(f"{name} ({n}/{each.cases})" for name, n in each.criteria.items())
             further = {"severity": each.severity(plan) or "-", "with reaction": self._reacted(each)}
-            rows.append([
-                self._name(each), "; ".join(effects), violated or "-",
-                _milliseconds(each.tolerance), _worst(each.seen), each.first_seen_by or "-",
-                each.kind, *(further[name] for name in self._further),
-            ])  # fmt: skip
+            rows.append(
+                [
+                    self._name(each),
+                    "; ".join(effects),
+                    violated or "-",
+                    _milliseconds(each.tolerance),
+                    _worst(each.seen),
+                    each.first_seen_by or "-",
+                    each.kind,
+                    *(further[name] for name in self._further),
+                ]
+            )
         return text_table(heads, rows)
 
     @property
@@ -167,10 +185,16 @@ class FaultCampaign(Answer):
             _, alarms, delay, seen = findings.curve(residual.name)[_at_threshold()]
             limit = findings.healthy.thresholds[residual.name]
             said = "never looked at" if limit <= NEVER else amount(limit, residual.unit, 3)
-            rows.append([
-                residual.name, residual.summary, said, str(alarms), f"{seen} of {dangerous}",
-                _milliseconds(delay),
-            ])  # fmt: skip
+            rows.append(
+                [
+                    residual.name,
+                    residual.summary,
+                    said,
+                    str(alarms),
+                    f"{seen} of {dangerous}",
+                    _milliseconds(delay),
+                ]
+            )
         heads = ["residual", "compares", "threshold", "false alarms", "sees", "median delay"]
         return text_table(heads, rows)
 
@@ -180,8 +204,16 @@ class FaultCampaign(Answer):
         rows = []
         for c in plan.criteria:
             unit = "1" if c.sense == "below_share" else signals[c.signal].unit
-            rows.append([c.name, c.signal, c.sense.replace("_", " "), amount(c.level, unit),
-                         amount(c.lasting, "s"), c.severity or "-"])  # fmt: skip
+            rows.append(
+                [
+                    c.name,
+                    c.signal,
+                    c.sense.replace("_", " "),
+                    amount(c.level, unit),
+                    amount(c.lasting, "s"),
+                    c.severity or "-",
+                ]
+            )
         return text_table(["criterion", "signal", "sense", "level", "lasting", "severity"], rows)
 
     def _figures(self) -> list[FigureBlock]:
@@ -200,12 +232,19 @@ class FaultCampaign(Answer):
             return alarm_curves(rows, plan.healthy - plan.tuning)
 
         return [
-            FigureBlock(times, "Dangerous faults: time from onset until a criterion is violated, "
-                        "and until a residual sees it, of every run.", "fault-times"),
-            FigureBlock(curves, "Median delay of detection in dangerous runs over healthy runs "
-                        "that alarm, for multiples of each threshold; rings are those in use.",
-                        "alarm-curves"),
-        ]  # fmt: skip
+            FigureBlock(
+                times,
+                "Dangerous faults: time from onset until a criterion is violated, "
+                "and until a residual sees it, of every run.",
+                "fault-times",
+            ),
+            FigureBlock(
+                curves,
+                "Median delay of detection in dangerous runs over healthy runs "
+                "that alarm, for multiples of each threshold; rings are those in use.",
+                "alarm-curves",
+            ),
+        ]
 
     def _data(self) -> dict[str, Any]:
         findings, plan = self.findings, self.findings.plan
@@ -217,34 +256,53 @@ class FaultCampaign(Answer):
             "coverage": findings.coverage,
             "coverage_class": coverage_class(findings.coverage),
             "weighted": findings.is_weighted,
-            "dangerous_runs": cases.cases, "seen_in_time": cases.count,
-            "false_alarms": {"runs": alarms.count, "of": alarms.cases, "low": alarms.low,
-                             "high": alarms.high},
+            "dangerous_runs": cases.cases,
+            "seen_in_time": cases.count,
+            "false_alarms": {
+                "runs": alarms.count,
+                "of": alarms.cases,
+                "low": alarms.low,
+                "high": alarms.high,
+            },
             "thresholds": dict(findings.healthy.thresholds),
             "faults": [self._fault_data(each) for each in findings.faults],
-            "warnings": self.warnings, "notes": self.notes,
-        }  # fmt: skip
+            "warnings": self.warnings,
+            "notes": self.notes,
+        }
 
     def _fault_data(self, each: FaultFinding) -> dict[str, Any]:
         return {
-            "fault": each.failing.mode.name, "summary": each.failing.mode.summary,
+            "fault": each.failing.mode.name,
+            "summary": each.failing.mode.summary,
             "value": each.failing.value if each.failing.mode.unit else None,
-            "unit": each.failing.mode.unit, "present": each.failing.is_present,
+            "unit": each.failing.mode.unit,
+            "present": each.failing.is_present,
             "after": each.failing.latent.mode.name if each.failing.latent else None,
-            "class": each.kind, "severity": each.severity(self.findings.plan),
-            "runs": each.cases, "violated": each.criteria, "tolerated_for": each.tolerance,
-            "violated_after": each.violated.tolist(), "seen_after": each.seen.tolist(),
+            "class": each.kind,
+            "severity": each.severity(self.findings.plan),
+            "runs": each.cases,
+            "violated": each.criteria,
+            "tolerated_for": each.tolerance,
+            "violated_after": each.violated.tolist(),
+            "seen_after": each.seen.tolist(),
             "first_by": each.first_seen_by,
-            "with_reaction": None if not each.reacted else {
+            "with_reaction": None
+            if not each.reacted
+            else {
                 "runs": len(each.answered),
                 "violated_after": {n: times.tolist() for n, times in each.reacted.items()},
                 "violated_only_with_it": each.only_with_reaction,
                 "violated_sooner_with_it": each.sooner_with_reaction,
             },
-            "extremes": {name: {"least": float(sides[0].min()), "largest": float(sides[1].max()),
-                                "end": float(sides[2].mean())}
-                         for name, sides in each.extremes.items()},
-        }  # fmt: skip
+            "extremes": {
+                name: {
+                    "least": float(sides[0].min()),
+                    "largest": float(sides[1].max()),
+                    "end": float(sides[2].mean()),
+                }
+                for name, sides in each.extremes.items()
+            },
+        }
 
 
 @use_case

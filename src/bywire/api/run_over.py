@@ -97,10 +97,12 @@ class BenchRange(Answer):
         return {
             label: xr.concat(
                 [r.recordings[label] for r in self.results if label in r.recordings],
-                dim="case", join="outer", combine_attrs="drop_conflicts",
+                dim="case",
+                join="outer",
+                combine_attrs="drop_conflicts",
             ).assign_coords({self.name: ("case", self._values_of(label), {"units": self.unit})})
             for label in labels
-        }  # fmt: skip
+        }
 
     def document(self) -> Document:
         """Return key figures by value, verdicts, curves."""
@@ -132,7 +134,8 @@ class BenchRange(Answer):
             record="range.json",
             remarks=[
                 f"requirement {'undecided' if outcome == 'undecided' else 'not met'}: {text}"
-                for outcome, text in judged if outcome != "met"
+                for outcome, text in judged
+                if outcome != "met"
             ],
             changes=subject.changes,
         )
@@ -170,9 +173,10 @@ class BenchRange(Answer):
     def _indistinct(self) -> list[str]:
         """Return a sentence on figures whose changes may be the step's; none where none is."""
         names = [
-            kpi.name for kpi in self._kpis()
+            kpi.name
+            for kpi in self._kpis()
             if not self._distinct[kpi.name] and np.ptp(self.kpi(kpi.name)) > 0.0  # NaN is not
-        ]  # fmt: skip
+        ]
         if not names:
             return []
         return [f"not distinct over {self.name}, by their error from the step: {', '.join(names)}"]
@@ -256,8 +260,10 @@ class BenchRange(Answer):
         from bywire.report.overlaid_panels import Scale, overlaid_panels
         from bywire.report.step_marks import step_limits
 
-        steps = [step_limits(r.bench.definition, r.bench.chosen_options, r.verdicts)
-                 for r in self.results]  # fmt: skip
+        steps = [
+            step_limits(r.bench.definition, r.bench.chosen_options, r.verdicts)
+            for r in self.results
+        ]
         shared = steps[0] if all(each == steps[0] for each in steps) else None
         values = self._values_of(label)
         named = {amount(v, self.unit, 6): r for v, r in zip(values, recordings, strict=True)}
@@ -284,7 +290,7 @@ class BenchRange(Answer):
             ],
             "distinct": self._distinct,
             "warnings": self.warnings,
-        }  # fmt: skip
+        }
 
 
 def run_over(

@@ -37,8 +37,9 @@ def fault_texts(bench: Bench, recordings: Recordings | None = None) -> list[str]
         until = f" to {amount(course.end, 's')}" if math.isfinite(course.end) else " on"
         is_met = recordings is None or any(
             course.is_there(each["time"].values).any()
-            for each in recordings.values() if "time" in each
-        )  # fmt: skip
+            for each in recordings.values()
+            if "time" in each
+        )
         unmet = "" if is_met else "; no recorded row meets it"
         texts.append(
             f"fault {mode.name}{size}, from {amount(course.onset, 's')}{until}: "

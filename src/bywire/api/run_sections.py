@@ -49,8 +49,9 @@ def source_says(result: Result) -> list[Block]:
         return []
     units = {
         name: str(signal.attrs.get("units", "1"))
-        for recording in result.recordings.values() for name, signal in recording.data_vars.items()
-    }  # fmt: skip
+        for recording in result.recordings.values()
+        for name, signal in recording.data_vars.items()
+    }
     rows = [
         (each.label, each.signal, stated_level(each, units.get(each.signal, "1")), each.where)
         for each in levels
@@ -70,9 +71,9 @@ def energy(ledgers: Mapping[str, Ledger]) -> list[Section]:
 def schematic_section(bench: Bench) -> list[Section]:
     """Return the brake as parts and wires, where its model is made of such."""
     case = next(iter(replace(bench, faults=()).cases()), None)  # without what bends its signals
-    model, par = (ASSEMBLIES.find(bench.system)(), bench.par) if case is None else (
-        case.model, case.par
-    )  # fmt: skip
+    model, par = (
+        (ASSEMBLIES.find(bench.system)(), bench.par) if case is None else (case.model, case.par)
+    )
     blocks = schematic_blocks(model, par)
     return [Section("Schematic", blocks)] if blocks else []
 

@@ -94,9 +94,13 @@ def run_study(
 
 
 def _completed(
-    origin: Origin, plan: StudyPlan, store: StudyStore, workers: int | None, cluster: str,
+    origin: Origin,
+    plan: StudyPlan,
+    store: StudyStore,
+    workers: int | None,
+    cluster: str,
     progress: Progress | None,
-) -> StudyRun:  # fmt: skip
+) -> StudyRun:
     """Return a study with all of its cases, those that were missing computed."""
 
     def ready() -> None:
@@ -106,9 +110,14 @@ def _completed(
 
     try:
         completed = complete(
-            plan, store, origin, workers=workers, cluster=cluster, progress=progress or silent,
+            plan,
+            store,
+            origin,
+            workers=workers,
+            cluster=cluster,
+            progress=progress or silent,
             meanwhile=ready,
-        )  # fmt: skip
+        )
     except KeyboardInterrupt:
         of = "" if plan.sought is not None else f" of {plan.chunks}"
         raise KeyboardInterrupt(

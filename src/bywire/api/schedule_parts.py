@@ -53,10 +53,16 @@ def as_object(
         "gain_units": {name: unit_of(case, name) for name in final},
         "regions": {
             region: {
-                "status": regional.status, "gains": dict(regional.gains), "slack": regional.slack,
+                "status": regional.status,
+                "gains": dict(regional.gains),
+                "slack": regional.slack,
                 "binding": [
-                    {"requirement": b.requirement.text, "at": b.case, "value": b.value,
-                     "slack": b.slack}
+                    {
+                        "requirement": b.requirement.text,
+                        "at": b.case,
+                        "value": b.value,
+                        "slack": b.slack,
+                    }
                     for b in regional.binding
                 ],
             }
@@ -69,7 +75,7 @@ def as_object(
             "retuned": [_case(across, at.name) for across in retuned],
         },
         "bench": None if tried is None else verification_object(case, tried),
-    }  # fmt: skip
+    }
 
 
 def _case(across: Across, name: str) -> dict[str, Any]:
@@ -125,12 +131,13 @@ def _frozen(case: LoopCase, across: Sequence[Across]) -> list[Part]:
     at = case.loop.at
     rows = [
         [
-            f"{shown(row.at, at.unit)}", row.region,
+            f"{shown(row.at, at.unit)}",
+            row.region,
             *(figure_text(name, row.figures[name]) for name in _SEEN),
             f"{100.0 * row.slack:+.1f} %",
         ]
         for row in across
-    ]  # fmt: skip
+    ]
     worst = min(across, key=lambda row: row.slack)
     where = f"{at.name} = {shown(worst.at, at.unit)}"
     return [
@@ -139,9 +146,7 @@ def _frozen(case: LoopCase, across: Sequence[Across]) -> list[Part]:
     ]
 
 
-def _gains(
-    case: LoopCase, design: ScheduleDesign, gains: Mapping[str, float], title: str
-) -> Table:
+def _gains(case: LoopCase, design: ScheduleDesign, gains: Mapping[str, float], title: str) -> Table:
     """Return a table of gains, a column for each region."""
     regions = scheduled(case.loop).regions
     cells: dict[str, dict[str, str]] = {}

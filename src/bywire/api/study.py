@@ -75,9 +75,12 @@ class StudyResult(Answer):
         study, findings = self.definition, self.findings
         defaults = study.defaults.flat()
         subject = Subject(
-            study.name, study.summary, self.name, self.par,
+            study.name,
+            study.summary,
+            self.name,
+            self.par,
             further=value_changes(self.options, defaults, defaults_of(study.name)),
-        )  # fmt: skip
+        )
         kpis = TableBlock(kpi_table(self._rows()))
         tables = [TableBlock(cut_table(cut), f"{cut.title}.", _WIDTH) for cut in findings.cuts]
         maps = [
@@ -95,7 +98,7 @@ class StudyResult(Answer):
         )
         brief_tables: list[str | Flat] = [
             each for table in tables for each in (table.caption.rstrip("."), table, "")
-        ]  # fmt: skip
+        ]
         return Document(
             f"Study {study.name}",
             subject.line,
@@ -108,23 +111,30 @@ class StudyResult(Answer):
                 subject.provenance(),
             ],
             brief=[
-                f"study {study.name} of {self.name}: {study.summary}", "", kpis, "",
-                *brief_limits, *brief_tables, Listing(findings.assumptions, "assumptions"),
+                f"study {study.name} of {self.name}: {study.summary}",
+                "",
+                kpis,
+                "",
+                *brief_limits,
+                *brief_tables,
+                Listing(findings.assumptions, "assumptions"),
             ],
             data=self._data(),
             attachments=[recording_file(f"{study.name}.nc", findings.data)],
             changes=subject.changes,
-        )  # fmt: skip
+        )
 
     def _rows(self) -> list[KpiRow]:
         """Return the key figures as rows of a table, each with its note."""
         return [
             KpiRow(
-                kpi.name, kpi.value, kpi.unit,
+                kpi.name,
+                kpi.value,
+                kpi.unit,
                 f"{kpi.definition} ({kpi.note})" if kpi.note else kpi.definition,
             )
             for kpi in self.findings.kpis
-        ]  # fmt: skip
+        ]
 
     def _data(self) -> dict[str, Any]:
         findings = self.findings
@@ -136,7 +146,9 @@ class StudyResult(Answer):
             "limits": list(findings.limits),
             "kpis": {
                 kpi.name: {
-                    "value": kpi.value, "unit": kpi.unit, "definition": kpi.definition,
+                    "value": kpi.value,
+                    "unit": kpi.unit,
+                    "definition": kpi.definition,
                     "note": kpi.note,
                 }
                 for kpi in findings.kpis
@@ -151,7 +163,7 @@ class StudyResult(Answer):
             },
             "figures": {name: shown.caption for name, shown in findings.maps.items()},
             "warnings": list(findings.warnings),
-        }  # fmt: skip
+        }
 
 
 @use_case

@@ -26,8 +26,9 @@ def scatters(findings: Findings) -> list[Block]:
     """Return the scatter of each requirement's key figure over what drives it most."""
     return [
         _scatter_block(findings, judgment)
-        for judgment in findings.judgments if findings.drivers(judgment.demand.kpi)
-    ]  # fmt: skip
+        for judgment in findings.judgments
+        if findings.drivers(judgment.demand.kpi)
+    ]
 
 
 def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
@@ -37,17 +38,22 @@ def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
     lacking = cases.lacking.size
     every = "all that have it" if lacking else "all"
     crosses = (
-        f"{every} meet the limit" if not cases.all_missed
-        else "crosses miss the limit" if cases.all_met else f"{every} miss the limit"
-    )  # fmt: skip
+        f"{every} meet the limit"
+        if not cases.all_missed
+        else "crosses miss the limit"
+        if cases.all_met
+        else f"{every} miss the limit"
+    )
     said = [
         f"{name.replace('_', ' ')} over what drives it most; {crosses}.",
         cases.caption("meet the limit", "miss it"),
         f"Triangles at the upper edge: cases without it ({lacking}), which miss the limit."
-        if lacking else "",
+        if lacking
+        else "",
         "Cases gather where failures are: shares of them are no probabilities."
-        if findings.rare else "",
-    ]  # fmt: skip
+        if findings.rare
+        else "",
+    ]
     return FigureBlock(
         partial(_scatter, findings, name, cases), " ".join(filter(None, said)), f"scatter-{name}"
     )
@@ -59,10 +65,12 @@ def parallel(findings: Findings) -> Block:
     cases = drawn_cases(met, LINES, LINES)
     thinned = cases.caption("meet all requirements", "miss one")
     said = (
-        "all meet all requirements" if not cases.all_missed
-        else "in front, those that miss a requirement" if cases.all_met
+        "all meet all requirements"
+        if not cases.all_missed
+        else "in front, those that miss a requirement"
+        if cases.all_met
         else "all miss a requirement"
-    )  # fmt: skip
+    )
     text = f"Cases as lines; {said}. {thinned}" if thinned else f"Every case as a line; {said}."
     drawn = _required(findings)
     if not all(np.isfinite(findings.figure(name)).all() for name in drawn):

@@ -55,8 +55,11 @@ class ShownCases:
     @cached_property
     def benches(self) -> Mapping[str, Bench]:
         """What runs each that has a result, by its key figure."""
-        return {j.demand.kpi: self._bench(j, row) for j in self.findings.judgments
-                if (row := j.worst) is not None and row not in self.findings.failures}  # fmt: skip
+        return {
+            j.demand.kpi: self._bench(j, row)
+            for j in self.findings.judgments
+            if (row := j.worst) is not None and row not in self.findings.failures
+        }
 
     @cached_property
     def results(self) -> Mapping[str, Result]:
@@ -66,9 +69,10 @@ class ShownCases:
     def texts(self) -> list[str]:
         """Return each case in words."""
         return [
-            self._text(each, each.worst) for each in self.findings.judgments
+            self._text(each, each.worst)
+            for each in self.findings.judgments
             if each.worst is not None
-        ]  # fmt: skip
+        ]
 
     def _text(self, judgment: Judgment, row: int) -> str:
         kpi = judgment.demand.kpi
@@ -108,12 +112,19 @@ class ShownCases:
         """Return bench files and recordings."""
         labels = list(self.nominal.recordings)
         return [
-            *(Attachment(f"{self.kind}-{kpi}.toml", partial(self._write_bench, bench))
-              for kpi, bench in self.benches.items()),
-            *(Attachment(f"{self.kind}-{kpi}{'' if len(labels) == 1 else '-' + label}.nc",
-                         partial(self._write_recording, kpi, label))
-              for kpi in self.benches for label in labels),
-        ]  # fmt: skip
+            *(
+                Attachment(f"{self.kind}-{kpi}.toml", partial(self._write_bench, bench))
+                for kpi, bench in self.benches.items()
+            ),
+            *(
+                Attachment(
+                    f"{self.kind}-{kpi}{'' if len(labels) == 1 else '-' + label}.nc",
+                    partial(self._write_recording, kpi, label),
+                )
+                for kpi in self.benches
+                for label in labels
+            ),
+        ]
 
     def _bench(self, judgment: Judgment, row: int) -> Bench:
         plan, findings = self.findings.plan, self.findings

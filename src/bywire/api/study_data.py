@@ -31,14 +31,17 @@ def findings_data(findings: Findings) -> dict[str, Any]:
         ],
         "kpis": {
             each.name: {
-                "unit": each.unit, "nominal": each.nominal, "least": each.least,
-                "largest": each.largest, "undefined": each.undefined,
+                "unit": each.unit,
+                "nominal": each.nominal,
+                "least": each.least,
+                "largest": each.largest,
+                "undefined": each.undefined,
                 **(_spread_data(each) if plan.is_sampled else {}),
                 **drivers_data(findings, each.name),
             }
             for each in findings.spreads
         },
-    }  # fmt: skip
+    }
 
 
 def _judgment_data(findings: Findings, judgment: Judgment) -> dict[str, Any]:
@@ -50,20 +53,24 @@ def _judgment_data(findings: Findings, judgment: Judgment) -> dict[str, Any]:
         (of,) = [each for each in findings.rare if each.demand == demand]
         rare = rare_data(judgment.failure, of)
     return rare | {
-        "kpi": demand.kpi, "limit": demand.limit, "wanted": demand.probability,
-        "outcome": judgment.outcome, "met": share.count,
+        "kpi": demand.kpi,
+        "limit": demand.limit,
+        "wanted": demand.probability,
+        "outcome": judgment.outcome,
+        "met": share.count,
         **(probability if findings.plan.is_sampled else {}),
         "undecided_cases": judgment.undecided,
         "worst_case": None if judgment.worst is None else findings.number(judgment.worst),
-    }  # fmt: skip
+    }
 
 
 def _spread_data(spread: Spread) -> dict[str, Any]:
     """Return mean and quantiles of drawn cases."""
     return {
-        "mean": spread.mean, "sd": spread.sd,
+        "mean": spread.mean,
+        "sd": spread.sd,
         "quantiles": [
             {"probability": q.probability, "value": q.value, "low": q.low, "high": q.high}
             for q in spread.quantiles
         ],
-    }  # fmt: skip
+    }

@@ -56,42 +56,54 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
     if findings.rare:
         return [*rare_figures(findings), *scatters(findings), *_overlays(findings, recordings)]
     band = (
-        "; the shaded band holds 90 % of them." if findings.plan.is_sampled
+        "; the shaded band holds 90 % of them."
+        if findings.plan.is_sampled
         else f"; heights count the cases of {findings.plan.design}, and are no frequencies."
-    )  # fmt: skip
+    )
     blocks: list[Block] = [
         FigureBlock(
             partial(_histograms, findings),
             f"Spread of the key figures over the cases{band} Dashed, the bench itself; dotted, "
-            "the limit.", "histograms", is_long=True,
+            "the limit.",
+            "histograms",
+            is_long=True,
         )
-    ]  # fmt: skip
+    ]
     figures = shown_figures(findings)
     if findings.plan.is_sampled and any(findings.influences(name) for name in figures):
-        blocks.append(FigureBlock(
-            partial(_influences, findings),
-            f"What drives the key figures: {'partial ' * bool(findings.plan.correlations)}rank "
-            "correlations with their intervals. Pale: not distinct from none."
-            f"{_on_choices(findings)}"
-            f"{strongest(map(findings.influences, figures))}", "influences",
-        ))  # fmt: skip
+        blocks.append(
+            FigureBlock(
+                partial(_influences, findings),
+                f"What drives the key figures: {'partial ' * bool(findings.plan.correlations)}rank "
+                "correlations with their intervals. Pale: not distinct from none."
+                f"{_on_choices(findings)}"
+                f"{strongest(map(findings.influences, figures))}",
+                "influences",
+            )
+        )
     if effects := moving_effects(findings):
-        blocks.append(FigureBlock(
-            partial(_tornado, findings, effects),
-            "How far each quantity alone moves the key figures from what the bench itself gives; "
-            f"marks are its levels, dotted the limit.{_on_gray(findings)}{_on_edge(effects)}"
-            f"{strongest(effects.values())}", "tornado",
-        ))  # fmt: skip
+        blocks.append(
+            FigureBlock(
+                partial(_tornado, findings, effects),
+                "How far each quantity alone moves the key figures from what the bench itself "
+                f"gives; marks are its levels, dotted the limit."
+                f"{_on_gray(findings)}{_on_edge(effects)}{strongest(effects.values())}",
+                "tornado",
+            )
+        )
     if findings.plan.sensitivity is not None:
         blocks += sensitivity_figures(findings)
     # Trajectories stand on a few levels: their points would be stripes.
     blocks += scatters(findings) if findings.plan.design != "morris" else []
     if findings.judgments and findings.plan.is_sampled:
-        blocks.append(FigureBlock(
-            partial(_convergence, findings),
-            "Probability that a requirement is met, as the cases came in; dotted, what is wanted."
-            f"{_on_others(findings)}", "convergence",
-        ))  # fmt: skip
+        blocks.append(
+            FigureBlock(
+                partial(_convergence, findings),
+                "Probability that a requirement is met, as the cases came in; dotted, what is "
+                f"wanted.{_on_others(findings)}",
+                "convergence",
+            )
+        )
     if findings.judgments:
         blocks += [parallel(findings), *_overlays(findings, recordings)]
     return blocks
@@ -120,15 +132,20 @@ def _on_choices(findings: Findings) -> str:
 def _histograms(findings: Findings) -> Figure:
     from bywire.report.study.histograms import Spread, histograms
 
-    return histograms({
-        each.name: Spread(
-            findings.figure(each.name), each.unit, each.nominal, bound_of(findings, each.name)
-        )
-        for each in findings.spreads if each.largest > each.least
-    } or {
-        each.name: Spread(findings.figure(each.name), each.unit, each.nominal)
-        for each in findings.spreads[:1]
-    }, has_band=findings.plan.is_sampled)  # fmt: skip
+    return histograms(
+        {
+            each.name: Spread(
+                findings.figure(each.name), each.unit, each.nominal, bound_of(findings, each.name)
+            )
+            for each in findings.spreads
+            if each.largest > each.least
+        }
+        or {
+            each.name: Spread(findings.figure(each.name), each.unit, each.nominal)
+            for each in findings.spreads[:1]
+        },
+        has_band=findings.plan.is_sampled,
+    )
 
 
 def _influences(findings: Findings) -> Figure:
@@ -151,8 +168,9 @@ def _convergence(findings: Findings) -> Figure:
     shown = _converging(findings)[:_PANELS]
     return convergence(
         {j.demand.text: running_share(j.met, findings.plan.confidence, _SHARES) for j in shown},
-        {j.demand.text: j.demand.probability for j in shown}, first=CHUNK,
-    )  # fmt: skip
+        {j.demand.text: j.demand.probability for j in shown},
+        first=CHUNK,
+    )
 
 
 def _converging(findings: Findings) -> list[Judgment]:
@@ -173,10 +191,12 @@ def _overlays(findings: Findings, recordings: Recordings) -> list[Block]:
         FigureBlock(
             partial(_overlaid, each),
             f"The bench itself and the {which} case of each requirement (run: {label}).",
-            f"worst-{label}", is_long=True,
+            f"worst-{label}",
+            is_long=True,
         )
-        for label, each in recordings().items() if len(each) > 1
-    ]  # fmt: skip
+        for label, each in recordings().items()
+        if len(each) > 1
+    ]
 
 
 def _overlaid(each: Mapping[str, xr.Dataset]) -> Figure:

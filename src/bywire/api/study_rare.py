@@ -39,13 +39,19 @@ def failure_table(findings: Findings) -> Table:
         assert wanted is not None
         probable = failure.estimate
         close = f" ({each.undecided} too close)" if each.undecided else ""
-        rows.append((
-            Cell(clean(f"{each.demand.kpi} {each.demand.limit}")),
-            Cell(_value(probable), value=probable.value), Cell(_ends(probable)),
-            Cell("-" if np.isnan(probable.variation) else f"{100.0 * probable.variation:.2g} %"),
-            Cell(f"{failure.runs}{close}", value=failure.runs), Cell(f"{1.0 - wanted:.3g}"),
-            OUTCOMES[each.outcome],
-        ))  # fmt: skip
+        rows.append(
+            (
+                Cell(clean(f"{each.demand.kpi} {each.demand.limit}")),
+                Cell(_value(probable), value=probable.value),
+                Cell(_ends(probable)),
+                Cell(
+                    "-" if np.isnan(probable.variation) else f"{100.0 * probable.variation:.2g} %"
+                ),
+                Cell(f"{failure.runs}{close}", value=failure.runs),
+                Cell(f"{1.0 - wanted:.3g}"),
+                OUTCOMES[each.outcome],
+            )
+        )
     columns = [Column(head, numeric="interval" not in head) for head in heads]
     return Table((Column("requirement"), *columns, Column("result")), tuple(rows))
 
@@ -53,21 +59,28 @@ def failure_table(findings: Findings) -> Table:
 def importance_tables(findings: Findings) -> list[TableBlock]:
     """Return where the failures of each requirement lie, by quantity."""
     return [
-        TableBlock(_importance_table(findings, each), f"Where {each.demand.kpi} fails.",
-                   title=f"where {each.demand.kpi} fails")
-        for each in findings.rare if each.importance
-    ]  # fmt: skip
+        TableBlock(
+            _importance_table(findings, each),
+            f"Where {each.demand.kpi} fails.",
+            title=f"where {each.demand.kpi} fails",
+        )
+        for each in findings.rare
+        if each.importance
+    ]
 
 
 def rare_figures(findings: Findings) -> list[FigureBlock]:
     """Return the figure of probabilities over the limit; none where nothing was found."""
     if not any(each.failure.span for each in findings.rare):
         return []
-    return [FigureBlock(
-        partial(_curves, findings),
-        "Probability that a key figure comes worse than a value, with its interval. Dotted, the "
-        "limit and the probability that is admitted.", "exceedance",
-    )]  # fmt: skip
+    return [
+        FigureBlock(
+            partial(_curves, findings),
+            "Probability that a key figure comes worse than a value, with its interval. Dotted, "
+            "the limit and the probability that is admitted.",
+            "exceedance",
+        )
+    ]
 
 
 def rare_data(failure: FailureProbability, findings: RareFailure) -> dict[str, Any]:
@@ -76,8 +89,10 @@ def rare_data(failure: FailureProbability, findings: RareFailure) -> dict[str, A
     return {
         "state": failure.state,
         "failure": {
-            "probability": probable.value, "variation": probable.variation,
-            "low": probable.low, "high": probable.high,
+            "probability": probable.value,
+            "variation": probable.variation,
+            "low": probable.low,
+            "high": probable.high,
         },
         "cases": failure.runs,
         "levels": [{"margin": x.margin, "probability": x.probability} for x in failure.levels],
@@ -85,21 +100,23 @@ def rare_data(failure: FailureProbability, findings: RareFailure) -> dict[str, A
         "failing_case": findings.case,
         "importance": {
             i.quantity: {
-                "score": i.score, "factor": i.factor,
+                "score": i.score,
+                "factor": i.factor,
                 **({"shares": {str(v): n for v, n in i.shares.items()}} if i.shares else {}),
             }
             for i in findings.importance
         },
-    }  # fmt: skip
+    }
 
 
 def state_texts(findings: Findings) -> list[str]:
     """Return of each requirement without an estimate why there is none, and what to do."""
     outcomes = {each.demand: each.outcome for each in findings.judgments}
     return [
-        f"{each.demand.kpi}: {text}" for each in findings.rare
+        f"{each.demand.kpi}: {text}"
+        for each in findings.rare
         if (text := _state_text(each, findings.plan, outcomes[each.demand]))
-    ]  # fmt: skip
+    ]
 
 
 def rare_notes(findings: Findings) -> list[str]:
@@ -109,8 +126,10 @@ def rare_notes(findings: Findings) -> list[str]:
     assert design is not None
     notes = []
     if design.kind == SUBSET and design.level != design.asked:
-        notes.append(f"{design.level} cases in each level in place of {design.asked}: they come in "
-                     "whole chunks")  # fmt: skip
+        notes.append(
+            f"{design.level} cases in each level in place of {design.asked}: they come in "
+            "whole chunks"
+        )
     if unjudged := [each.text for each in plan.demands if each not in plan.judged_demands]:
         notes.append(
             f"not judged, for no probability is wanted of it: {'; '.join(unjudged)}; cases that go "
@@ -119,18 +138,22 @@ def rare_notes(findings: Findings) -> list[str]:
     notes += [
         f"{each.demand.kpi}: failure is less probable than a thousandth of what is admitted: it "
         "was followed no further"
-        for each in findings.rare if each.failure.state == "negligible"
+        for each in findings.rare
+        if each.failure.state == "negligible"
     ]
     for each in findings.judgments if len(findings.cases) else ():
         if each.outcome == "undecided" and each.failure and each.failure.state == "done":
             more = (
-                "more cases_per_level, in another folder, narrow it" if design.kind == SUBSET
+                "more cases_per_level, in another folder, narrow it"
+                if design.kind == SUBSET
                 else "extend the study"
-            )  # fmt: skip
+            )
             notes.append(f"{each.demand.kpi}: the interval holds what is admitted: {more}")
     if design.kind == IMPORTANCE:
-        notes.append("importance-sampling: failures far from the design point may be missed; "
-                     "'subset-simulation' looks for them everywhere")  # fmt: skip
+        notes.append(
+            "importance-sampling: failures far from the design point may be missed; "
+            "'subset-simulation' looks for them everywhere"
+        )
     return notes
 
 
@@ -141,11 +164,13 @@ def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
         seen = f"failing cases seen, too few for an estimate: {failure.failed}; "
         so_far = seen * bool(failure.failed) + so_far
         where = (
-            "before the last level" if plan.design == SUBSET
+            "before the last level"
+            if plan.design == SUBSET
             else "by the search for the design point"
-        )  # fmt: skip
-        return (f"the budget of {plan.cases} cases is spent {where} ({so_far})"
-                + (": extend the study" if outcome == "undecided" else ""))  # fmt: skip
+        )
+        return f"the budget of {plan.cases} cases is spent {where} ({so_far})" + (
+            ": extend the study" if outcome == "undecided" else ""
+        )
     if failure.state == "level":
         return "too many cases have the same figure to tell worse ones: take 'monte-carlo'"
     if failure.state == "no design point":
@@ -175,12 +200,17 @@ def _importance_table(findings: Findings, each: RareFailure) -> Table:
             Cell(f"{i.factor:.2f}", value=i.factor),
         )
         for i in each.importance
-    ]  # fmt: skip
-    return Table((
-        Column("quantity"), Column("where failures lie", numeric=True),
-        Column("in the bench", numeric=True), Column("standard deviations", numeric=True),
-        Column("importance", numeric=True),
-    ), tuple(rows))  # fmt: skip
+    ]
+    return Table(
+        (
+            Column("quantity"),
+            Column("where failures lie", numeric=True),
+            Column("in the bench", numeric=True),
+            Column("standard deviations", numeric=True),
+            Column("importance", numeric=True),
+        ),
+        tuple(rows),
+    )
 
 
 def _place(importance: Importance, failure: RareFailure, unit: str) -> str:
@@ -214,19 +244,25 @@ def _curve(findings: Findings, each: RareFailure, make: Any) -> Any:
     sign = -1.0 if compare.startswith("<") else 1.0
     intervals: Sequence[Interval] = [each.failure.below(float(m)) for m in margins]
     return make(
-        demand.kpi, unit, bound, 1.0 - demand.probability, bound + sign * margins,
-        np.array([f.value for f in intervals]), np.array([f.low for f in intervals]),
+        demand.kpi,
+        unit,
+        bound,
+        1.0 - demand.probability,
+        bound + sign * margins,
+        np.array([f.value for f in intervals]),
+        np.array([f.low for f in intervals]),
         np.array([f.high for f in intervals]),
-    )  # fmt: skip
+    )
 
 
 def search_notes(findings: Findings) -> list[str]:
     """Return what a search for worst cases stands for, and where it did not come to its end."""
     plan = findings.plan
     spent = [
-        demand.kpi for demand, each in zip(plan.judged_demands, findings.searches, strict=False)
+        demand.kpi
+        for demand, each in zip(plan.judged_demands, findings.searches, strict=False)
         if each.state == "budget spent"
-    ]  # fmt: skip
+    ]
     notes = [f"{plan.design}: a search proves nothing: a worse case may be where it did not look"]
     if spent:
         notes.append(

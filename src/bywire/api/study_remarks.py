@@ -69,9 +69,11 @@ def noted(findings: Findings, damaged: int) -> list[str]:
         files = "1 damaged chunk is" if damaged == 1 else f"{damaged} damaged chunks are"
         repaired = f"{files} computed again"
     return [
-        *filter(None, [repaired]), *_rounding(findings.plan), *_on_intervals(findings),
+        *filter(None, [repaired]),
+        *_rounding(findings.plan),
+        *_on_intervals(findings),
         *_on_choices(findings.plan),
-    ]  # fmt: skip
+    ]
 
 
 def failure_texts(findings: Findings, named: Callable[[int], str]) -> list[str]:
@@ -134,12 +136,13 @@ def _wide_shares(findings: Findings) -> list[str]:
     design = findings.plan.sensitivity
     assert design is not None
     wide = [
-        name for name in shown_figures(findings)
+        name
+        for name in shown_figures(findings)
         if any(
             isinstance(each, VarianceShares) and max(each.first.reach, each.total.reach) > _WIDE
             for each in findings.sensitivity(name).drivers
         )
-    ]  # fmt: skip
+    ]
     if not wide:
         return []
     return [

@@ -99,10 +99,14 @@ class StudyRun(Answer):
 
         units = {**self.plan.units, **self.findings.units}
         columns = {
-            name: ("case", np.asarray(self.cases[name]), {"units": units[name]} if name in units
-                   else {})
-            for name in self.cases if name != "case"
-        }  # fmt: skip
+            name: (
+                "case",
+                np.asarray(self.cases[name]),
+                {"units": units[name]} if name in units else {},
+            )
+            for name in self.cases
+            if name != "case"
+        }
         return xr.Dataset(columns, coords={"case": np.asarray(self.cases["case"])})
 
     @property
@@ -166,10 +170,12 @@ class StudyRun(Answer):
         demands = TableBlock(table, width=120)
         is_indexed = plan.sensitivity is not None
         drivers = (
-            importance_tables(findings) if is_rare
-            else sensitivity_tables(findings) if is_indexed
+            importance_tables(findings)
+            if is_rare
+            else sensitivity_tables(findings)
+            if is_indexed
             else influence_tables(findings) + effect_tables(findings)
-        )  # fmt: skip
+        )
         more = len(drivers) - _BRIEF
         said = [*missing_indices(findings), *unmoved(findings)]
         unexplained = [Listing(said)] if said else []
@@ -186,38 +192,53 @@ class StudyRun(Answer):
                 tested_section(self.nominal, plan.tested, subject),
                 *([Section("What else to know", [Listing(remarks)])] if remarks else []),
                 *([Section("Key figures", figures)] if figures else []),
-                *([Section("What drives them", [*drivers, *unexplained])] if drivers or unexplained
-                  else []),
-                *([Section("Figures", drawn)]
-                  if (drawn := study_figures(findings, self._shown.recordings)) else []),
+                *(
+                    [Section("What drives them", [*drivers, *unexplained])]
+                    if drivers or unexplained
+                    else []
+                ),
+                *(
+                    [Section("Figures", drawn)]
+                    if (drawn := study_figures(findings, self._shown.recordings))
+                    else []
+                ),
                 *([Section(self._shown.title, [Listing(texts)])] if judged and texts else []),
                 *([Section("Cases without a result", [Listing(missing)])] if missing else []),
                 Section("What varies", [TableBlock(varied_table(plan)), *correlated(plan)]),
                 subject.provenance(f"Chunks of the study: {self.folder}.", has_changes=False),
             ],
-            brief=spaced([
-                *tested_brief(self.nominal, plan),
-                *([demands] if judged else []), *figures, *drivers[:_BRIEF],
-                *(unexplained if findings.plan.sensitivity is None else []),
-                *([f"and {more} more such tables in the report"] if more > 0 else []),
-                *([Listing(missing, "Cases without a result")] if missing else []),
-            ]),
+            brief=spaced(
+                [
+                    *tested_brief(self.nominal, plan),
+                    *([demands] if judged else []),
+                    *figures,
+                    *drivers[:_BRIEF],
+                    *(unexplained if findings.plan.sensitivity is None else []),
+                    *([f"and {more} more such tables in the report"] if more > 0 else []),
+                    *([Listing(missing, "Cases without a result")] if missing else []),
+                ]
+            ),
             data=self._data,
             banner=self._banner(),
             attachments=self._shown.attachments(),
             record="report.json",
             remarks=[
                 f"requirement {each.outcome}: {each.demand.text}"
-                for each in findings.judgments if each.outcome != "met"
+                for each in findings.judgments
+                if each.outcome != "met"
             ],
             changes=subject.changes,
-        )  # fmt: skip
+        )
 
     def _empty(self) -> Document:
         return Document(
-            f"Study {self.plan.name}", "", sections=[], brief=["no case is computed yet"],
-            data=self._data(), is_paged=False,
-        )  # fmt: skip
+            f"Study {self.plan.name}",
+            "",
+            sections=[],
+            brief=["no case is computed yet"],
+            data=self._data(),
+            is_paged=False,
+        )
 
     def _banner(self) -> Banner:
         if not self.findings.spreads:
@@ -234,7 +255,11 @@ class StudyRun(Answer):
 
     def _data(self) -> dict[str, Any]:
         return {
-            "study": self.plan.name, "status": self.status, "folder": str(self.folder),
+            "study": self.plan.name,
+            "status": self.status,
+            "folder": str(self.folder),
             "bench": tested_data(self.plan.bench, self.plan.tested),
-            **findings_data(self.findings), "warnings": self.warnings, "notes": self.notes,
-        }  # fmt: skip
+            **findings_data(self.findings),
+            "warnings": self.warnings,
+            "notes": self.notes,
+        }

@@ -30,10 +30,12 @@ _CAPTIONS = {
 def sensitivity_tables(findings: Findings) -> list[TableBlock]:
     """Return the indices of each key figure of a requirement; of all where nothing is required."""
     return [
-        TableBlock(_table(findings, name, found), f"What drives {name}.",
-                   title=f"what drives {name}")
-        for name in shown_figures(findings) if (found := findings.sensitivity(name).drivers)
-    ]  # fmt: skip
+        TableBlock(
+            _table(findings, name, found), f"What drives {name}.", title=f"what drives {name}"
+        )
+        for name in shown_figures(findings)
+        if (found := findings.sensitivity(name).drivers)
+    ]
 
 
 def sensitivity_figures(findings: Findings) -> list[FigureBlock]:
@@ -72,10 +74,12 @@ def drivers_data(findings: Findings, name: str) -> dict[str, Any]:
 
 def _effect_data(effect: Effect) -> dict[str, Any]:
     return {
-        "unit": effect.unit or None, "values": list(effect.values),
-        "figures": effect.figures.tolist(), "swing": effect.swing,
+        "unit": effect.unit or None,
+        "values": list(effect.values),
+        "figures": effect.figures.tolist(),
+        "swing": effect.swing,
         "undefined": effect.lacking,
-    }  # fmt: skip
+    }
 
 
 def missing_indices(findings: Findings) -> list[str]:
@@ -94,9 +98,10 @@ def missing_indices(findings: Findings) -> list[str]:
 
 
 def _table(
-    findings: Findings, name: str,
+    findings: Findings,
+    name: str,
     drivers: Sequence[VarianceShares] | Sequence[ElementaryEffects],
-) -> Table:  # fmt: skip
+) -> Table:
     columns, rows = [Column("quantity")], []
     written = partial(figure_text, findings, name, digits=3, is_difference=True)
     for each in drivers:

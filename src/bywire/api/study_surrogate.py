@@ -51,8 +51,9 @@ class StudySurrogates(Answer):
         poor = [
             f"the surrogate of {each.kpi} tells {100.0 * each.explained:.0f} % of the variance of "
             "cases it has not seen: the rest is noise, or no polynomial"
-            for each in self.surrogates.values() if each.explained < _POOR
-        ]  # fmt: skip
+            for each in self.surrogates.values()
+            if each.explained < _POOR
+        ]
         none = [f"no surrogate of {kpi}: {why}" for kpi, why in self.refused.items()]
         return [*poor, *none, *self.study.warnings]
 
@@ -66,8 +67,11 @@ class StudySurrogates(Answer):
             for v in varied
             if self.at and v.name not in self.at and first.nominal[v.name] != v.nominal
         ]
-        pairs = [pair for pair in self.study.plan.correlations if (pair[0] in self.at) !=
-                 (pair[1] in self.at)]  # fmt: skip
+        pairs = [
+            pair
+            for pair in self.study.plan.correlations
+            if (pair[0] in self.at) != (pair[1] in self.at)
+        ]
         return moved + [
             f"{' and '.join(pair)} are correlated, and one of them stays as in the bench: give both"
             for pair in pairs
@@ -95,11 +99,16 @@ class StudySurrogates(Answer):
         for s in self.surrogates.values():
             told = [figure_text(self.study.findings, s.kpi, float(s(self.at)))] if self.at else []
             texts = [
-                *told, f"{100.0 * s.explained:.2f} %",
-                *(figure_text(self.study.findings, s.kpi, error, is_difference=True)
-                  for error in (s.rms, s.largest)),
-                str(s.degree), str(s.terms), str(s.cases),
-            ]  # fmt: skip
+                *told,
+                f"{100.0 * s.explained:.2f} %",
+                *(
+                    figure_text(self.study.findings, s.kpi, error, is_difference=True)
+                    for error in (s.rms, s.largest)
+                ),
+                str(s.degree),
+                str(s.terms),
+                str(s.cases),
+            ]
             rows.append((Cell(clean(s.kpi)), *map(Cell, texts)))
         columns = (Column("name"), *(Column(head, numeric=True) for head in (*at, *heads)))
         return Table(columns, tuple(rows))
@@ -110,14 +119,19 @@ class StudySurrogates(Answer):
             "at": dict(self.at),
             "surrogates": {
                 s.kpi: {
-                    "unit": s.unit, "variance_told": s.explained, "rms_error": s.rms,
-                    "largest_error": s.largest, "degree": s.degree, "terms": s.terms,
-                    "cases": s.cases, **({"value": float(s(self.at))} if self.at else {}),
+                    "unit": s.unit,
+                    "variance_told": s.explained,
+                    "rms_error": s.rms,
+                    "largest_error": s.largest,
+                    "degree": s.degree,
+                    "terms": s.terms,
+                    "cases": s.cases,
+                    **({"value": float(s(self.at))} if self.at else {}),
                 }
                 for s in self.surrogates.values()
             },
             "warnings": self.warnings,
-        }  # fmt: skip
+        }
 
 
 @use_case

@@ -42,9 +42,11 @@ def demand_table(findings: Findings) -> Table:
         if is_sampled:
             cells += [
                 Cell(percent(each.share.value, each.share), value=each.share.value),
-                Cell(f"{percent(each.share.low, each.share)} to "
-                     f"{percent(each.share.high, each.share)}"),
-            ]  # fmt: skip
+                Cell(
+                    f"{percent(each.share.low, each.share)} to "
+                    f"{percent(each.share.high, each.share)}"
+                ),
+            ]
         result = OUTCOMES[each.outcome]
         if each.outcome == "met" and each.demand.probability is None:
             result = replace(result, text="met in all")
@@ -80,8 +82,9 @@ def figure_text(
         Whether it is one: of temperatures they are in K.
     """
     unit = findings.units[name]
-    return amount(value, difference_unit(unit) if is_difference else unit, digits,
-                  findings.size(name))  # fmt: skip
+    return amount(
+        value, difference_unit(unit) if is_difference else unit, digits, findings.size(name)
+    )
 
 
 def strongest(drivers: Iterable[Sequence[object]]) -> str:
@@ -134,11 +137,15 @@ def varied_table(plan: StudyPlan) -> Table:
     return text_table(
         ["quantity", "in the bench", "distribution", "together with it"],
         [
-            (v.name, value_text(v.nominal, v.unit or "1"), v.distribution.text,
-             ", ".join(v.together) or "-")
+            (
+                v.name,
+                value_text(v.nominal, v.unit or "1"),
+                v.distribution.text,
+                ", ".join(v.together) or "-",
+            )
             for v in plan.varied
         ],
-    )  # fmt: skip
+    )
 
 
 def correlated(plan: StudyPlan) -> list[Listing]:
@@ -157,19 +164,26 @@ def influence_tables(findings: Findings) -> list[TableBlock]:
     each = {name: findings.influences(name) for name in shown_figures(findings)}
     is_partial = bool(findings.plan.correlations)
     return [
-        TableBlock(_influence_table(found, is_partial), f"What drives {name}{_more(found)}.",
-                   title=f"what drives {name}{_more(found)}")
-        for name, found in each.items() if found
-    ]  # fmt: skip
+        TableBlock(
+            _influence_table(found, is_partial),
+            f"What drives {name}{_more(found)}.",
+            title=f"what drives {name}{_more(found)}",
+        )
+        for name, found in each.items()
+        if found
+    ]
 
 
 def effect_tables(findings: Findings) -> list[TableBlock]:
     """Return what each quantity alone does to key figures of requirements, or to all."""
     return [
-        TableBlock(_effect_table(findings, name, found),
-                   f"What each quantity alone does to {name}.", title=f"what moves {name}")
+        TableBlock(
+            _effect_table(findings, name, found),
+            f"What each quantity alone does to {name}.",
+            title=f"what moves {name}",
+        )
         for name, found in moving_effects(findings).items()
-    ]  # fmt: skip
+    ]
 
 
 def moving_effects(findings: Findings) -> dict[str, Sequence[Effect]]:
@@ -184,11 +198,14 @@ def _effect_table(findings: Findings, name: str, effects: Sequence[Effect]) -> T
     for each in effects:
         ends = [value_text(each.values[k], each.unit or "1") for k in (0, -1)]
         figures = [float(each.figures[0]), float(each.figures[-1]), each.least, each.largest]
-        rows.append((
-            Cell(each.quantity), *map(Cell, ends),
-            *(Cell(figure_text(findings, name, v), value=v) for v in figures),
-            Cell(figure_text(findings, name, each.swing, is_difference=True), value=each.swing),
-        ))  # fmt: skip
+        rows.append(
+            (
+                Cell(each.quantity),
+                *map(Cell, ends),
+                *(Cell(figure_text(findings, name, v), value=v) for v in figures),
+                Cell(figure_text(findings, name, each.swing, is_difference=True), value=each.swing),
+            )
+        )
     return Table((Column("quantity"), *(Column(h, numeric=True) for h in heads)), tuple(rows))
 
 
@@ -213,8 +230,9 @@ def unmoved(findings: Findings) -> list[str]:
     if not (findings.plan.is_sampled or findings.plan.design == ONE):
         return []
     shown = shown_figures(findings)
-    same = [each.name for each in findings.spreads
-            if each.name in shown and each.least == each.largest]  # fmt: skip
+    same = [
+        each.name for each in findings.spreads if each.name in shown and each.least == each.largest
+    ]
     return [f"nothing moves {', '.join(same)}: the same in every case"] if same else []
 
 
@@ -224,9 +242,7 @@ def _more(influences: Sequence[object]) -> str:
     return f", the {_SHOWN} strongest, and {rest} more in report.json" if rest > 0 else ""
 
 
-def _influence_table(
-    influences: Sequence[Influence | ChoiceInfluence], is_partial: bool
-) -> Table:
+def _influence_table(influences: Sequence[Influence | ChoiceInfluence], is_partial: bool) -> Table:
     """Return rank correlations; where choices are among them, their ratios in a column beside."""
     heads = [f"{'partial ' * is_partial}rank correlation", "interval"]
     has_choices = any(isinstance(i, ChoiceInfluence) for i in influences)

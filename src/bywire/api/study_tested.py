@@ -74,18 +74,21 @@ def tested_data(bench: Bench, source: StudiedBench | None) -> dict[str, Any]:
         "options": bench.chosen_options.model_dump(mode="json"),
         "faults": [
             {
-                "fault": fault.mode.name, "summary": fault.mode.summary,
-                "value": fault.value if fault.mode.unit else None, "unit": fault.mode.unit or None,
+                "fault": fault.mode.name,
+                "summary": fault.mode.summary,
+                "value": fault.value if fault.mode.unit else None,
+                "unit": fault.mode.unit or None,
                 "onset": fault.course.onset,
                 "end": fault.course.end if math.isfinite(fault.course.end) else None,
             }
             for fault in bench.injections
         ],
-    }  # fmt: skip
+    }
 
 
 def _source_text(source: StudiedBench) -> str:
     """Return which bench the study file names, and what the study sets of it."""
     changes = ", ".join(f"{name} = {value}" for name, value in source.changes.items())
-    return clean(f"Bench: {source.bench}" + (f", of which the study sets {changes}" if changes
-                                             else ""))  # fmt: skip
+    return clean(
+        f"Bench: {source.bench}" + (f", of which the study sets {changes}" if changes else "")
+    )

@@ -30,9 +30,7 @@ def all_things() -> dict[str, Any]:
     """Return kind of thing -> name -> summary, as plain data; what was loaded by path first."""
     sets, experiments = _in_order(PARAMETER_SETS), _in_order(EXPERIMENTS)
     anywhere = {e.name: f"{e.summary} (any)" for e in GENERIC_EXPERIMENTS.all().values()}
-    for_benches = {
-        m.name: f"{m.summary} (any, with --bench)" for m in BENCH_METHODS.all().values()
-    }  # fmt: skip
+    for_benches = {m.name: f"{m.summary} (any, with --bench)" for m in BENCH_METHODS.all().values()}
     files = loaded_files()
     known = sorted(brakes().values(), key=lambda brake: brake.file not in files)
     return {

@@ -73,7 +73,8 @@ class TrustStudy(Answer):
             f"{count} simulated experiments, each with its own noise",
             sections=[Section("What comes back", blocks)],
             brief=[
-                f"{method.name}: {count} simulated experiments, each with its own noise", *blocks
+                f"{method.name}: {count} simulated experiments, each with its own noise",
+                *blocks,
             ],
             data={
                 "method": method.name,
@@ -157,9 +158,15 @@ def trust(
         store = Path(folder) / STORE
     try:
         recovered = trusted.trust(
-            chosen.method, chosen.par, chosen.options, range(seed, seed + count),
-            Effort(starts=starts), processes=processes, store=store, progress=shown,
-        )  # fmt: skip
+            chosen.method,
+            chosen.par,
+            chosen.options,
+            range(seed, seed + count),
+            Effort(starts=starts),
+            processes=processes,
+            store=store,
+            progress=shown,
+        )
     except KeyboardInterrupt:
         if store is None or not store.exists():
             raise

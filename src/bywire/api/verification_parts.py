@@ -50,9 +50,7 @@ def verification_parts(
     labels = tried.final.corners
     if labels:
         worst = f" (worst of {tried.corners} corners)" if len(labels) < tried.corners else ""
-        parts.append(
-            f"tried on the bench: at the nominal point, and at {'; '.join(labels)}{worst}"
-        )
+        parts.append(f"tried on the bench: at the nominal point, and at {'; '.join(labels)}{worst}")
     kept = {requirement.text for requirement in tried.kept}
     for text, slack in tried.final.slacks.items():
         verdict = "met" if slack >= 0.0 else "NOT met"
@@ -105,10 +103,9 @@ def figure_text(name: str, value: float) -> str:
     return text
 
 
-def _figure_rows(
-    case: LoopCase, where: str, columns: list[BenchFigures | None]
-) -> list[list[str]]:
+def _figure_rows(case: LoopCase, where: str, columns: list[BenchFigures | None]) -> list[list[str]]:
     """Return rows of one trial: what the sines and the step show, a column for each design."""
+
     def cell(figures: BenchFigures | None, k: int, name: str) -> str:
         if figures is None or not figures.small:
             return "-"
@@ -119,10 +116,13 @@ def _figure_rows(
         [],
     )
     rows = [
-        [f"{name}, sine of {amount(size, case.input_unit, 3)}{where}",
-         *(cell(figures, k, name) for figures in columns)]
-        for k, size in enumerate(sizes) for name in ("bandwidth", "phase_margin", "crossover")
-    ]  # fmt: skip
+        [
+            f"{name}, sine of {amount(size, case.input_unit, 3)}{where}",
+            *(cell(figures, k, name) for figures in columns),
+        ]
+        for k, size in enumerate(sizes)
+        for name in ("bandwidth", "phase_margin", "crossover")
+    ]
     steps = next((tuple(figures.step) for figures in columns if figures and figures.step), ())
     for name in steps:
         cells = [
@@ -135,8 +135,11 @@ def _figure_rows(
 
 def _reasons(case: LoopCase, tries: Sequence[BenchFigures]) -> list[Part]:
     """Return why figures are not defined, each reason once."""
-    texts = [f"{n}, {case.loop.proof}, is not defined: {why}"
-             for figures in tries for n, why in figures.reasons.items()]  # fmt: skip
+    texts = [
+        f"{n}, {case.loop.proof}, is not defined: {why}"
+        for figures in tries
+        for n, why in figures.reasons.items()
+    ]
     for size in [small for figures in tries for small in figures.small]:
         if not math.isnan(size.phase_margin):
             continue
@@ -167,11 +170,13 @@ def verification_object(case: LoopCase, tried: Verification) -> dict[str, Any]:
         "kept": [requirement.text for requirement in tried.kept],
         "experiment": case.loop.proof,
         "kpis": {kpi.name: {"value": kpi.value, "unit": kpi.unit} for kpi in tried.kpis},
-        "conflict": None if conflict is None else {
+        "conflict": None
+        if conflict is None
+        else {
             "requirements": list(conflict[:2]),
             "slacks": [list(pair) for pair in conflict[2]],
         },
-    }  # fmt: skip
+    }
 
 
 def _candidate(candidate: Candidate) -> dict[str, Any]:
@@ -187,10 +192,15 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
 def _figures(figures: BenchFigures) -> dict[str, Any]:
     return {
         "sines": [
-            {"amplitude": s.amplitude, "bandwidth": s.bandwidth,
-             "phase_margin": s.phase_margin, "crossover": s.crossover,
-             "peak": s.peak, "settled": s.settled}
+            {
+                "amplitude": s.amplitude,
+                "bandwidth": s.bandwidth,
+                "phase_margin": s.phase_margin,
+                "crossover": s.crossover,
+                "peak": s.peak,
+                "settled": s.settled,
+            }
             for s in figures.small
         ],
         "step": dict(figures.step),
-    }  # fmt: skip
+    }

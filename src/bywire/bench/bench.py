@@ -154,9 +154,7 @@ class Bench:
             if name not in known:
                 raise unknown_name(f"stimulus beside {chosen.name}", name, known)
 
-    def _require_effects(
-        self, names: Sequence[str], cases: Sequence[Case], make: Cases
-    ) -> None:
+    def _require_effects(self, names: Sequence[str], cases: Sequence[Case], make: Cases) -> None:
         """Refuse parameters that a choice switches off: they would be listed and do nothing.
 
         ``names``: those that are written out; a pattern may match some that have no effect.

@@ -75,9 +75,10 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
         file, "bench file", missing=meant_by, too_large=_TOO_LARGE
     )
     relative = {
-        name: value for name, value in changes.items()
+        name: value
+        for name, value in changes.items()
         if is_relative(name, value) and name.partition(".")[0] not in SECTIONS
-    }  # fmt: skip
+    }
     try:
         require_kind(content, BENCH, file)
         _require_shape(content)
@@ -141,7 +142,7 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
         ).items():
             if each in flat:
                 raise ParameterError(
-                    f"{each} has two values, by {each} and by \"{each}\" in quotation marks: leave "
+                    f'{each} has two values, by {each} and by "{each}" in quotation marks: leave '
                     "one of both out"
                 )
             flat[each] = leaf

@@ -59,12 +59,16 @@ def bench_text(bench: Bench, comment: str = "") -> str:
     for section, fault in zip(bench.faults, bench.injections, strict=True):
         units = _units(Course) | {"value": fault.mode.unit or "1"}
         lines += ["", "[[faults]]"]
-        lines += [f"{_key(k)} = {_text(k, v, units.get(k, '1'))}"
-                  for k, v in section.items() if k != "set"]  # fmt: skip
+        lines += [
+            f"{_key(k)} = {_text(k, v, units.get(k, '1'))}"
+            for k, v in section.items()
+            if k != "set"
+        ]
         changed = section.get("set", {})
         of_parameters = _units(type(bench.par))
-        lines += [f'set."{k}" = {_text(k, v, of_parameters.get(k, "1"))}'
-                  for k, v in changed.items()]  # fmt: skip
+        lines += [
+            f'set."{k}" = {_text(k, v, of_parameters.get(k, "1"))}' for k, v in changed.items()
+        ]
     return "\n".join(lines) + "\n"
 
 

@@ -17,9 +17,15 @@ from bywire.core.errors import InputError
 from bywire.simulation.engine import prepare
 
 _ROOMS = (
-    "bywire.bench.experiments", "bywire.bench.faults.modes", "bywire.bench.generic_experiment",
-    "bywire.bench.kpis", "bywire.bench.stimuli", "bywire.control", "bywire.plant", "bywire.vehicle",
-)  # fmt: skip
+    "bywire.bench.experiments",
+    "bywire.bench.faults.modes",
+    "bywire.bench.generic_experiment",
+    "bywire.bench.kpis",
+    "bywire.bench.stimuli",
+    "bywire.control",
+    "bywire.plant",
+    "bywire.vehicle",
+)
 _C_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.S)
 
 
@@ -45,9 +51,7 @@ def computation(
     }
 
 
-def functions_digest(
-    roots: Iterable[Any], *rooms: str, with_equations: bool = False
-) -> str:
+def functions_digest(roots: Iterable[Any], *rooms: str, with_equations: bool = False) -> str:
     """Digest of functions with all that they reach in brakes and in what brakes are made of.
 
     Parameters

@@ -99,9 +99,7 @@ def _is_alike(case: Case, other: Case) -> bool:
     plans = [(c.duration, c.settle, c.keep, c.record) for c in (case, other)]
     if plans[0] != plans[1] or type(case.model) is not type(other.model):
         return False
-    begun, also_begun = (
-        np.array([*c.state, *c.memory], dtype=float) for c in (case, other)
-    )
+    begun, also_begun = (np.array([*c.state, *c.memory], dtype=float) for c in (case, other))
     times = np.linspace(-case.settle, case.duration, _TIMES)
     driven, also = case.stimulus(times), other.stimulus(times)
     return (
@@ -165,15 +163,20 @@ def _traced(model: Any, par: ParameterSet) -> frozenset[str]:
     mass, balance = model.mass(xe, here), model.balance(x, xe, m, here, contact)
     results: tuple[Any, ...] = (
         # What nothing drives stands still, whatever its mass.
-        tuple(each for each, force, name in zip(mass, balance, model.State._fields, strict=True)
-              if not zeros.has(force) or name in model.frictions),
+        tuple(
+            each
+            for each, force, name in zip(mass, balance, model.State._fields, strict=True)
+            if not zeros.has(force) or name in model.frictions
+        ),
         balance,
-        model.bounds(x, xe, m, here, contact), groups, model.gap(x, xe, here),
+        model.bounds(x, xe, m, here, contact),
+        groups,
+        model.gap(x, xe, here),
         model.powers(x, xe, rate, m, here, contact, reaction),
         model.output(x, m, here, contact, reaction, flow),
         tuple(task.tick(x, m, u, here) for task in model.tasks(par)),
         tuple(task.period for task in model.tasks(here)),
-    )  # fmt: skip
+    )
     return frozenset(_names_that_count(results, zeros)) & leaves.keys()
 
 

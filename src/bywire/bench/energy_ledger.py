@@ -99,9 +99,7 @@ class Delivery:
     turnover: Any
 
 
-def deliveries(
-    recording: xr.Dataset, among: Collection[str] | None = None
-) -> list[Delivery]:
+def deliveries(recording: xr.Dataset, among: Collection[str] | None = None) -> list[Delivery]:
     """Return what every loss of a recording gave back, in all books.
 
     Work, ``W_...``, is no loss and has either sign. Recordings of the ends alone tell what was
@@ -109,10 +107,13 @@ def deliveries(
     """
     roles = _roles(recording, _energies(recording))
     losses = {
-        name: role for name, role in roles.items()
-        if role.side == "sink" and role.returns != "any" and name.startswith("E_")
+        name: role
+        for name, role in roles.items()
+        if role.side == "sink"
+        and role.returns != "any"
+        and name.startswith("E_")
         and (among is None or name in among)
-    }  # fmt: skip
+    }
     turnovers = {
         book: _ledger(recording, book, is_split=False).turnover
         for book in dict.fromkeys(role.book for role in losses.values())
@@ -149,9 +150,10 @@ def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
     names = [name for name in _books(recording) if name not in ("", main)]
     books = {name: _ledger(recording, name) for name in names}
     return {
-        name: each for name, each in books.items()
+        name: each
+        for name, each in books.items()
         if any(np.any(posting.energy) for posting in (*each.sources, *each.sinks))
-    }  # fmt: skip
+    }
 
 
 def _main_book(recording: xr.Dataset) -> str:
@@ -227,9 +229,7 @@ def _roles(recording: xr.Dataset, names: Collection[str]) -> dict[str, Role]:
         if name.startswith("E_") and name != "E_source" and name not in roles:
             label = str(recording.variables[name].attrs.get("long_name", name))
             is_store = name == "E_stored"
-            roles[name] = (
-                Role("sink", "stored", returns="any") if is_store else Role("sink", label)
-            )
+            roles[name] = Role("sink", "stored", returns="any") if is_store else Role("sink", label)
     return roles
 
 

@@ -73,16 +73,22 @@ class BenchEnsemble:
 
 @overload
 def simulate_ensemble(
-    run: Run, variations: Variations, signals: Sequence[str], threads: int | None = None,
+    run: Run,
+    variations: Variations,
+    signals: Sequence[str],
+    threads: int | None = None,
     engine: str = "auto",
-) -> Ensemble: ...  # fmt: skip
+) -> Ensemble: ...
 
 
 @overload
 def simulate_ensemble(
-    run: Bench, variations: Variations, signals: None = None, threads: int | None = None,
+    run: Bench,
+    variations: Variations,
+    signals: None = None,
+    threads: int | None = None,
     engine: str = "auto",
-) -> BenchEnsemble: ...  # fmt: skip
+) -> BenchEnsemble: ...
 
 
 @checked
@@ -188,9 +194,7 @@ def _names_within(
     return _Names(tuple(parameters), tuple((n, own) for own, n in options.items()), switches)
 
 
-def changed(
-    bench: Bench, values: Mapping[str, float | str], seed: int | None = None
-) -> Bench:
+def changed(bench: Bench, values: Mapping[str, float | str], seed: int | None = None) -> Bench:
     """Return a bench with other parameters, choices and options [SI], and noise of another seed.
 
     What is true or false is a text, ``"true"`` or ``"false"``, as other choices are.

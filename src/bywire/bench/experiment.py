@@ -98,9 +98,12 @@ class Case:
 
 @lru_cache(maxsize=256)  # the cases of a study ask for the same one
 def _settling(
-    settle: float, duration: float, periods: tuple[tuple[str, float], ...], step: float,
+    settle: float,
+    duration: float,
+    periods: tuple[tuple[str, float], ...],
+    step: float,
     record: float,
-) -> float:  # fmt: skip
+) -> float:
     """Return a settling time after which all ticks and a row fall on zero; see `Case.aligned`."""
     schedule = plan(settle + duration, step, dict(periods), record)
     common = math.lcm(schedule.record_frames, *schedule.task_frames) * schedule.frame
@@ -285,9 +288,7 @@ def as_run(
     )
 
 
-def driven_at(
-    case: Case, t: NDArray[np.float64]
-) -> Mapping[str, NDArray[np.float64]]:
+def driven_at(case: Case, t: NDArray[np.float64]) -> Mapping[str, NDArray[np.float64]]:
     """Return the signals that a case drives at times of its recording [s], faults among them."""
     given = case.stimulus(t)
     return {**given, **case.falsified(t)} if isinstance(case, FaultyCase) else given

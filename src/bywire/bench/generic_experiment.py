@@ -116,10 +116,16 @@ class Subject:
                 return {**beside, self.input: driven(t)}
 
             case = Case(
-                "run", self.model, par, *at_rest(self.model, par), stimulus, duration(options),
-                settle=options.settle, record=options.record,
+                "run",
+                self.model,
+                par,
+                *at_rest(self.model, par),
+                stimulus,
+                duration(options),
+                settle=options.settle,
+                record=options.record,
                 start=partial(at_rest, self.model),
-            )  # fmt: skip
+            )
             return (case,)
 
         def settings(options: Any) -> dict[str, Any]:
@@ -263,9 +269,13 @@ def _placed(note: Any, places: Sequence[tuple[str, str, float]]) -> Any:
 
 
 def _signal(
-    model: Model, experiment: str, option: str, place: str, wanted: Any,
+    model: Model,
+    experiment: str,
+    option: str,
+    place: str,
+    wanted: Any,
     chosen: Mapping[str, tuple[str, Signal]],
-) -> tuple[str, Signal]:  # fmt: skip
+) -> tuple[str, Signal]:
     """Return the signal that an option names, or the one that there is no choice about."""
     known = _known(model, place)
     if wanted is not None and not isinstance(wanted, str):

@@ -88,9 +88,12 @@ def rows_of(
     kept = dict(zip(trajectory.names, trajectory.values[begin:].T.copy(), strict=True))
     signals = {name: kept[name] for name in attributes if name in kept}
     return Rows(
-        np.round(time[begin:], 12), signals, attributes,
-        lambda: {**run_notes(run, trajectory), **notes()}, run.par,
-    )  # fmt: skip
+        np.round(time[begin:], 12),
+        signals,
+        attributes,
+        lambda: {**run_notes(run, trajectory), **notes()},
+        run.par,
+    )
 
 
 def rows_of_group(group: RunGroup, settle: float) -> Rows:
@@ -191,9 +194,7 @@ def energy_doubts_of_cases(
     if _are_surely_closed(recording):
         return doubts
     books = actuator_ledger(recording)
-    error, turned = (
-        np.broadcast_to(each, cases) for each in (books.closing_error, books.turnover)
-    )
+    error, turned = (np.broadcast_to(each, cases) for each in (books.closing_error, books.turnover))
     for k, (left, total) in enumerate(zip(error.tolist(), turned.tolist(), strict=True)):
         if abs(left) > _OPEN * total + _NOTHING:
             doubts[k].append(
@@ -260,9 +261,10 @@ def energy_residual(recording: xr.Dataset) -> xr.DataArray:
     losses = sum(
         values
         for name, values in recording.items()
-        if str(name).startswith("E_") and name not in ("E_source", "E_stored")
+        if str(name).startswith("E_")
+        and name not in ("E_source", "E_stored")
         and "energy_book" not in values.attrs
-    )  # fmt: skip
+    )
     balance = recording["E_source"] - losses - recording["E_stored"]
     residual: xr.DataArray = balance - float(balance.values[0])
     residual.attrs = {"units": "J", "long_name": "residual of the energy balance"}

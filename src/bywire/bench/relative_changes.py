@@ -62,10 +62,11 @@ def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
         if name in leaves and share_of(value) is not None:
             refuse_share_of_temperature(name, str(value), leaves[name].unit.symbol)
     return {
-        name: value if (share := share_of(value)) is None or name not in values
+        name: value
+        if (share := share_of(value)) is None or name not in values
         else _scaled(name, value, share, values[name], name in leaves)
         for name, value in spread.items()
-    }  # fmt: skip
+    }
 
 
 def share_of(value: object) -> float | None:

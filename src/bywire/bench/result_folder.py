@@ -92,18 +92,27 @@ def read_result(folder: Path) -> FolderResult:
 def kpi_record(kpi: Kpi) -> dict[str, Any]:
     """Return what JSON says of a key figure, which has null for infinite and unknown errors."""
     return {
-        "value": kpi.value, "unit": kpi.unit, "note": kpi.note,
-        "error": kpi.error, "error_estimated": not math.isnan(kpi.error),
-        "converges": kpi.converges, "open": kpi.is_open,
-    }  # fmt: skip
+        "value": kpi.value,
+        "unit": kpi.unit,
+        "note": kpi.note,
+        "error": kpi.error,
+        "error_estimated": not math.isnan(kpi.error),
+        "converges": kpi.converges,
+        "open": kpi.is_open,
+    }
 
 
 def verdict_record(verdict: Verdict) -> dict[str, Any]:
     """Return what a JSON object says of a requirement."""
     return {
-        "kpi": verdict.kpi, "limit": verdict.limit, "value": verdict.value, "unit": verdict.unit,
-        "met": verdict.met, "outcome": verdict.outcome, "error": verdict.error,
-    }  # fmt: skip
+        "kpi": verdict.kpi,
+        "limit": verdict.limit,
+        "value": verdict.value,
+        "unit": verdict.unit,
+        "met": verdict.met,
+        "outcome": verdict.outcome,
+        "error": verdict.error,
+    }
 
 
 def record_of(folder: Path) -> dict[str, Any]:
@@ -143,17 +152,29 @@ def _kpi(name: str, record: Mapping[str, Any]) -> Kpi:
         error = math.inf
     value, unit = _number(record["value"]), str(record["unit"])
     return Kpi(
-        name, value, unit, "", str(record.get("note", "")), error,
-        bool(record.get("open", False)), bool(record.get("converges", True)),
-    )  # fmt: skip
+        name,
+        value,
+        unit,
+        "",
+        str(record.get("note", "")),
+        error,
+        bool(record.get("open", False)),
+        bool(record.get("converges", True)),
+    )
 
 
 def _verdict(record: Mapping[str, Any]) -> Verdict:
     value, unit = _number(record["value"]), str(record["unit"])
     return Verdict(
-        str(record["kpi"]), str(record["limit"]), value, unit, bool(record["met"]), "",
-        error=_number(record.get("error")), is_decided=record.get("outcome") != "undecided",
-    )  # fmt: skip
+        str(record["kpi"]),
+        str(record["limit"]),
+        value,
+        unit,
+        bool(record["met"]),
+        "",
+        error=_number(record.get("error")),
+        is_decided=record.get("outcome") != "undecided",
+    )
 
 
 def _number(value: Any) -> float:

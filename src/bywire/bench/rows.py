@@ -169,9 +169,11 @@ class Rows:
             return recording
         each = {str(name): one for name, one in recording.variables.items() if name != TIME}
         rows = cls(
-            recording.variables[TIME].values, {name: one.values for name, one in each.items()},
-            {name: one.attrs for name, one in each.items()}, lambda: recording.attrs,
-        )  # fmt: skip
+            recording.variables[TIME].values,
+            {name: one.values for name, one in each.items()},
+            {name: one.attrs for name, one in each.items()},
+            lambda: recording.attrs,
+        )
         rows.__dict__["dataset"] = recording  # what is asked for besides need not be made
         return cast(xr.Dataset, rows)  # it answers as one
 
@@ -233,9 +235,7 @@ class Rows:
     ) -> Rows:
         """Return the rows with further signals; see `Rows` for both."""
         every = {name: self._values[name] for name in self._signals}
-        return Rows(
-            self._values[TIME], {**every, **signals}, {**self._attributes, **attributes}
-        )
+        return Rows(self._values[TIME], {**every, **signals}, {**self._attributes, **attributes})
 
     def drop_vars(self, names: str | Collection[str]) -> Rows:
         """Return the rows without some signals."""

@@ -158,7 +158,8 @@ def stated_figures(bench: Bench) -> dict[str, StatedFigure]:
 def _holding(bench: Bench, statements: Iterable[S]) -> list[S]:
     chosen, ours = bench.definition.defaults.flat(), bench.chosen_options.flat()
     return [
-        each for each in statements
+        each
+        for each in statements
         if each.experiment == bench.experiment
         and all(chosen[name] == ours[name] for name in each.options)
-    ]  # fmt: skip
+    ]

@@ -164,15 +164,14 @@ def note_step_errors(
             y = signal.values.astype(float)
             errors = [
                 of_difference(factor) * (y - made[label][name].values)
-                for factor, made in others.items() if factor in OTHER_STEPS
+                for factor, made in others.items()
+                if factor in OTHER_STEPS
             ]
             signal.attrs["step_error_rms"] = max(map(_rms, errors))
             signal.attrs["step_error_max"] = max(float(np.max(np.abs(e))) for e in errors)
 
 
-def _estimate(
-    value: float, others: Mapping[float, float], rounding: float
-) -> tuple[float, bool]:
+def _estimate(value: float, others: Mapping[float, float], rounding: float) -> tuple[float, bool]:
     """Return the error of a figure, and whether it converges.
 
     ``others``: the figure in other steps, by their length over that of ``value``; ``rounding``:

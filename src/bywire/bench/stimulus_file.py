@@ -59,9 +59,11 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
             )
         signal["column"] = names[0]
     trace = read_trace(
-        path, {_NAME: level_unit}, max_gap=values.get("max_gap", 0.1),
+        path,
+        {_NAME: level_unit},
+        max_gap=values.get("max_gap", 0.1),
         mapping={**whole, "signals": {_NAME: signal}},
-    )  # fmt: skip
+    )
     time = trace["time"].values
     nodes = {"times": (time - time[0]).tolist(), "values": trace[_NAME].values.tolist()}
     return {"between": "linear", **rest, **nodes}

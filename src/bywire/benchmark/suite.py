@@ -68,9 +68,12 @@ class Benchmark(Answer):
             sections=[Section("Figures", [table])],
             brief=[table],
             has_files=False,
-            data={"machine": self.machine, "status": self.status,
-                  "results": [asdict(each) for each in self.results]},
-        )  # fmt: skip
+            data={
+                "machine": self.machine,
+                "status": self.status,
+                "results": [asdict(each) for each in self.results],
+            },
+        )
 
     def _table(self) -> Table:
         verdict = {True: "yes", False: "no", None: "-"}

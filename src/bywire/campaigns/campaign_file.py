@@ -26,11 +26,32 @@ from bywire.data.toml_file import read_toml
 from bywire.studies.study_file import read_bench
 from bywire.studies.vary_section import read_all_varied
 
-_KEYS = ("name", "bench", "set", "vary", "measured", "campaign", "values", "criteria", "residuals",
-         "rates", "reaction")  # fmt: skip
+_KEYS = (
+    "name",
+    "bench",
+    "set",
+    "vary",
+    "measured",
+    "campaign",
+    "values",
+    "criteria",
+    "residuals",
+    "rates",
+    "reaction",
+)
 _SECTIONS = ("set", "vary", "campaign", "values", "rates", "reaction")
-_CAMPAIGN = ("only", "leave_out", "present", "latent", "onset", "onsets", "spread", "healthy",
-             "false_alarms", "seed")  # fmt: skip
+_CAMPAIGN = (
+    "only",
+    "leave_out",
+    "present",
+    "latent",
+    "onset",
+    "onsets",
+    "spread",
+    "healthy",
+    "false_alarms",
+    "seed",
+)
 _REACTION = ("fault", "value", "delay")
 
 
@@ -67,9 +88,7 @@ def read_campaign(
         raise type(error)(f"{file}: {error}") from None
 
 
-def _plan(
-    content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
-) -> CampaignPlan:
+def _plan(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]) -> CampaignPlan:
     for key in content:
         if key not in _KEYS:
             raise unknown_name("key of a campaign file", key, _KEYS)
@@ -104,13 +123,20 @@ def _plan(
     if not criteria:
         raise ParameterError("[[criteria]] are missing: say what a fault must not do")
     plan = CampaignPlan(
-        str(content["name"]), bench, faults, _onsets(section, case), criteria,
-        _residuals(content.get("residuals"), case), varied,
+        str(content["name"]),
+        bench,
+        faults,
+        _onsets(section, case),
+        criteria,
+        _residuals(content.get("residuals"), case),
+        varied,
         healthy=_whole(section, "healthy", 64, 4),
-        false_alarms=_share(section), seed=_whole(section, "seed", 1, 0, 1_000_000),
-        correlations=correlations, rates=_rates(content.get("rates", {}), modes),
+        false_alarms=_share(section),
+        seed=_whole(section, "seed", 1, 0, 1_000_000),
+        correlations=correlations,
+        rates=_rates(content.get("rates", {}), modes),
         reaction=_reaction(content, modes),
-    )  # fmt: skip
+    )
     require_small(plan)
     return plan
 
@@ -162,15 +188,14 @@ def _size(mode: Mode, value: Any, where: str) -> float:
     """Return a value of a mode [SI]; the mode's own is a plain number."""
     if not mode.unit:
         return 0.0
-    size = number(value, mode.unit, where) if value is mode.value else written(
-        value, mode.unit, where)  # fmt: skip
+    size = (
+        number(value, mode.unit, where) if value is mode.value else written(value, mode.unit, where)
+    )
     require_admissible(mode, size, where)
     return size
 
 
-def _pairs(
-    singles: Sequence[Failing], latent: Sequence[Failing], case: Case
-) -> Iterator[Failing]:
+def _pairs(singles: Sequence[Failing], latent: Sequence[Failing], case: Case) -> Iterator[Failing]:
     """Yield every fault once more beside each of the latent ones, where both can be there."""
     for before in latent:
         for each in singles:

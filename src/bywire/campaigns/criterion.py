@@ -104,7 +104,7 @@ def _criterion(entry: Mapping[str, Any], signals: Mapping[str, Signal]) -> Crite
     if len(senses) != 1:
         raise ParameterError(
             f"[[criteria]] {name!r}: say exactly one of {', '.join(SENSES)}, for instance "
-            "above_healthy = \"5 bar\""
+            'above_healthy = "5 bar"'
         )
     (sense,) = senses
     unit = "1" if sense == "below_share" else signals[str(signal)].unit

@@ -139,8 +139,11 @@ class FaultFinding:
         if not times.size:
             return ""
         ranked = np.where(np.isnan(times), np.inf, times)
-        firsts = [names[k] for k, least in zip(ranked.argmin(0), ranked.min(0), strict=True)
-                  if np.isfinite(least)]  # fmt: skip
+        firsts = [
+            names[k]
+            for k, least in zip(ranked.argmin(0), ranked.min(0), strict=True)
+            if np.isfinite(least)
+        ]
         return Counter(firsts).most_common(1)[0][0] if firsts else ""
 
     @property
@@ -256,7 +259,8 @@ def _harm(groups: Mapping[str, Sequence[Mapping[str, int]]]) -> list[str]:
     return [
         f"{', '.join(dict.fromkeys(name for counts in worse for name in counts))} in {len(worse)} "
         f"of {len(each)} {kind} faults"
-        for kind, each in groups.items() if (worse := [counts for counts in each if counts])
+        for kind, each in groups.items()
+        if (worse := [counts for counts in each if counts])
     ]
 
 

@@ -55,8 +55,10 @@ def judge_healthy(plan: CampaignPlan, traces: Traces) -> Healthy:
         limit = threshold(lasted[: plan.tuning].max(axis=1), plan.false_alarms)
         thresholds[residual.name] = limit
         judged = lasted[plan.tuning :]
-        each = [~np.isnan(detected(judged, _scaled(limit, factor), traces.time, start))
-                for factor in FACTORS]  # fmt: skip
+        each = [
+            ~np.isnan(detected(judged, _scaled(limit, factor), traces.time, start))
+            for factor in FACTORS
+        ]
         alarms[residual.name] = [int(alarm.sum()) for alarm in each]
         alarmed |= each[FACTORS.index(1.0)]
     return Healthy(traces, thresholds, alarms, int(alarmed.sum()))
@@ -94,10 +96,12 @@ def _reached(
 ) -> dict[str, list[Any]]:
     """Return how long after its onset a fault has done too much [s], by criterion."""
     return {
-        c.name: _plain(c.reached(traces.signals[c.signal], beside.signals[c.signal], traces.time,
-                                 onsets) - onsets)
+        c.name: _plain(
+            c.reached(traces.signals[c.signal], beside.signals[c.signal], traces.time, onsets)
+            - onsets
+        )
         for c in plan.criteria
-    }  # fmt: skip
+    }
 
 
 def _extremes(
@@ -109,8 +113,11 @@ def _extremes(
     for name in dict.fromkeys(c.signal for c in plan.criteria):
         off = np.where(later, traces.signals[name] - beside.signals[name], 0.0)
         tail = max(off.shape[1] // 20, 1)
-        extremes[name] = [_plain(off.min(axis=1)), _plain(off.max(axis=1)),
-                          _plain(off[:, -tail:].mean(axis=1))]  # fmt: skip
+        extremes[name] = [
+            _plain(off.min(axis=1)),
+            _plain(off.max(axis=1)),
+            _plain(off[:, -tail:].mean(axis=1)),
+        ]
     return extremes
 
 

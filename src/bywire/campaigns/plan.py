@@ -216,24 +216,31 @@ class CampaignPlan:
     def identity(self) -> Mapping[str, Any]:
         """All that the figures of its runs depend on."""
         bench, reaction = self.bench, self.reaction
-        return as_json({
-            "version": __version__,
-            "computed": computation(bench, beside=self._functions),
-            "experiment": bench.experiment,
-            "parameters": bench.par.flat(),
-            "options": bench.chosen_options.flat(),
-            "stimulus": str(dict(bench.stimulus)),
-            "step": bench.step, "record": bench.record, "noise": bench.seed,
-            "varied": {v.name: [v.distribution.text, v.together] for v in self.varied},
-            "correlation": {" and ".join(pair): r for pair, r in self.correlations.items()},
-            "faults": [[each.name, each.value, each.is_present] for each in self.faults],
-            "onsets": self.onsets,
-            "criteria": [repr(each) for each in self.criteria],
-            "residuals": [each.name for each in self.residuals],
-            "healthy": self.healthy, "false_alarms": self.false_alarms, "seed": self.seed,
-            "reaction": None if reaction is None else [
-                reaction.failing.name, reaction.failing.value, reaction.delay],
-        })  # fmt: skip
+        return as_json(
+            {
+                "version": __version__,
+                "computed": computation(bench, beside=self._functions),
+                "experiment": bench.experiment,
+                "parameters": bench.par.flat(),
+                "options": bench.chosen_options.flat(),
+                "stimulus": str(dict(bench.stimulus)),
+                "step": bench.step,
+                "record": bench.record,
+                "noise": bench.seed,
+                "varied": {v.name: [v.distribution.text, v.together] for v in self.varied},
+                "correlation": {" and ".join(pair): r for pair, r in self.correlations.items()},
+                "faults": [[each.name, each.value, each.is_present] for each in self.faults],
+                "onsets": self.onsets,
+                "criteria": [repr(each) for each in self.criteria],
+                "residuals": [each.name for each in self.residuals],
+                "healthy": self.healthy,
+                "false_alarms": self.false_alarms,
+                "seed": self.seed,
+                "reaction": None
+                if reaction is None
+                else [reaction.failing.name, reaction.failing.value, reaction.delay],
+            }
+        )
 
 
 def evenly(first: float, spread: float, count: int) -> tuple[float, ...]:

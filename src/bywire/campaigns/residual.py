@@ -61,8 +61,7 @@ class Residual:
         return least_of_the_last(self.compute(signals, par, dt), round(self.hold / dt) + 1)
 
 
-RESIDUALS = Kind("residual", ("residuals",), instances(Residual),
-                 declared="a Residual")  # fmt: skip
+RESIDUALS = Kind("residual", ("residuals",), instances(Residual), declared="a Residual")
 """the residuals of every brake"""
 
 
@@ -78,17 +77,24 @@ def residuals_of(model: Any) -> dict[str, Residual]:
         for each in residuals_of(sub.assembly).values():
             name = f"{sub.path}.{each.name}"
             known[name] = replace(
-                each, name=name, summary=f"{sub.label}: {each.summary}", assembly=model.name,
+                each,
+                name=name,
+                summary=f"{sub.label}: {each.summary}",
+                assembly=model.name,
                 signals=tuple(map(sub.named, each.signals)),
                 compute=partial(_within, sub, each.signals, each.compute),
-            )  # fmt: skip
+            )
     return known
 
 
 def _within(
-    sub: Any, names: tuple[str, ...], compute: Callable[[Mapping[str, Array], Any, float], Array],
-    signals: Mapping[str, Array], par: Any, dt: float,
-) -> Array:  # fmt: skip
+    sub: Any,
+    names: tuple[str, ...],
+    compute: Callable[[Mapping[str, Array], Any, float], Array],
+    signals: Mapping[str, Array],
+    par: Any,
+    dt: float,
+) -> Array:
     own = {name: signals[sub.named(name)] for name in names}
     return compute(own, sub.parameters(par), dt)
 
@@ -103,8 +109,9 @@ def missed_ticks(task: str, assembly: str, period: float) -> Residual:
     def count(signals: Mapping[str, Array], par: Any, dt: float) -> Array:
         return mean_of_the_last(signals[signal], max(round(5.0 * period / dt), 1))
 
-    return Residual(f"watchdog.{task}", f"missed ticks of task {task}", assembly, "1",
-                    (signal,), count)  # fmt: skip
+    return Residual(
+        f"watchdog.{task}", f"missed ticks of task {task}", assembly, "1", (signal,), count
+    )
 
 
 def threshold(largest: Array, share: float) -> float:

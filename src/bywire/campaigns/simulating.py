@@ -69,9 +69,12 @@ def healthy_traces(plan: CampaignPlan) -> Traces:
 
 
 def faulty_traces(
-    plan: CampaignPlan, failing: Failing, onsets: Sequence[float], samples: Sequence[int],
+    plan: CampaignPlan,
+    failing: Failing,
+    onsets: Sequence[float],
+    samples: Sequence[int],
     reactions: Sequence[float] | None = None,
-) -> Traces:  # fmt: skip
+) -> Traces:
     """Return the signals of runs with a fault.
 
     Parameters
@@ -96,9 +99,7 @@ def faulty_traces(
     return _traces(plan, cases, list(samples))
 
 
-def _case(
-    plan: CampaignPlan, sample: int, faults: Sequence[Injection], is_apart: bool
-) -> Case:
+def _case(plan: CampaignPlan, sample: int, faults: Sequence[Injection], is_apart: bool) -> Case:
     """Return a run of a sample with faults, of the model that most share or of one of its own."""
     taps, tasks = ((), ()) if is_apart else plan.taps
     return injected(plan.case(sample), faults, taps, tasks)
@@ -106,8 +107,10 @@ def _case(
 
 def _traces(plan: CampaignPlan, cases: Sequence[Case], samples: Sequence[int]) -> Traces:
     bench = plan.bench
-    runs = [as_run(case, bench.step, bench.record, (bench.seed + sample, 0))
-            for case, sample in zip(cases, samples, strict=True)]  # fmt: skip
+    runs = [
+        as_run(case, bench.step, bench.record, (bench.seed + sample, 0))
+        for case, sample in zip(cases, samples, strict=True)
+    ]
     computed: list[Trajectory] = []
     for first in range(0, len(runs), LANES):
         computed += _computed(runs[first : first + LANES], plan.signals, bench.engine)
@@ -121,9 +124,7 @@ def _traces(plan: CampaignPlan, cases: Sequence[Case], samples: Sequence[int]) -
     return Traces(time, signals)
 
 
-def _computed(
-    runs: Sequence[Run], signals: Sequence[str], engine: str
-) -> Sequence[Trajectory]:
+def _computed(runs: Sequence[Run], signals: Sequence[str], engine: str) -> Sequence[Trajectory]:
     if len(runs) > 1 and fit_lanes(runs, engine):
         return simulate_group(runs, signals, engine=engine)
     return [simulate(run, signals, engine=engine) for run in runs]

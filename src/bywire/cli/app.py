@@ -78,12 +78,13 @@ def _root(
     system: Annotated[
         list[str] | None,
         typer.Option(
-            "--system", metavar="PATH",
+            "--system",
+            metavar="PATH",
             help="Load a brake of your own, a file or a package; its code is run. "
             "Before or behind the command.",
         ),
     ] = None,
-) -> None:  # fmt: skip
+) -> None:
     if version:
         from bywire.core.version import __version__
 

@@ -67,8 +67,14 @@ def run(
         raise InputError("--animate writes into a folder: give one by --out")
     show(
         lambda progress: run_bench(
-            bench, changes(set_), over=over, faults=fault or (), progress=progress, engine=engine,
-            estimate_error=error_estimate, animate=animate,
+            bench,
+            changes(set_),
+            over=over,
+            faults=fault or (),
+            progress=progress,
+            engine=engine,
+            estimate_error=error_estimate,
+            animate=animate,
         ),
         out,
         json,

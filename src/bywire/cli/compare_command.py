@@ -34,8 +34,12 @@ def compare(
 
     show(
         lambda progress: compare_runs(
-            *runs, overrides=changes(set_), is_full=full, progress=progress,
+            *runs,
+            overrides=changes(set_),
+            is_full=full,
+            progress=progress,
             estimate_error=error_estimate,
         ),
-        out, json,
-    )  # fmt: skip
+        out,
+        json,
+    )

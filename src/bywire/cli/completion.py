@@ -39,8 +39,11 @@ def _texts(things: dict[str, str] | list[str]) -> dict[str, str]:
 def _files(incomplete: str, ending: str) -> Completed:
     """Return folders, and files of an ending, whose paths begin so."""
     paths = sorted(iglob(f"{escape(incomplete)}*"))
-    return [(f"{path}/" if isdir(path) else path, "") for path in paths
-            if isdir(path) or path.endswith(ending)]  # fmt: skip
+    return [
+        (f"{path}/" if isdir(path) else path, "")
+        for path in paths
+        if isdir(path) or path.endswith(ending)
+    ]
 
 
 def changeable(args: list[str], incomplete: str) -> Completed:
@@ -92,6 +95,19 @@ SIZING = names_of("studies")
 LIVES = names_of("lives", ending=".toml")
 CAMPAIGNS = names_of("campaigns", ending=".toml")
 ANYTHING = names_of(
-    "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "elements",
-    "loops", "plants", "studies", "lives", "methods", "stimuli", "campaigns", "residuals", "kpis",
-)  # fmt: skip
+    "brakes",
+    "assemblies",
+    "parameter_sets",
+    "experiments",
+    "generic_experiments",
+    "elements",
+    "loops",
+    "plants",
+    "studies",
+    "lives",
+    "methods",
+    "stimuli",
+    "campaigns",
+    "residuals",
+    "kpis",
+)

@@ -49,12 +49,21 @@ def convert(
     left_out = [] if exclude == "nothing" else _listed(exclude)
     show(
         lambda progress: convert_file(
-            source, target, mapping=map_, signals=_listed(signals), time=time, rate=rate or None,
-            method=method, exclude=left_out if exclude else None, max_gap=max_gap,
-            format=format_, force=force, progress=progress,
+            source,
+            target,
+            mapping=map_,
+            signals=_listed(signals),
+            time=time,
+            rate=rate or None,
+            method=method,
+            exclude=left_out if exclude else None,
+            max_gap=max_gap,
+            format=format_,
+            force=force,
+            progress=progress,
         ),
         as_json=json,
-    )  # fmt: skip
+    )
 
 
 def _listed(text: str) -> list[str]:

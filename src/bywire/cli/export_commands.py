@@ -17,9 +17,10 @@ export_app = typer.Typer(
 
 ExportFolder = Annotated[
     Path,
-    typer.Option("--out", help="Folder of the export.", parser=folder, metavar="PATH",
-                 show_default=False),
-]  # fmt: skip
+    typer.Option(
+        "--out", help="Folder of the export.", parser=folder, metavar="PATH", show_default=False
+    ),
+]
 Precision = Annotated[str, typer.Option(help="Numbers of the C: double, or single.")]
 RunLabel = Annotated[
     str, typer.Option("--case", help="Run of the experiment; needed where there are several.")
@@ -34,16 +35,21 @@ def export_controller_command(
     vectors: Annotated[int, typer.Option(help="Test vectors of each task.")] = 200,
     check: Annotated[
         bool,
-        typer.Option("--check", help="Run it here and on emulated Cortex-M3, M4F and M7, in both "
-                     "precisions; exit status 1 where a bit differs."),
+        typer.Option(
+            "--check",
+            help="Run it here and on emulated Cortex-M3, M4F and M7, in both "
+            "precisions; exit status 1 where a bit differs.",
+        ),
     ] = False,
     dbc: Annotated[
         bool, typer.Option("--dbc", help="Describe its memory for a CAN bus, too.")
     ] = False,
     name: Annotated[
         str,
-        typer.Option(help="What files and symbols begin with, so that several ECUs link into one "
-                     "program.", show_default="the model's name"),
+        typer.Option(
+            help="What files and symbols begin with, so that several ECUs link into one program.",
+            show_default="the model's name",
+        ),
     ] = "",
     set_: BenchChanges = None,
     json: JsonFlag = False,
@@ -54,11 +60,17 @@ def export_controller_command(
 
     show(
         lambda _: export_controller(
-            read(bench, changes(set_)), out, precision=precision, vectors=vectors, check=check,
-            dbc=dbc, name=name,
+            read(bench, changes(set_)),
+            out,
+            precision=precision,
+            vectors=vectors,
+            check=check,
+            dbc=dbc,
+            name=name,
         ),
-        None, json,
-    )  # fmt: skip
+        None,
+        json,
+    )
 
 
 @export_app.command("fmu")
@@ -86,11 +98,19 @@ def export_fmu_command(
 
     show(
         lambda progress: export_fmu(
-            bench, out, changes(set_), part=part, kind=kind, fmi=fmi, case=case,
-            targets=target or (), progress=progress,
+            bench,
+            out,
+            changes(set_),
+            part=part,
+            kind=kind,
+            fmi=fmi,
+            case=case,
+            targets=target or (),
+            progress=progress,
         ),
-        None, json,
-    )  # fmt: skip
+        None,
+        json,
+    )
 
 
 @export_app.command("wasm")

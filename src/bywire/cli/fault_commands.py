@@ -16,13 +16,14 @@ from bywire.core import option_texts as texts
 def faults_command(
     campaign: Annotated[
         str,
-        typer.Argument(help=texts.CAMPAIGN,
-                       show_default=False, autocompletion=completion.CAMPAIGNS),
+        typer.Argument(
+            help=texts.CAMPAIGN, show_default=False, autocompletion=completion.CAMPAIGNS
+        ),
     ],
     set_: BenchChanges = None,
     out: OutFolder = None,
     json: JsonFlag = False,
-) -> None:  # fmt: skip
+) -> None:
     """Let every part fail in a maneuver: what it does, when it is seen, what is covered."""
     from bywire.api.run_faults import run_faults
 

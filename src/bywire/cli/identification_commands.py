@@ -30,30 +30,30 @@ from bywire.core.errors import ParameterError
 _ANY_BENCH = "Methods of any bench"
 TestBench = Annotated[
     Path | None,
-    typer.Option(
-        "--bench", help=texts.TEST_BENCH, rich_help_panel=_ANY_BENCH
-    ),
+    typer.Option("--bench", help=texts.TEST_BENCH, rich_help_panel=_ANY_BENCH),
 ]
 NoisyOutputs = Annotated[
     list[str] | None,
-    typer.Option("--output", metavar="SIGNAL[=COLUMN]", rich_help_panel=_ANY_BENCH,
-                 help=texts.NOISY_OUTPUT),
-]  # fmt: skip
+    typer.Option(
+        "--output", metavar="SIGNAL[=COLUMN]", rich_help_panel=_ANY_BENCH, help=texts.NOISY_OUTPUT
+    ),
+]
 Unknowns = Annotated[
     list[str] | None,
-    typer.Option("--unknown", metavar="NAME[=LOW..HIGH]", rich_help_panel=_ANY_BENCH,
-                 help=texts.UNKNOWN),
-]  # fmt: skip
+    typer.Option(
+        "--unknown", metavar="NAME[=LOW..HIGH]", rich_help_panel=_ANY_BENCH, help=texts.UNKNOWN
+    ),
+]
 Priors = Annotated[
     list[str] | None,
-    typer.Option("--prior", metavar="NAME=VALUE+-DEV", rich_help_panel=_ANY_BENCH,
-                 help=texts.PRIOR),
-]  # fmt: skip
+    typer.Option(
+        "--prior", metavar="NAME=VALUE+-DEV", rich_help_panel=_ANY_BENCH, help=texts.PRIOR
+    ),
+]
 States = Annotated[
     list[str] | None,
-    typer.Option("--estimate-start", metavar="STATE", rich_help_panel=_ANY_BENCH,
-                 help=texts.START),
-]  # fmt: skip
+    typer.Option("--estimate-start", metavar="STATE", rich_help_panel=_ANY_BENCH, help=texts.START),
+]
 Loss = Annotated[
     str,
     typer.Option(rich_help_panel=_ANY_BENCH, help=texts.LOSS),
@@ -67,9 +67,7 @@ Holdout = Annotated[
 def identify(
     method: Annotated[
         str,
-        typer.Argument(
-            help=texts.METHOD, show_default=False, autocompletion=completion.METHODS
-        ),
+        typer.Argument(help=texts.METHOD, show_default=False, autocompletion=completion.METHODS),
     ],
     measurements: Annotated[
         list[Path] | None,
@@ -111,34 +109,57 @@ def identify(
     from bywire.identification.fitting.question import Question
 
     question = Question(
-        bench, changes(input_, "--input"), named(output, "--output"), named(unknown, "--unknown"),
-        changes(prior, "--prior"), start or (), case, holdout, loss,
-    )  # fmt: skip
+        bench,
+        changes(input_, "--input"),
+        named(output, "--output"),
+        named(unknown, "--unknown"),
+        changes(prior, "--prior"),
+        start or (),
+        case,
+        holdout,
+        loss,
+    )
     shared: dict[str, Any] = {
-        "parameters": parameters, "overrides": changes(set_), "question": question,
-        "options": changes(option, "--option"), "seed": seed, "folder": out,
-    }  # fmt: skip
+        "parameters": parameters,
+        "overrides": changes(set_),
+        "question": question,
+        "options": changes(option, "--option"),
+        "seed": seed,
+        "folder": out,
+    }
     if study is None:
         show(
             lambda progress: identify_parameters(
-                method, measurements or [], mapping=map_, time=time, starts=starts or 16,
-                synthetic=synthetic, progress=progress, **shared,
+                method,
+                measurements or [],
+                mapping=map_,
+                time=time,
+                starts=starts or 16,
+                synthetic=synthetic,
+                progress=progress,
+                **shared,
             ),
-            out, json,
-        )  # fmt: skip
+            out,
+            json,
+        )
         return
     _require_no_measurement(method, measurements, synthetic, map_, time or None, holdout)
     count = study
     show(
         lambda progress: trust(method, count, starts=starts or 1, progress=progress, **shared),
-        out, json,
-    )  # fmt: skip
+        out,
+        json,
+    )
 
 
 def _require_no_measurement(
-    method: str, measurements: object, synthetic: int | None, mapping: object, time: object,
+    method: str,
+    measurements: object,
+    synthetic: int | None,
+    mapping: object,
+    time: object,
     holdout: object,
-) -> None:  # fmt: skip
+) -> None:
     """Refuse what a study of simulated experiments cannot use."""
     if measurements or synthetic is not None:
         raise ParameterError(
@@ -181,9 +202,20 @@ def replay(
 
     show(
         lambda progress: replay_measurement(
-            measurement, bench, changes(set_), mapping=map_, inputs=changes(input_, "--input"),
-            outputs=named(output, "--output"), time=time, case=case, tolerances=tolerance or [],
-            segments=segments, track=track or [], progress=progress, estimate_error=error_estimate,
+            measurement,
+            bench,
+            changes(set_),
+            mapping=map_,
+            inputs=changes(input_, "--input"),
+            outputs=named(output, "--output"),
+            time=time,
+            case=case,
+            tolerances=tolerance or [],
+            segments=segments,
+            track=track or [],
+            progress=progress,
+            estimate_error=error_estimate,
         ),
-        out, json,
-    )  # fmt: skip
+        out,
+        json,
+    )

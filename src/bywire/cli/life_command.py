@@ -16,8 +16,7 @@ from bywire.core import option_texts as texts
 def life_command(
     life: Annotated[
         Path,
-        typer.Argument(help=texts.LIFE, show_default=False,
-                       autocompletion=completion.LIVES),
+        typer.Argument(help=texts.LIFE, show_default=False, autocompletion=completion.LIVES),
     ],
     set_: BenchChanges = None,
     check: Annotated[int, typer.Option(help=texts.LIFE_CHECK, min=0)] = 0,
@@ -29,5 +28,6 @@ def life_command(
 
     show(
         lambda progress: project_life(life, changes(set_), check=check, progress=progress),
-        out, json,
-    )  # fmt: skip
+        out,
+        json,
+    )

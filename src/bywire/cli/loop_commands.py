@@ -25,10 +25,11 @@ from bywire.core import option_texts as texts
 LoopOrPlant = Annotated[
     str,
     typer.Argument(
-        help=texts.LOOP_OR_PLANT, show_default=False,
+        help=texts.LOOP_OR_PLANT,
+        show_default=False,
         autocompletion=completion.LOOPS_OR_PLANTS,
     ),
-]  # fmt: skip
+]
 
 
 def linearize_command(
@@ -50,11 +51,20 @@ def linearize_command(
 
     show(
         lambda _: linearize(
-            loop, parameters, at, changes(set_), locus=locus, reduce=reduce, friction=friction,
-            speed=speed, dither=dither, side=side,
+            loop,
+            parameters,
+            at,
+            changes(set_),
+            locus=locus,
+            reduce=reduce,
+            friction=friction,
+            speed=speed,
+            dither=dither,
+            side=side,
         ),
-        out, json,
-    )  # fmt: skip
+        out,
+        json,
+    )
 
 
 def frequency_response_command(
@@ -76,12 +86,21 @@ def frequency_response_command(
 
     show(
         lambda progress: frequency_response(
-            loop, parameters, at, changes(set_), frequencies=frequencies, amplitudes=amplitudes,
-            excitation=excitation, over=over, progress=progress, estimate_error=error_estimate,
+            loop,
+            parameters,
+            at,
+            changes(set_),
+            frequencies=frequencies,
+            amplitudes=amplitudes,
+            excitation=excitation,
+            over=over,
+            progress=progress,
+            estimate_error=error_estimate,
             side=side,
         ),
-        out, json,
-    )  # fmt: skip
+        out,
+        json,
+    )
 
 
 def agreement_command(
@@ -100,11 +119,18 @@ def agreement_command(
 
     show(
         lambda progress: agreement(
-            loop, parameters, at, changes(set_), frequencies=frequencies, amplitudes=amplitudes,
-            progress=progress, side=side,
+            loop,
+            parameters,
+            at,
+            changes(set_),
+            frequencies=frequencies,
+            amplitudes=amplitudes,
+            progress=progress,
+            side=side,
         ),
-        out, json,
-    )  # fmt: skip
+        out,
+        json,
+    )
 
 
 def margins_command(

@@ -26,27 +26,29 @@ OutFolder = Annotated[
 BenchFile = Annotated[
     Path,
     typer.Argument(
-        help="Bench file (TOML), or an experiment.", metavar="BENCH", show_default=False,
+        help="Bench file (TOML), or an experiment.",
+        metavar="BENCH",
+        show_default=False,
         autocompletion=completion.BENCHES,
     ),
-]  # fmt: skip
+]
 LoopName = Annotated[
     str,
-    typer.Argument(
-        help=texts.LOOP, show_default=False, autocompletion=completion.LOOPS
-    ),
+    typer.Argument(help=texts.LOOP, show_default=False, autocompletion=completion.LOOPS),
 ]
 Parameters = Annotated[str, typer.Option(help=texts.PARAMETERS, autocompletion=completion.SETS)]
 At = Annotated[str, typer.Option("--at", help=texts.AT)]
 Changes = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help=texts.CHANGES,
-                 autocompletion=completion.changeable),
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help=texts.CHANGES, autocompletion=completion.changeable
+    ),
 ]
 BenchChanges = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help=texts.BENCH_CHANGES,
-                 autocompletion=completion.changeable),
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help=texts.BENCH_CHANGES, autocompletion=completion.changeable
+    ),
 ]
 Side = Annotated[str, typer.Option("--side", help=texts.SIDE)]
 ErrorEstimate = Annotated[bool, typer.Option(help=texts.ERROR_ESTIMATE)]

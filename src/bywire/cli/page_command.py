@@ -19,8 +19,10 @@ def page_command(
     ],
     vary: Annotated[
         list[str] | None,
-        typer.Option(help="Parameter that stands first in the page; may be given several times.",
-                     autocompletion=varied),
+        typer.Option(
+            help="Parameter that stands first in the page; may be given several times.",
+            autocompletion=varied,
+        ),
     ] = None,
     case: Annotated[
         str, typer.Option("--case", help="Run of the experiment; needed where there are several.")

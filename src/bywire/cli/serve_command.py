@@ -17,17 +17,20 @@ def serve_command(
     subject: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[BENCH|FOLDER]", show_default=False, autocompletion=completion.BENCHES,
+            metavar="[BENCH|FOLDER]",
+            show_default=False,
+            autocompletion=completion.BENCHES,
             help="Bench file, experiment or folder; the current folder by default.",
         ),
     ] = None,
     port: Annotated[int, typer.Option(help="Port; 0 for any that is free.")] = PORT,
     folder: Annotated[
         Path | None,
-        typer.Option(help="What is served; by default the folder of the bench file.",
-                     show_default=False),
+        typer.Option(
+            help="What is served; by default the folder of the bench file.", show_default=False
+        ),
     ] = None,
-) -> None:  # fmt: skip
+) -> None:
     """Show benches, results and studies in a browser of this machine, and compute what they ask."""
     from bywire.server.serving import serve
 

@@ -23,9 +23,11 @@ if TYPE_CHECKING:
 
 
 def show(
-    compute: Callable[[Progress], Answer], out: Path | None = None, as_json: bool = False,
+    compute: Callable[[Progress], Answer],
+    out: Path | None = None,
+    as_json: bool = False,
     advice: str = ANOTHER,
-) -> None:  # fmt: skip
+) -> None:
     """Compute an answer and show it; a full disk must not cost the numbers too.
 
     Parameters

@@ -26,15 +26,12 @@ from bywire.core import option_texts as texts
 def study_command(
     name: Annotated[
         str,
-        typer.Argument(help=texts.SIZING, show_default=False,
-                       autocompletion=completion.SIZING),
+        typer.Argument(help=texts.SIZING, show_default=False, autocompletion=completion.SIZING),
     ],
     parameters: Parameters = "",
     set_: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help=texts.SIZING_CHANGES
-        ),
+        typer.Option("--set", metavar="KEY=VALUE", help=texts.SIZING_CHANGES),
     ] = None,
     out: OutFolder = None,
     json: JsonFlag = False,
@@ -78,8 +75,10 @@ def design_command(
     ] = False,
     vary: Annotated[
         str,
-        typer.Option(help="Study file: gains for models drawn as its cases are, judged by others.",
-                     metavar="FILE"),
+        typer.Option(
+            help="Study file: gains for models drawn as its cases are, judged by others.",
+            metavar="FILE",
+        ),
     ] = "",
     drawn: Annotated[int, typer.Option(help="Models drawn for the gains.")] = 64,
     probability: Annotated[
@@ -89,16 +88,30 @@ def design_command(
     side: Side = "",
     out: OutFolder = None,
     json: JsonFlag = False,
-) -> None:  # fmt: skip
+) -> None:
     """Choose a loop's gains from requirements; exit status 1 when they cannot be met."""
     from bywire.api.design import design
 
     show(
         lambda progress: design(
-            loop, parameters, at, changes(set_), require=require or (), requirements=requirements,
-            over=over or (), amplitudes=amplitudes, schedule=schedule, linear_only=linear_only,
-            free_derivative=free_derivative, vary=vary, drawn=drawn, probability=probability,
-            seed=seed, progress=progress, side=side,
+            loop,
+            parameters,
+            at,
+            changes(set_),
+            require=require or (),
+            requirements=requirements,
+            over=over or (),
+            amplitudes=amplitudes,
+            schedule=schedule,
+            linear_only=linear_only,
+            free_derivative=free_derivative,
+            vary=vary,
+            drawn=drawn,
+            probability=probability,
+            seed=seed,
+            progress=progress,
+            side=side,
         ),
-        out, json,
-    )  # fmt: skip
+        out,
+        json,
+    )

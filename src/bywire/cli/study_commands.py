@@ -47,9 +47,10 @@ def _study_folder(folder: Path) -> Path:
 
 StudyFolder = Annotated[
     Path,
-    typer.Argument(help="Folder of the study.", metavar="FOLDER", show_default=False,
-                   callback=_study_folder),
-]  # fmt: skip
+    typer.Argument(
+        help="Folder of the study.", metavar="FOLDER", show_default=False, callback=_study_folder
+    ),
+]
 Cases = Annotated[int | None, typer.Option(help=texts.STUDY_CASES)]
 Workers = Annotated[
     int | None, typer.Option(help="Processes; one a core by default, where it is worth it.")
@@ -67,8 +68,12 @@ def study_run_command(
     ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="Folder of the study; by default named as the file.",
-                     parser=folder, metavar="PATH"),
+        typer.Option(
+            "--out",
+            help="Folder of the study; by default named as the file.",
+            parser=folder,
+            metavar="PATH",
+        ),
     ] = None,
     overrides: BenchChanges = None,
     cases: Cases = None,
@@ -86,18 +91,28 @@ def study_run_command(
     place = out if out is not None else Path(study.stem)
     show(
         lambda progress: run_study(
-            study, place, changes(overrides), cases=cases, workers=workers, cluster=cluster,
-            engine=engine, progress=progress,
+            study,
+            place,
+            changes(overrides),
+            cases=cases,
+            workers=workers,
+            cluster=cluster,
+            engine=engine,
+            progress=progress,
         ),
-        place, json,
-    )  # fmt: skip
+        place,
+        json,
+    )
 
 
 @study_app.command("resume")
 def resume_command(
-    place: StudyFolder, workers: Workers = None, cluster: ClusterAddress = "",
-    engine: EngineName = "auto", json: JsonFlag = False,
-) -> None:  # fmt: skip
+    place: StudyFolder,
+    workers: Workers = None,
+    cluster: ClusterAddress = "",
+    engine: EngineName = "auto",
+    json: JsonFlag = False,
+) -> None:
     """Go on with a study that was interrupted or killed."""
     _resumed(place, None, workers, cluster, engine, json)
 
@@ -140,11 +155,12 @@ def surrogate_command(
     ] = None,
     at: Annotated[
         list[str] | None,
-        typer.Option("--at", help="Tell the figures here, e.g. motor.R_m=0.4ohm.",
-                     metavar="KEY=VALUE"),
+        typer.Option(
+            "--at", help="Tell the figures here, e.g. motor.R_m=0.4ohm.", metavar="KEY=VALUE"
+        ),
     ] = None,
     json: JsonFlag = False,
-) -> None:  # fmt: skip
+) -> None:
     """Tell key figures between the cases of a study by polynomials, with their error."""
     from bywire.api.study_surrogate import study_surrogates
 
@@ -158,8 +174,14 @@ def _resumed(
 
     show(
         lambda progress: resume_study(
-            place, cases=cases, workers=workers, cluster=cluster, engine=engine,
+            place,
+            cases=cases,
+            workers=workers,
+            cluster=cluster,
+            engine=engine,
             progress=progress,
         ),
-        place, as_json, _WRITABLE,
-    )  # fmt: skip
+        place,
+        as_json,
+        _WRITABLE,
+    )

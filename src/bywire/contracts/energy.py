@@ -54,9 +54,10 @@ def has_rates_of_its_states(module: ModuleType) -> Iterator[Evidence]:
         for (name, number), (top, bottom) in zip(states.items(), rates, strict=True):
             rate, unit = top / bottom, f"({number.unit})/s"
             yield Evidence(
-                fits(rate, unit), f"rate of {name} is {rate}, wanted {unit}{described(choices)}",
+                fits(rate, unit),
+                f"rate of {name} is {rate}, wanted {unit}{described(choices)}",
                 place=place_of(balance),
-            )  # fmt: skip
+            )
 
 
 def keeps_energy(module: ModuleType) -> Iterator[Evidence]:

@@ -62,9 +62,7 @@ def is_in_SI(function: Function) -> Iterator[Evidence]:
     for argument, annotation in (*arguments.items(), ("result", returns)):
         for name, number in numbers(argument, annotation).items():
             factor = Dimensioned(1.0, number.unit).value
-            yield measured(
-                abs(factor - 1.0), PREFIX, f"{name} [{number.unit}] is {factor:g} of SI"
-            )
+            yield measured(abs(factor - 1.0), PREFIX, f"{name} [{number.unit}] is {factor:g} of SI")
 
 
 def has_agreeing_back_ends(function: Function) -> Iterator[Evidence]:

@@ -73,12 +73,18 @@ class Rehearsal:
             if experiment.beside is not None:
                 signals = signals_of(case.model.Stimulus) | signals
             recording = xr.Dataset(
-                {name: ("time", np.zeros(_SAMPLES), {"units": signal.unit})
-                 for name, signal in signals.items()},
+                {
+                    name: ("time", np.zeros(_SAMPLES), {"units": signal.unit})
+                    for name, signal in signals.items()
+                },
                 coords={"time": ("time", time, {"units": "s"})},
-                attrs={"parameters": case.par.model_dump_json(), "case": case.label,
-                       "model": case.model.name, "experiment": experiment.name},
-            )  # fmt: skip
+                attrs={
+                    "parameters": case.par.model_dump_json(),
+                    "case": case.label,
+                    "model": case.model.name,
+                    "experiment": experiment.name,
+                },
+            )
             finish = experiment.finish
             recordings[case.label] = recording if finish is None else finish(recording, options)
         return recordings

@@ -65,9 +65,15 @@ class Demand:
             return Finding(self.subject, self.name, "not checked", str(reason), place)
         outcome: Outcome = "holds" if evidence.holds else "broken"
         return Finding(
-            self.subject, self.name, outcome, evidence.text, evidence.place or place,
-            evidence.figure, evidence.limit, evidence.is_error,
-        )  # fmt: skip
+            self.subject,
+            self.name,
+            outcome,
+            evidence.text,
+            evidence.place or place,
+            evidence.figure,
+            evidence.limit,
+            evidence.is_error,
+        )
 
 
 def one_by_cause(findings: Iterable[Finding]) -> Iterator[Finding]:

@@ -132,19 +132,30 @@ class Drive:
             return np.asarray(rows[np.minimum(row, len(rows) - 1)])
 
         return Run(
-            Probe(at.model, held=True, frictions=frictions), at.par, at.state,
-            at.memory, prescribed, (len(rows) - 1) * period,
-            step or at.step, period,
-        )  # fmt: skip
+            Probe(at.model, held=True, frictions=frictions),
+            at.par,
+            at.state,
+            at.memory,
+            prescribed,
+            (len(rows) - 1) * period,
+            step or at.step,
+            period,
+        )
 
 
 def drive_of(start: Start, share: float) -> Drive:
     """Return what the controllers do in a run from a start, see `Start.run`."""
     run = start.run(share)
     probe = Run(
-        Probe(start.model, held=False), run.par, run.state, run.memory, run.stimulus,
-        run.duration, run.step, run.record,
-    )  # fmt: skip
+        Probe(start.model, held=False),
+        run.par,
+        run.state,
+        run.memory,
+        run.stimulus,
+        run.duration,
+        run.step,
+        run.record,
+    )
     trajectory = simulate(probe)
     memory = trajectory.values[:, len(start.state) :]
     return Drive(start, np.asarray(memory - memory[0]))

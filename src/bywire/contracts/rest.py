@@ -143,5 +143,3 @@ def _forces(trial: Trial, column: Any) -> tuple[float, ...]:
     """Return the contact forces at a state."""
     forces = contact_forces(trial.model, trial.start.par, column)
     return tuple(float(f) for f in np.asarray(ca.evalf(forces)).ravel())
-
-

@@ -98,4 +98,3 @@ def _strongest(trial: Trial, run: Run) -> list[str]:
 def _moved(run: Run, name: str, share: float) -> float:
     value = run.par.leaves()[name]
     return value + share * (abs(value) or leaf_fields(type(run.par))[name].unit.nominal)
-

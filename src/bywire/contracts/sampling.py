@@ -186,7 +186,9 @@ def carrying(arguments: Arguments, values: Mapping[str, Any]) -> Arguments:
 
 
 def described(
-    choices: Choices, structure: Arguments | None = None, values: Sequence[float] | Array = (),
+    choices: Choices,
+    structure: Arguments | None = None,
+    values: Sequence[float] | Array = (),
     is_broken: bool = True,
 ) -> str:
     """Return with which choices and values a contract was tried, as messages end; with units.

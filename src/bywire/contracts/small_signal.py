@@ -103,9 +103,14 @@ def _linear(trial: Trial) -> tuple[LinearModel, bool]:
     for friction in choices:
         try:
             linear = linearize(
-                trial.model, start.par, start.state, start.memory,
-                inputs=start.memory._fields, outputs=(), friction=friction,
-            )  # fmt: skip
+                trial.model,
+                start.par,
+                start.state,
+                start.memory,
+                inputs=start.memory._fields,
+                outputs=(),
+                friction=friction,
+            )
         except CornerError:
             raise
         except InputError as error:

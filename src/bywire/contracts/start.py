@@ -82,9 +82,15 @@ class Start:
             return np.asarray(np.clip(base + share * wave[:, None] * reach, low, high))
 
         return Run(
-            self.model, self.par, self.state, self.memory, stimulus, duration, self.step,
+            self.model,
+            self.par,
+            self.state,
+            self.memory,
+            stimulus,
+            duration,
+            self.step,
             record or self.period,
-        )  # fmt: skip
+        )
 
 
 def start_of(model: Model, par: ParameterSet) -> Start:
@@ -135,9 +141,13 @@ def _points(model: Model, par: ParameterSet) -> Iterator[Start]:
                 continue
             if type(point.model) is type(model):
                 yield Start(
-                    point.model, point.par, point.state, point.memory, point.stimulus,
+                    point.model,
+                    point.par,
+                    point.state,
+                    point.memory,
+                    point.stimulus,
                     f"the operating point of the loop {loop.name}",
-                )  # fmt: skip
+                )
 
 
 def _cases(model: Model, par: ParameterSet, module: str = "") -> Iterator[Start]:
@@ -153,8 +163,11 @@ def _cases(model: Model, par: ParameterSet, module: str = "") -> Iterator[Start]
             if type(case.model) is type(model):
                 at = {n: float(v[0]) for n, v in case.stimulus(np.zeros(1)).items()}
                 yield Start(
-                    case.model, case.par, case.state, case.memory,
+                    case.model,
+                    case.par,
+                    case.state,
+                    case.memory,
                     zeros(case.model.Stimulus)._replace(**at),
                     f"the start of the experiment {experiment.name}",
-                )  # fmt: skip
+                )
                 break

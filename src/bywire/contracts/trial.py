@@ -78,8 +78,9 @@ class Trial:
         ticks = prepare(self.model, self.start.par).program.ticks
         return any(
             tick.instruction_id(k) == ca.OP_FLOOR
-            for tick in ticks for k in range(tick.n_instructions())
-        )  # fmt: skip
+            for tick in ticks
+            for k in range(tick.n_instructions())
+        )
 
     def large_run(self, frictions: bool) -> Run:
         """Return a large run from the start, with states and memory recorded.

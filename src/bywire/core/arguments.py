@@ -116,9 +116,10 @@ def _signature(function: Callable[..., Any]) -> tuple[list[str], dict[str, list[
     """Return the names of positional arguments, and the kinds of each that can be checked."""
     parameters = inspect.signature(function).parameters
     positional = [
-        p.name for p in parameters.values()
+        p.name
+        for p in parameters.values()
         if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
-    ]  # fmt: skip
+    ]
     known = getattr(inspect.unwrap(function), "__globals__", {})
     kinds = {
         name: [_kind(part.strip(), known) for part in _parts(str(p.annotation))]
@@ -127,8 +128,9 @@ def _signature(function: Callable[..., Any]) -> tuple[list[str], dict[str, list[
     }
     return positional, {
         name: [kind for kind in each if kind is not None]
-        for name, each in kinds.items() if None not in each
-    }  # fmt: skip
+        for name, each in kinds.items()
+        if None not in each
+    }
 
 
 def _parts(annotation: str) -> list[str]:

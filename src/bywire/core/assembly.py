@@ -178,9 +178,12 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
                 value = _wired(w, part).call(function)
                 values[name] = values[name] + value if name in values else value
         for sub, inner, here in _held(w):
-            values |= sub.outside("Flow", inner.powers(
-                here.x, here.xe, here.rate, here.memory, here.par, here.forces, here.reaction
-            ))  # fmt: skip
+            values |= sub.outside(
+                "Flow",
+                inner.powers(
+                    here.x, here.xe, here.rate, here.memory, here.par, here.forces, here.reaction
+                ),
+            )
         values |= known(self, "power", self.power(w), self.Flow._fields)
         return filled(self, "power", self.Flow, values)
 
@@ -204,9 +207,10 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         if "E_stored" in self.Output._fields:
             values["E_stored"] = self.stored(w)
         for sub, inner, here in _held(w):
-            values |= sub.outside("Output", inner.output(
-                here.x, here.memory, here.par, here.forces, here.reaction, here.flow
-            ))  # fmt: skip
+            values |= sub.outside(
+                "Output",
+                inner.output(here.x, here.memory, here.par, here.forces, here.reaction, here.flow),
+            )
         values |= known(self, "record", self.record(w), self.Output._fields)
         return filled(self, "record", self.Output, values)
 

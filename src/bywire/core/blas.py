@@ -24,8 +24,9 @@ _DEFAULTS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 # Libraries that start threads as soon as they are loaded, which bywire never uses: numexpr beside
 # pandas, and the allocator of pyarrow. A process with threads cannot be copied.
 _IDLE_THREADS = {
-    "NUMEXPR_NUM_THREADS": "1", "JE_ARROW_MALLOC_CONF": "background_thread:false",
-}  # fmt: skip
+    "NUMEXPR_NUM_THREADS": "1",
+    "JE_ARROW_MALLOC_CONF": "background_thread:false",
+}
 VARIABLES = (*_DEFAULTS, "OMP_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """environment variables by which a user chooses"""
 

@@ -61,8 +61,12 @@ class Brake:
         return importlib.import_module(self.module).__file__ or self.module
 
     def _repr_html_(self) -> str:
-        rows = {"brake": self.name, "what it is": self.summary, "declared in": self.file,
-                "what it brings": f"bywire.overview(), or bywire.check({self.name!r})"}  # fmt: skip
+        rows = {
+            "brake": self.name,
+            "what it is": self.summary,
+            "declared in": self.file,
+            "what it brings": f"bywire.overview(), or bywire.check({self.name!r})",
+        }
         cells = "".join(f"<tr><th>{k}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
         return f"<table>{cells}</table>"
 

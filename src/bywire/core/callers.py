@@ -11,11 +11,21 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _ARGUMENTS = {
-    "set": "overrides", "input": "inputs", "output": "outputs", "unknown": "unknowns",
-    "prior": "priors", "estimate-start": "states", "option": "options", "map": "mapping",
-    "tolerance": "tolerances", "out": "folder", "force": "force=True", "dither": "dither=True",
-    "schedule": "schedule=True", "study": "bywire.trust, with count",
-}  # fmt: skip
+    "set": "overrides",
+    "input": "inputs",
+    "output": "outputs",
+    "unknown": "unknowns",
+    "prior": "priors",
+    "estimate-start": "states",
+    "option": "options",
+    "map": "mapping",
+    "tolerance": "tolerances",
+    "out": "folder",
+    "force": "force=True",
+    "dither": "dither=True",
+    "schedule": "schedule=True",
+    "study": "bywire.trust, with count",
+}
 """flags whose arguments are called otherwise"""
 _WORDS = re.compile(
     r"(?P<command>\bbywire [a-z-]+(?: [^\s',;:)]+)*)"  # a command that is quoted stays one

@@ -88,10 +88,11 @@ def safe_start() -> Iterator[None]:
     ``python -c``. Workers then take the path of this process.
     """
     changes = {
-        SAFE_PATH: "1", "PYTHONPATH": os.pathsep.join(import_path()),
+        SAFE_PATH: "1",
+        "PYTHONPATH": os.pathsep.join(import_path()),
         # The tracker complains on standard error of what a killed command could not tidy up.
         _WARNINGS: ",".join(filter(None, (os.environ.get(_WARNINGS), _SILENT_TRACKER))),
-    }  # fmt: skip
+    }
     before = {name: os.environ.get(name) for name in changes}
     os.environ.update(changes)
     try:

@@ -129,13 +129,15 @@ class _Trace:
         self._kept: list[Traced] = []  # a mark is known by its object, which must live on
         self.owners = {
             part.state_name(state): Node("part", part.name)
-            for part in model.parts.values() if part.has("State")
+            for part in model.parts.values()
+            if part.has("State")
             for state in part.element.State._fields
-        }  # fmt: skip
+        }
         self.owners |= {
             state: Node("part", name)
-            for name, sub in model.subs.items() for state in sub.signals("State")
-        }  # fmt: skip
+            for name, sub in model.subs.items()
+            for state in sub.signals("State")
+        }
         each: list[Any] = [*model.parts.values(), *model.subs.values()]
         paths = [one.path for one in each]
         self._paths = {
@@ -147,10 +149,14 @@ class _Trace:
         self.fields: dict[str, Node] = {}
         ticks = list(self._ticks(par))
         self.ticks = {
-            node: read | {k: self.fields[k] for k in model.Memory._fields
-                          if k in held and self.fields.get(k, node) != node}
+            node: read
+            | {
+                k: self.fields[k]
+                for k in model.Memory._fields
+                if k in held and self.fields.get(k, node) != node
+            }
             for node, read, held in ticks
-        }  # fmt: skip
+        }
         counts = {part.name: sum(part.group_sizes(par)) for part in model.parts.values()}
         counts |= {
             name: contact_count(sub.assembly, sub.parameters(par))
@@ -165,8 +171,9 @@ class _Trace:
         inputs = {name: vars(getattr(w, name))["_input"] for name in model.parts}
         self.inputs = {
             name: tuple(self._marks[id(each)][1] for each in value)
-            for name, value in inputs.items() if value is not None
-        }  # fmt: skip
+            for name, value in inputs.items()
+            if value is not None
+        }
         self.frictions = model.friction(w)
         self.ports = {
             name: {
@@ -182,8 +189,9 @@ class _Trace:
         own = dict(zip(sub.signals("Memory"), sub.assembly.Memory._fields, strict=True))
         raw = tuple(value for at, value in self._marks.values() if at == node)
         leaves = {str(each).removeprefix("m.") for each in names_in(raw) if str(each)[:2] == "m."}
-        return {own[each]: self.fields[each]
-                for each in own if each in leaves and each in self.fields}  # fmt: skip
+        return {
+            own[each]: self.fields[each] for each in own if each in leaves and each in self.fields
+        }
 
     def _mark(self, name: str, value: Any) -> Any:
         """Return a value that is known by the wire or input that carries it."""
@@ -213,9 +221,10 @@ class _Trace:
             node = Node("task", task.name)
             after = task.tick(self._state, self._memory, stimulus, self._par)
             changed = {
-                name: value for name, value in after._asdict().items()
+                name: value
+                for name, value in after._asdict().items()
                 if value is not getattr(self._memory, name)
-            }  # fmt: skip
+            }
             self.fields |= dict.fromkeys(changed, node)
             leaves = {str(each) for each in names_in(tuple(changed.values()))}
             read = {name: self.owners[name] for name in self.model.State._fields if name in leaves}
@@ -255,7 +264,7 @@ class _Trace:
         labels |= {
             Node("part", name): part.kind.replace("_", " ")
             for name, part in self.model.parts.items()
-        }  # fmt: skip
+        }
         labels |= {
             Node("part", name): str(sub.assembly.name).replace("-", " ")
             for name, sub in self.model.subs.items()

@@ -94,10 +94,13 @@ def processes(
     """
     with nullcontext() if is_copied else safe_start():
         pool = ProcessPoolExecutor(
-            count, get_context("fork") if is_copied else _Anew(), initializer=_begin,
-            initargs=(prepare, *arguments) if is_copied else
-            (_prepare, bytes(ForkingPickler.dumps((prepare, arguments)))),
-        )  # fmt: skip
+            count,
+            get_context("fork") if is_copied else _Anew(),
+            initializer=_begin,
+            initargs=(prepare, *arguments)
+            if is_copied
+            else (_prepare, bytes(ForkingPickler.dumps((prepare, arguments)))),
+        )
     workers: list[BaseProcess] = []
     is_over = threading.Event()
     watch = threading.Thread(target=_break_off, args=(pool, workers, is_over), daemon=True)

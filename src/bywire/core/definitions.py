@@ -31,9 +31,11 @@ _SCALARS = (str, int, float, complex, bool, bytes, type(None), Enum)
 
 
 def definitions_digest(
-    roots: Iterable[Any], rooms: Collection[str],
-    named: Callable[[str], Iterable[Any]] = lambda _: (), with_equations: bool = False,
-) -> str:  # fmt: skip
+    roots: Iterable[Any],
+    rooms: Collection[str],
+    named: Callable[[str], Iterable[Any]] = lambda _: (),
+    with_equations: bool = False,
+) -> str:
     """Digest of all that some objects compute with.
 
     Parameters
@@ -261,10 +263,11 @@ def _computing(node: ast.AST) -> Iterator[ast.AST]:
         node = waiting.pop()
         yield node
         below = [
-            each for name, value in ast.iter_fields(node)
+            each
+            for name, value in ast.iter_fields(node)
             for each in (value if isinstance(value, list) else [value])
             if isinstance(each, ast.AST) and name not in _FORMLESS and not _is_silent(each)
-        ]  # fmt: skip
+        ]
         waiting.extend(reversed(below))
 
 
@@ -291,9 +294,10 @@ def _form(tree: ast.AST) -> str:
             text.append(repr(value.value))
         elif isinstance(value, ast.AST):
             fields = [
-                [_Sign(f"{name}="), each] for name, each in ast.iter_fields(value)
+                [_Sign(f"{name}="), each]
+                for name, each in ast.iter_fields(value)
                 if name not in _FORMLESS and each is not None and each != []
-            ]  # fmt: skip
+            ]
             waiting.extend(reversed(_row(f"{type(value).__name__}(", fields, ")")))
         else:
             text.append(repr(value))
@@ -349,8 +353,9 @@ class _Source:
     def assignments_of(self, name: str) -> Iterator[ast.stmt]:
         """Yield the statements of the file that say what a name is."""
         for node in self.tree.body:
-            targets = node.targets if isinstance(node, ast.Assign) else [
-                getattr(node, "target", None)]  # fmt: skip
+            targets = (
+                node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+            )
             if any(isinstance(each, ast.Name) and each.id == name for each in targets):
                 yield node
 

@@ -76,12 +76,12 @@ def _turned(x: float, quarter: int) -> float:
     z = r * r
     if n & 1:
         c2, c4, c6, c8, c10, c12, c14, c16 = COSINE
-        y = 1.0 + z * (c2 + z * (c4 + z * (c6 + z * (c8 + z * (
-            c10 + z * (c12 + z * (c14 + z * c16)))))))  # fmt: skip
+        y = 1.0 + z * (
+            c2 + z * (c4 + z * (c6 + z * (c8 + z * (c10 + z * (c12 + z * (c14 + z * c16))))))
+        )
     else:
         s3, s5, s7, s9, s11, s13, s15 = SINE
-        y = r + r * z * (s3 + z * (s5 + z * (s7 + z * (s9 + z * (
-            s11 + z * (s13 + z * s15))))))  # fmt: skip
+        y = r + r * z * (s3 + z * (s5 + z * (s7 + z * (s9 + z * (s11 + z * (s13 + z * s15))))))
     return -y if n & 2 else y
 
 
@@ -105,9 +105,9 @@ def _log_parts(a: float) -> tuple[float, float]:
     z2 = z * z
     half = 0.5 * f * f
     l3, l5, l7, l9, l11, l13, l15, l17, l19, l21 = LOGARITHM
-    p = (l3 + z * l5) + z2 * ((l7 + z * l9)
-        + z2 * ((l11 + z * l13) + z2 * ((l15 + z * l17)
-        + z2 * (l19 + z * l21))))  # fmt: skip
+    p = (l3 + z * l5) + z2 * (
+        (l7 + z * l9) + z2 * ((l11 + z * l13) + z2 * ((l15 + z * l17) + z2 * (l19 + z * l21)))
+    )
     whole = k * LN_2[0]
     high = whole + f
     low = (f - (high - whole)) + (s * (half + z * p) + k * LN_2[1] - half)

@@ -8,8 +8,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _FOR_DEVELOPERS = (
-    DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning,
-)  # fmt: skip
+    DeprecationWarning,
+    PendingDeprecationWarning,
+    ImportWarning,
+    ResourceWarning,
+)
 """what Python hides by default: a user can do nothing about it"""
 
 

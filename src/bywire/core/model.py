@@ -244,8 +244,7 @@ def require_states(model: Any) -> None:
         where = f"{place_of(cls)}: {model.name}: {kind}"
         if not isinstance(names, tuple):
             raise ModelError(
-                f"{where} = {names!r}: a tuple of states is wanted, "
-                f"as ({fields[0]!r},)"
+                f"{where} = {names!r}: a tuple of states is wanted, as ({fields[0]!r},)"
             )
         for name in names:
             if name not in fields:

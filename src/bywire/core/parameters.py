@@ -74,8 +74,11 @@ class ParameterSet(BaseModel):
         given = read(made, tuple(values))
         new = {name: value for name, value in given.items() if type(value) is float}
         chosen = {name: value for name, value in given.items() if type(value) is str}
-        if (len(new) + len(chosen) == len(given)
-            and new.keys() <= numbers.keys() and chosen.keys() <= choices.keys()):  # fmt: skip
+        if (
+            len(new) + len(chosen) == len(given)
+            and new.keys() <= numbers.keys()
+            and chosen.keys() <= choices.keys()
+        ):
             made.__dict__[KNOWN] = {
                 ("numbers", ""): numbers | new,
                 ("choices", ""): choices | chosen if chosen else choices,
@@ -205,7 +208,7 @@ def require_units(cls: type[ParameterSet], prefix: str = "") -> None:
         elif inner in (float, int) and not any(isinstance(m, Unit) for m in info.metadata):
             raise ModelError(
                 f"{place_of(cls)}: {cls.__qualname__}.{name} is a number without a unit: write "
-                f"{name}: Annotated[float, Unit(\"kg\")], \"1\" for a pure number, or a quantity "
+                f'{name}: Annotated[float, Unit("kg")], "1" for a pure number, or a quantity '
                 "of core.quantities"
             )
 
@@ -271,9 +274,10 @@ def _as_given(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> Par
     """Return a set of objects with others at dotted names."""
     fields: dict[str, Any] = {
         name: _as_given(value, f"{prefix}{name}.", values)
-        if isinstance(value, ParameterSet) else values.get(prefix + name, value)
+        if isinstance(value, ParameterSet)
+        else values.get(prefix + name, value)
         for name, value in fields_of(node).items()
-    }  # fmt: skip
+    }
     return _with_objects(type(node).model_construct(**fields))
 
 

@@ -107,9 +107,11 @@ class Kind(Generic[T]):
         files = loaded_files()
         loaded = [brake.module for brake in brakes().values() if brake.file in files]
         error = unknown_name(
-            title, name, [n for kind in kinds for n in kind.all()],
+            title,
+            name,
+            [n for kind in kinds for n in kind.all()],
             first=[n for kind in kinds for module in loaded for n in kind.of(module)],
-        )  # fmt: skip
+        )
         hints = [
             f"the brake {brake.name!r} declares no {title}: that takes {self.declared} in a module "
             f"or folder {' or '.join(self.folders)} of its package, or in its file, see "
@@ -129,8 +131,18 @@ class Kind(Generic[T]):
         stem = name.replace("-", "_")
         if not stem.isidentifier():
             return None
-        homes = [home for home in (self.home, *(f"{brake.module}.{folder}"
-                 for brake in brakes().values() for folder in self.folders)) if home]  # fmt: skip
+        homes = [
+            home
+            for home in (
+                self.home,
+                *(
+                    f"{brake.module}.{folder}"
+                    for brake in brakes().values()
+                    for folder in self.folders
+                ),
+            )
+            if home
+        ]
         files = [f"{home}.{stem}" for home in homes if _is_folder(home) is True]
         files += [home for home in homes if _is_folder(home) is False]
         for file in files:
@@ -269,7 +281,8 @@ def _of_others(kind: Kind[Any], *owners: Brake) -> dict[str, tuple[Any, str, Mod
     """Return what kinds of the same name declare, generally and in some brakes, by name."""
     return {
         thing.name: (thing, "", module)
-        for other in _KINDS if other is not kind and other.name == kind.name
+        for other in _KINDS
+        if other is not kind and other.name == kind.name
         for owner in (None, *owners)
         for thing, module in _declared(other, owner)
     }

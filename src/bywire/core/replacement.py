@@ -95,12 +95,16 @@ def _rules(cls: type[BaseModel]) -> tuple[str, ...] | None:
     known, groups = cls.__pydantic_decorators__, cls.model_fields.values()
     judges = known.model_validators
     does_more = (
-        known.validators or known.field_validators or known.root_validators
-        or cls.__pydantic_custom_init__ or cls.__pydantic_post_init__ or cls.__private_attributes__
+        known.validators
+        or known.field_validators
+        or known.root_validators
+        or cls.__pydantic_custom_init__
+        or cls.__pydantic_post_init__
+        or cls.__private_attributes__
         or any(each.info.mode != "after" for each in judges.values())
         or any(len(inspect.signature(getattr(cls, name)).parameters) != 1 for name in judges)
         or any(each.metadata for each in groups if _is_group(each.annotation))
-    )  # fmt: skip
+    )
     return None if does_more else tuple(judges)
 
 

@@ -130,7 +130,7 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
         if signal is None:
             raise ModelError(
                 f"{place_of(tuple_type)}: {tuple_type.__qualname__}.{name} has no Signal annotation"
-                f": write {name}: Annotated[float, Signal(\"m\", \"what it is\")]"
+                f': write {name}: Annotated[float, Signal("m", "what it is")]'
             )
         signals[name] = signal
     return signals
@@ -185,9 +185,11 @@ def limits_of(tuple_type: type[NamedTuple]) -> dict[str, Limited]:
     """Return what limits the commands among the signals of a NamedTuple class."""
     hints = typing.get_type_hints(tuple_type, include_extras=True)
     return {
-        name: note for name, hint in hints.items()
-        for note in getattr(hint, "__metadata__", ()) if isinstance(note, Limited)
-    }  # fmt: skip
+        name: note
+        for name, hint in hints.items()
+        for note in getattr(hint, "__metadata__", ())
+        if isinstance(note, Limited)
+    }
 
 
 def _number(end: Any) -> float:
@@ -207,8 +209,13 @@ def without_noise(stimuli: Iterable[str]) -> list[str]:
 
 def places_of(model: Any) -> dict[str, type[NamedTuple]]:
     """Return the signal tuples of a model by what they are in it."""
-    return {"recording": model.Output, "state": model.State, "memory": model.Memory,
-            "stimulus": model.Stimulus, "integral": model.Flow}  # fmt: skip
+    return {
+        "recording": model.Output,
+        "state": model.State,
+        "memory": model.Memory,
+        "stimulus": model.Stimulus,
+        "integral": model.Flow,
+    }
 
 
 def merged_signals(

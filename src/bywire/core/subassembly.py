@@ -151,9 +151,11 @@ class Sub(Generic[A]):
             role = replace(role, book=book, whole=whole, rest=rest)
         target = signal.set_point_of
         return replace(
-            signal, label=f"{signal.label}, {self.label}", role=role,
+            signal,
+            label=f"{signal.label}, {self.label}",
+            role=role,
             set_point_of=self.named(target) if target else "",
-        )  # fmt: skip
+        )
 
     def _role(self, name: str, signal: Signal) -> Role | None:
         """Return the role of a signal; that which its name tells, where books go by names."""
@@ -203,9 +205,11 @@ class Sub(Generic[A]):
 
     def _tick(self, tick: Callable[..., Any], x: Any, m: Any, u: Any, par: Any) -> Any:
         after = tick(
-            self.inside("State", x), self.inside("Memory", m), self._stimulus(m, u),
+            self.inside("State", x),
+            self.inside("Memory", m),
+            self._stimulus(m, u),
             self.parameters(par),
-        )  # fmt: skip
+        )
         return m._replace(**self.outside("Memory", after))
 
     def _stimulus(self, m: Any, u: Any) -> Any:

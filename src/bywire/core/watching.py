@@ -19,6 +19,7 @@ from bywire.core.wired import Instant, Wired
 _NAN = float("nan")
 _PARAMETER = "."  # before the name of one, among names of signals
 
+
 class Watching(Model):
     """What an assembly says of recordings: its elements, and the assemblies within."""
 

@@ -104,10 +104,12 @@ class Wired(Generic[X, U, F, P]):
 
     def call(self, function: Callable[..., Any], **more: Any) -> Any:
         """Return what a function of the element gives, its arguments taken by their names."""
-        return function(*(
-            more[name] if name in more else self._argument(name, function)
-            for name in arguments(function)
-        ))  # fmt: skip
+        return function(
+            *(
+                more[name] if name in more else self._argument(name, function)
+                for name in arguments(function)
+            )
+        )
 
     def felt(self, function: Callable[..., Any]) -> dict[str, Any]:
         """Return those arguments of a function of the element that are no parameters, by name."""

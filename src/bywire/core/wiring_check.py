@@ -97,10 +97,15 @@ class _Operands:
         wired: AnyAssembly = self.evaluated(
             method,
             lambda: self.model.at(
-                self.state, self.memory, self.par, self.contact, rate=self.rate,
-                reaction=self.reaction, lines=lines,
+                self.state,
+                self.memory,
+                self.par,
+                self.contact,
+                rate=self.rate,
+                reaction=self.reaction,
+                lines=lines,
             ),
-        )  # fmt: skip
+        )
         return wired
 
     def evaluated(self, method: str, function: Callable[..., Any], *arguments: Any) -> Any:
@@ -124,8 +129,9 @@ def _check_inputs(model: AnyAssembly, at: _Operands, w: AnyAssembly) -> None:
                 f"{_place(model)}: the wire {name} ({wire.signal.label}) is never set: assign "
                 f"w.{name} = ... [{wire.signal.unit}] in wire"
             )
-        _require(model, "wire", name, instant.wires[name], wire.signal.unit, wire.signal.label,
-                 instant)  # fmt: skip
+        _require(
+            model, "wire", name, instant.wires[name], wire.signal.unit, wire.signal.label, instant
+        )
     for part in model.parts.values():
         if not part.has("Input"):
             continue
@@ -138,8 +144,9 @@ def _check_inputs(model: AnyAssembly, at: _Operands, w: AnyAssembly) -> None:
         for (field, signal), each in zip(
             signals_of(part.element.Input).items(), value, strict=True
         ):
-            _require(model, "wire", f"{part.name}.u.{field}", each, signal.unit, signal.label,
-                     instant)  # fmt: skip
+            _require(
+                model, "wire", f"{part.name}.u.{field}", each, signal.unit, signal.label, instant
+            )
     for name, sub in model.subs.items():
         _check_inputs(sub.assembly, at, getattr(w, name))
 
@@ -187,11 +194,26 @@ def _check_contacts(model: AnyAssembly, at: _Operands) -> None:
 def _protocol(model: AnyAssembly, at: _Operands, method: str) -> Iterator[Any]:
     """Yield the function of the protocol that a method is a part of, and its arguments."""
     if method == "power":
-        yield from (model.powers, at.state, at.state, at.rate, at.memory, at.par, at.contact,
-                    at.reaction)  # fmt: skip
+        yield from (
+            model.powers,
+            at.state,
+            at.state,
+            at.rate,
+            at.memory,
+            at.par,
+            at.contact,
+            at.reaction,
+        )
     else:
-        yield from (model.output, at.state, at.memory, at.par, at.contact, at.reaction,
-                    at.tuple(model.Flow))  # fmt: skip
+        yield from (
+            model.output,
+            at.state,
+            at.memory,
+            at.par,
+            at.contact,
+            at.reaction,
+            at.tuple(model.Flow),
+        )
 
 
 def _require(
@@ -240,6 +262,9 @@ def _place(model: AnyAssembly, method: str = "wire") -> str:
 def _line_of(error: BaseException, model: AnyAssembly) -> str:
     """Return the innermost line outside of the numbers' own operations."""
     checkers = {__file__, inspect.getsourcefile(Dimension), inspect.getsourcefile(fits)}
-    frames = [f for f in traceback.extract_tb(error.__traceback__)
-              if f.filename not in checkers and not f.filename.endswith("core/ops.py")]  # fmt: skip
+    frames = [
+        f
+        for f in traceback.extract_tb(error.__traceback__)
+        if f.filename not in checkers and not f.filename.endswith("core/ops.py")
+    ]
     return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else _place(model)

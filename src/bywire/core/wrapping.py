@@ -96,17 +96,28 @@ class Wrapping(Model):
         return self.inner.gap(x, xe, par)
 
     def powers(
-        self, x: Any, xe: Any, rate: Any, memory: Any, par: Any, contact: tuple[float, ...],
+        self,
+        x: Any,
+        xe: Any,
+        rate: Any,
+        memory: Any,
+        par: Any,
+        contact: tuple[float, ...],
         reaction: tuple[float, ...],
-    ) -> Any:  # fmt: skip
+    ) -> Any:
         """Return the rates of the integrals."""
         felt = self.memory_inside(memory)
         return self.inner.powers(x, xe, rate, felt, par, contact, reaction)
 
     def output(
-        self, x: Any, memory: Any, par: Any, contact: tuple[float, ...],
-        reaction: tuple[float, ...], flow: Any,
-    ) -> Any:  # fmt: skip
+        self,
+        x: Any,
+        memory: Any,
+        par: Any,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+        flow: Any,
+    ) -> Any:
         """Return what is recorded."""
         return self.inner.output(x, self.memory_inside(memory), par, contact, reaction, flow)
 

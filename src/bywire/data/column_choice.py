@@ -39,9 +39,12 @@ class MissingUnitsError(UnitError):
     """
 
     def __init__(
-        self, text: str, lacking: str = "", signals: Mapping[str, str] | None = None,
+        self,
+        text: str,
+        lacking: str = "",
+        signals: Mapping[str, str] | None = None,
         clock: str = "",
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.lacking, self.signals, self.clock = lacking, dict(signals or {}), clock
         super().__init__(text)
 
@@ -150,8 +153,10 @@ class Chosen:
     def attributes(self) -> dict[str, Any]:
         """Return what a dataset says of the signal."""
         attributes: dict[str, Any] = {
-            "units": self.symbol, "long_name": self.label, "column": self.column,
-        }  # fmt: skip
+            "units": self.symbol,
+            "long_name": self.label,
+            "column": self.column,
+        }
         if self.meanings:
             attributes["flag_meanings"] = self.meanings
         if self.mapping.delay:
@@ -229,9 +234,7 @@ def every_signal(
 def _chosen(
     file: Path, source: Source, meaning: MeasurementMapping, signal: SignalMapping
 ) -> Chosen:
-    column = _column(
-        file, source, signal.column, f"signals.{signal.name}.column", signal.number
-    )
+    column = _column(file, source, signal.column, f"signals.{signal.name}.column", signal.number)
     unit = signal.unit or column.unit
     lacking = {} if unit else {signal.name: column.name}
     try:
@@ -342,9 +345,7 @@ def _column(file: Path, source: Source, name: str, key: str, number: int = 0) ->
         number = int(title[:9])
     if number:
         if number > len(order):
-            raise FileError(
-                f"{file} has no column {number} ({key}): it has {len(order)} columns"
-            )
+            raise FileError(f"{file} has no column {number} ({key}): it has {len(order)} columns")
         name = order[number - 1]
     title = split_title(name)[0]
     column = columns.get(name) or columns.get(title)

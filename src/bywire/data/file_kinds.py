@@ -10,8 +10,12 @@ from bywire.core.errors import FileError, ParameterError
 from bywire.data.toml_file import read_toml
 
 BENCH, STUDY, LIFE, CAMPAIGN = "bench", "study", "life", "campaign"
-_COMMANDS = {BENCH: "bywire run", STUDY: "bywire study run", LIFE: "bywire life",
-             CAMPAIGN: "bywire faults"}  # fmt: skip
+_COMMANDS = {
+    BENCH: "bywire run",
+    STUDY: "bywire study run",
+    LIFE: "bywire life",
+    CAMPAIGN: "bywire faults",
+}
 _WORDS = {BENCH: "a bench", STUDY: "a study", LIFE: "a life", CAMPAIGN: "a campaign of faults"}
 HEADS = {BENCH: "experiment", STUDY: "bench", LIFE: "life", CAMPAIGN: "bench"}
 """the key that each cannot do without"""

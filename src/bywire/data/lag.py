@@ -110,9 +110,7 @@ def _coarsest(measurement: xr.Dataset, first: str, second: str) -> float:
     return max(steps)
 
 
-def _coefficients(
-    a: NDArray[np.float64], b: NDArray[np.float64], most: int
-) -> NDArray[np.float64]:
+def _coefficients(a: NDArray[np.float64], b: NDArray[np.float64], most: int) -> NDArray[np.float64]:
     """Return the correlation coefficients over the overlap at shifts of -most to most samples."""
     a, b = a - a.mean(), b - b.mean()
     n = a.size

@@ -62,10 +62,15 @@ class Child:
         # asammdf writes a temporary file; with its folder it goes, whatever becomes of the child.
         self._folder = mkdtemp(dir=process_folder())
         self._process = start_python(
-            "bywire.data.reading_child", module, "forks" if _IS_LINUX else "alone", bufsize=0,
-            stderr=DEVNULL, further={
+            "bywire.data.reading_child",
+            module,
+            "forks" if _IS_LINUX else "alone",
+            bufsize=0,
+            stderr=DEVNULL,
+            further={
                 **one_thread_variables(),  # it forks: it has no threads
-                "TMPDIR": self._folder, "TEMP": self._folder,
+                "TMPDIR": self._folder,
+                "TEMP": self._folder,
             },
         )
         self.state: _State = "idle"

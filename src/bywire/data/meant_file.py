@@ -20,9 +20,13 @@ def first_there(places: Iterable[Path]) -> Path | None:
 
 
 def near_files(
-    file: Path, kinds: Collection[str], folders: Iterable[Path], least: float, *,
+    file: Path,
+    kinds: Collection[str],
+    folders: Iterable[Path],
+    least: float,
+    *,
     with_ending: bool = False,
-) -> Iterator[tuple[float, Path]]:  # fmt: skip
+) -> Iterator[tuple[float, Path]]:
     """Yield the files that a name resembles, each with how much, the likest first.
 
     Parameters

@@ -190,10 +190,13 @@ def _dataset(
         variables[signal.mapping.name] = (dims[key], numbers, signal.attributes())
     # Indexes of pandas that share the array: from the array, xarray would copy it.
     coords: dict[str, Any] = {
-        dims[key]: (dims[key], pd.Index(axis, copy=False, name=dims[key]),
-                    {"units": "s", "long_name": "time"})
+        dims[key]: (
+            dims[key],
+            pd.Index(axis, copy=False, name=dims[key]),
+            {"units": "s", "long_name": "time"},
+        )
         for key, axis in axes.items()
-    }  # fmt: skip
+    }
     return xr.Dataset(variables, coords=coords), notes
 
 

@@ -77,9 +77,10 @@ def read_named(
     with opened(file, meaning) as source, _shown_units(named):
         meaning = _timed(meaning, named.time)
         signals = dict(meaning.signals) or {
-            name: signal for name, signal in every_signal(file, source, meaning).items()
+            name: signal
+            for name, signal in every_signal(file, source, meaning).items()
             if named.units is None or name in named.units or source.columns[signal.column].unit
-        }  # fmt: skip
+        }
         signals |= {n: _signal(meaning, n, column) for n, column in named.signals.items()}
         whole = replace(meaning, signals=signals)
         dataset, notes = dataset_of(file, source, whole, None, progress, room())

@@ -111,9 +111,11 @@ class RecordingSource:
     """
 
     def __init__(
-        self, variables: Mapping[str, xr.Variable], attributes: Mapping[Any, Any],
+        self,
+        variables: Mapping[str, xr.Variable],
+        attributes: Mapping[Any, Any],
         coords: Sequence[str],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._variables = variables
         numbers = {name: v for name, v in variables.items() if v.dtype.kind in "iufbmM"}
         self.columns: Mapping[str, Column] = {
@@ -146,10 +148,11 @@ class RecordingSource:
 def _plain(attributes: Mapping[Any, Any]) -> dict[str, Any]:
     """Return attributes as JSON holds them: texts, and numbers with their type."""
     return {
-        str(name): value if isinstance(value, str) else
-        {"kind": np.asarray(value).dtype.str, "values": np.asarray(value).tolist()}
+        str(name): value
+        if isinstance(value, str)
+        else {"kind": np.asarray(value).dtype.str, "values": np.asarray(value).tolist()}
         for name, value in attributes.items()
-    }  # fmt: skip
+    }
 
 
 def _attributes(plain: Mapping[str, Any]) -> dict[str, Any]:
@@ -191,7 +194,14 @@ def _open(path: Path, options: ReadOptions) -> Iterator[RecordingSource]:
 
 
 FORMAT = FileFormat(
-    "recording", "a recording", NETCDF.endings, NETCDF.recognizes, _open, NETCDF.write,
-    has_many_axes=True, libraries=("netCDF4",), counts=("index", 0),
-)  # fmt: skip
+    "recording",
+    "a recording",
+    NETCDF.endings,
+    NETCDF.recognizes,
+    _open,
+    NETCDF.write,
+    has_many_axes=True,
+    libraries=("netCDF4",),
+    counts=("index", 0),
+)
 """how the child reads a recording; measurement files have the format ``netcdf``"""

@@ -124,8 +124,12 @@ def _serve(
                     # As they are stored: single precision takes half the way through the pipe.
                     is_plain = part.dtype.isnative and part.dtype.name in NUMBERS
                     numbers = np.ascontiguousarray(part, None if is_plain else np.float64)
-                    place = {"column": names.index(name), "begin": begin, "count": numbers.size,
-                             "kind": NUMBERS.index(numbers.dtype.name)}  # fmt: skip
+                    place = {
+                        "column": names.index(name),
+                        "begin": begin,
+                        "count": numbers.size,
+                        "kind": NUMBERS.index(numbers.dtype.name),
+                    }
                     send(answers, place, numbers)
                 send(answers, {"end": True, "remarks": list(getattr(source, "remarks", []))})
     except FileError as error:

@@ -91,9 +91,11 @@ def strict_columns(
         text = "\n".join(" ".join(line.split()) for line in text.split("\n"))
     rows: list[list[float]] = []
     reader = csv.reader(
-        io.StringIO(text, newline=""), delimiter=dialect.separator, strict=True,
+        io.StringIO(text, newline=""),
+        delimiter=dialect.separator,
+        strict=True,
         skipinitialspace=True,
-    )  # fmt: skip
+    )
     line = first_line
     try:
         for cells in reader:
@@ -124,10 +126,11 @@ def _require_width(path: Path, line: int, cells: list[str], dialect: Dialect) ->
     if len(cells) != dialect.width:
         fix = (
             "complete the row: where blanks separate columns, a missing value needs a mark such as "
-            "nan" if dialect.separator == " "
+            "nan"
+            if dialect.separator == " "
             else "complete the row, or remove it if the recording was cut here; with decimal "
             "commas, separate the columns by semicolons"
-        )  # fmt: skip
+        )
         raise FileError(
             f"{path}, line {line}: {len(cells)} cells, but the first row has {dialect.width} "
             f"(separated by {SEPARATORS[dialect.separator]}): {fix}; where other lines stand "
@@ -135,9 +138,7 @@ def _require_width(path: Path, line: int, cells: list[str], dialect: Dialect) ->
         )
 
 
-def _number(
-    path: Path, line: int, cell: str, column: int, dialect: Dialect, seen: Seen
-) -> float:
+def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect, seen: Seen) -> float:
     if dialect.is_mark(cell):
         if cell:
             seen.marks[column, cell] += 1

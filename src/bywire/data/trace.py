@@ -129,9 +129,7 @@ def _names(file: Path, source: Source, meaning: MeasurementMapping) -> tuple[str
     return names
 
 
-def _chosen(
-    file: Path, source: Source, meaning: MeasurementMapping, name: str
-) -> SignalMapping:
+def _chosen(file: Path, source: Source, meaning: MeasurementMapping, name: str) -> SignalMapping:
     """Return what a signal's column means, whose name may be in other capitals."""
     said = meaning.signals.get(name) or SignalMapping(name, name.strip())
     if said.column in source.columns and meaning.signals:

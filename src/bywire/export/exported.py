@@ -70,15 +70,15 @@ class Exported:
         """What drives the run at its start, without noise."""
         names = self.run.model.Stimulus._fields
         (row,) = self.run.stimulus(np.zeros(1))
-        return [0.0 if name.startswith("noise_") else float(value)
-                for name, value in zip(names, row, strict=True)]  # fmt: skip
+        return [
+            0.0 if name.startswith("noise_") else float(value)
+            for name, value in zip(names, row, strict=True)
+        ]
 
     @property
     def vector(self) -> list[float]:
         """State vector at the start."""
-        started: list[float] = initial_vector(
-            self.layout, self.run.state, self.run.memory
-        ).tolist()
+        started: list[float] = initial_vector(self.layout, self.run.state, self.run.memory).tolist()
         return started
 
 

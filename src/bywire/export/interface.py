@@ -83,8 +83,11 @@ def interface(made: Exported, part: Part, start_reads: frozenset[int] = frozense
     signals += (each for each in rows if each.name not in taken)
     if part == "plant":
         named = {each.name for each in rows}
-        signals += (state_variable(made, k, name, "output") for k, name in asked.items()
-                    if name not in named)  # fmt: skip
+        signals += (
+            state_variable(made, k, name, "output")
+            for k, name in asked.items()
+            if name not in named
+        )
     if part == "brake":
         signals += (row_variable(made, k, "sampled") for k in reads.shown(part))
     parameters = reads.parameters(part) | start_reads
@@ -101,8 +104,12 @@ class _Reads:
 
     @classmethod
     def of(cls, stages: Stages) -> _Reads:
-        passes = [node for each in (stages.fast, stages.exact) for nodes in each.values()
-                  for node in nodes]  # fmt: skip
+        passes = [
+            node
+            for each in (stages.fast, stages.exact)
+            for nodes in each.values()
+            for node in nodes
+        ]
         passes += stages.posed + stages.quadrature.products
         passes += [c for pairs in stages.quadrature.combinations for c, _ in pairs]
         ticks = [node for roots in stages.ticks for node in _changed(stages, roots)]
@@ -122,8 +129,11 @@ class _Reads:
     def parameters(self, part: Part) -> frozenset[int]:
         """Return the parameters that a part depends on."""
         shown = frozenset[int]().union(*(self.outputs[k]["p"] for k in self.shown(part)))
-        own = {"brake": self.plant["p"] | self.ecu["p"], "plant": self.plant["p"],
-               "ecu": self.ecu["p"]}[part]  # fmt: skip
+        own = {
+            "brake": self.plant["p"] | self.ecu["p"],
+            "plant": self.plant["p"],
+            "ecu": self.ecu["p"],
+        }[part]
         return own | shown
 
     @property
@@ -154,9 +164,16 @@ def _stimuli(made: Exported, reads: _Reads) -> Iterator[Variable]:
         if k in reads.ecu["u"]:
             label = signal.label + ", a standard normal number" * name.startswith("noise_")
             yield Variable(
-                name, "input", "stimulus", k, signal.unit, label, starts[k], is_held=True,
+                name,
+                "input",
+                "stimulus",
+                k,
+                signal.unit,
+                label,
+                starts[k],
+                is_held=True,
                 ends=ranges.get(name, (-math.inf, math.inf)),
-            )  # fmt: skip
+            )
 
 
 def readings(made: Exported) -> dict[int, str]:

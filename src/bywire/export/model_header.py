@@ -15,16 +15,26 @@ from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.layout import COUNTERS
 
 _PLACES = {
-    "parameter": "PARAMETER", "stimulus": "STIMULUS", "state": "IN_STATE", "row": "IN_ROW",
-    "sampled": "IN_SAMPLED", "rate": "IN_RATE", "mode": "IN_MODE", "closed": "IN_CLOSED",
-    "indicator": "IN_INDICATOR", "events": "IN_EVENTS",
-}  # fmt: skip
+    "parameter": "PARAMETER",
+    "stimulus": "STIMULUS",
+    "state": "IN_STATE",
+    "row": "IN_ROW",
+    "sampled": "IN_SAMPLED",
+    "rate": "IN_RATE",
+    "mode": "IN_MODE",
+    "closed": "IN_CLOSED",
+    "indicator": "IN_INDICATOR",
+    "events": "IN_EVENTS",
+}
 
 
 def model_header(
-    made: Exported, faces: Interface, start: str, token: str,
+    made: Exported,
+    faces: Interface,
+    start: str,
+    token: str,
     modes: Mapping[str, object] | None = None,
-) -> str:  # fmt: skip
+) -> str:
     """Return the C header of an exported part.
 
     Parameters
@@ -125,10 +135,14 @@ def _ends(each: Variable) -> str:
 def text(value: str) -> str:
     """Return a C string; what is not ASCII as octal bytes."""
     encoded = value.encode("utf-8")
-    return '"' + "".join(
-        f"\\{chr(b)}" if chr(b) in '"\\' else chr(b) if 32 <= b < 127 else f"\\{b:03o}"
-        for b in encoded
-    ) + '"'  # fmt: skip
+    return (
+        '"'
+        + "".join(
+            f"\\{chr(b)}" if chr(b) in '"\\' else chr(b) if 32 <= b < 127 else f"\\{b:03o}"
+            for b in encoded
+        )
+        + '"'
+    )
 
 
 def comment(value: str) -> str:

@@ -14,7 +14,15 @@ from bywire.core.signals import signals_of
 from bywire.export.exported import Exported
 
 Place = Literal[
-    "parameter", "stimulus", "state", "row", "sampled", "rate", "mode", "closed", "indicator",
+    "parameter",
+    "stimulus",
+    "state",
+    "row",
+    "sampled",
+    "rate",
+    "mode",
+    "closed",
+    "indicator",
     "events",
 ]
 Causality = Literal["parameter", "input", "output", "local"]
@@ -99,9 +107,16 @@ def parameter_variables(
         shown = f"{group}[{int(node) + 1}]" if is_node else name
         label = notes[group if is_node else name]
         yield Variable(
-            shown, "parameter", "parameter", k, leaf.unit.symbol, label, value, leaf,
+            shown,
+            "parameter",
+            "parameter",
+            k,
+            leaf.unit.symbol,
+            label,
+            value,
+            leaf,
             is_tunable=k in tunable,
-        )  # fmt: skip
+        )
 
 
 def finite_range(leaf: Leaf) -> tuple[float | None, float | None]:

@@ -111,9 +111,7 @@ def differentiated(
     require_signals(data, (signal, *held))
     interval = even_interval(data["time"].values)
     data = data.assign({name: ("time", _centered(data[name].values)) for name in held})
-    smooth = data.map(
-        lambda column: column.copy(data=low_passed(column.values, interval, cutoff))
-    )
+    smooth = data.map(lambda column: column.copy(data=low_passed(column.values, interval, cutoff)))
     values, unit = smooth[signal].values, smooth[signal].attrs.get("units", "1")
     for k, name in enumerate(names, 1):
         values = _derivative(values, interval)

@@ -52,15 +52,26 @@ class Driven(Model):
         """Return the smooth right-hand side, a State; ``memory`` are the inputs."""
 
     def powers(
-        self, x: Any, xe: Any, rate: Any, memory: Any, par: Any, contact: tuple[float, ...],
+        self,
+        x: Any,
+        xe: Any,
+        rate: Any,
+        memory: Any,
+        par: Any,
+        contact: tuple[float, ...],
         reaction: tuple[float, ...],
-    ) -> NoPower:  # fmt: skip
+    ) -> NoPower:
         """Return none."""
         return NoPower(0.0 * x[0])
 
     def output(
-        self, x: Any, memory: Any, par: Any, contact: tuple[float, ...],
-        reaction: tuple[float, ...], flow: Any,
-    ) -> Any:  # fmt: skip
+        self,
+        x: Any,
+        memory: Any,
+        par: Any,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+        flow: Any,
+    ) -> Any:
         """Return the states."""
         return x

@@ -49,9 +49,7 @@ class Equation:
 class EquationError:
     """The equation's error and its derivatives by the unknowns, sample by sample."""
 
-    def __init__(
-        self, equation: Equation, par: ParameterSet, unknowns: Sequence[Unknown]
-    ) -> None:
+    def __init__(self, equation: Equation, par: ParameterSet, unknowns: Sequence[Unknown]) -> None:
         model = equation.model
         if equation.state not in model.State._fields:
             raise ModelError(

@@ -164,10 +164,13 @@ class Estimate:
         rows = [
             f"{name:<16} {v:>12.5g} +- {half:<10.2g} {u.unit}"
             for name, u, v, half in zip(
-                self.names, self.unknowns, self.values,
-                0.5 * np.diff(self.intervals(), axis=1).ravel(), strict=True,
+                self.names,
+                self.unknowns,
+                self.values,
+                0.5 * np.diff(self.intervals(), axis=1).ravel(),
+                strict=True,
             )
-        ]  # fmt: skip
+        ]
         kept = [
             f"{k.unknown.label:<16} not told by the data, kept at {k.unknown.start:g} "
             f"{k.unknown.unit}: {k.reason}"
@@ -198,9 +201,10 @@ class Estimate:
         for part in self.parts:
             r = self.residuals[begin : begin + part.count] * (part.noise or 1.0)
             parts.append(
-                Leftover(part.label, part.unit, r, part.noise, part.spread, part.size,
-                         part.numerical)
-            )  # fmt: skip
+                Leftover(
+                    part.label, part.unit, r, part.noise, part.spread, part.size, part.numerical
+                )
+            )
             begin += part.count
         return tuple(parts)
 
@@ -209,14 +213,20 @@ def as_object(estimate: Estimate) -> dict[str, object]:
     """Return what JSON holds of an estimate."""
     rows: Mapping[str, dict[str, object]] = {
         name: {
-            "value": float(v), "unit": u.unit, "standard_deviation": float(d),
+            "value": float(v),
+            "unit": u.unit,
+            "standard_deviation": float(d),
             "interval_95": [float(lo), float(hi)],
         }
         for name, u, v, d, (lo, hi) in zip(
-            estimate.names, estimate.unknowns, estimate.values, estimate.deviations,
-            estimate.intervals(), strict=True,
+            estimate.names,
+            estimate.unknowns,
+            estimate.values,
+            estimate.deviations,
+            estimate.intervals(),
+            strict=True,
         )
-    }  # fmt: skip
+    }
     if estimate.step_errors is not None:
         for row, error in zip(rows.values(), estimate.step_errors, strict=True):
             row["step_error"] = float(error)
@@ -231,7 +241,8 @@ def as_object(estimate: Estimate) -> dict[str, object]:
         "residual_rms": estimate.rms,
         "outputs": {
             left.label: {
-                "unit": left.unit, "rms": left.rms,
+                "unit": left.unit,
+                "rms": left.rms,
                 "fit_percent": left.fit if math.isfinite(left.fit) else None,
                 "over_noise": left.over_noise if math.isfinite(left.over_noise) else None,
             }

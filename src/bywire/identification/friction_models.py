@@ -80,8 +80,7 @@ class Law:
         factor = 1.0 + (k - 1.0) * fall
         slopes = [dry * factor[:, None]]
         slopes += [v[:, None]] if self.viscous else []
-        slopes += [(size * fall)[:, None],
-                   (size * (k - 1.0) * fall * np.abs(v) / v_s**2)[:, None]]  # fmt: skip
+        slopes += [(size * fall)[:, None], (size * (k - 1.0) * fall * np.abs(v) / v_s**2)[:, None]]
         return size * factor + viscous, np.hstack(slopes)
 
     def candidate(self) -> Candidate:
@@ -163,8 +162,10 @@ def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> Non
 
 def _require_braking(sliding: Mapping[str, xr.Dataset]) -> None:
     """Refuse friction that gives power: it takes some up, in the mean over the record."""
-    F, v = (np.concatenate([record[n].values for record in sliding.values()])
-            for n in ("friction", "speed"))  # fmt: skip
+    F, v = (
+        np.concatenate([record[n].values for record in sliding.values()])
+        for n in ("friction", "speed")
+    )
     along = float(F @ v / np.sqrt((F @ F) * (v @ v))) if F.any() else 0.0
     if along < 0.0:
         raise wrong_sign("friction", "speed", f"cosine {along:.2f}: it would drive the motion")

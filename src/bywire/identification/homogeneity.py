@@ -51,9 +51,10 @@ class Disagreement:
         there, rest = (
             f"{shown(float(f'{value:.5g}'), self.unit)} +- {deviation:.2g}"
             for value, deviation in (
-                (self.value, self.deviation), (self.others, self.others_deviation),
+                (self.value, self.deviation),
+                (self.others, self.others_deviation),
             )
-        )  # fmt: skip
+        )
         return (
             f"records do not agree: {self.name} is {there} in {self.record} and {rest} in the "
             f"others (standard deviations), {self.apart:.2g} of their difference's apart: look at "
@@ -100,9 +101,7 @@ def disagreements(estimates: Mapping[str, Estimate]) -> tuple[Disagreement, ...]
     tables = {
         label: {
             u.name: _Told(float(v), float(d), estimate.freedom, u.unit)
-            for u, v, d in zip(
-                estimate.unknowns, estimate.values, estimate.deviations, strict=True
-            )
+            for u, v, d in zip(estimate.unknowns, estimate.values, estimate.deviations, strict=True)
         }
         for label, estimate in estimates.items()
     }
@@ -141,11 +140,14 @@ def between_records(estimate: Estimate, jacobian: Array) -> tuple[Disagreement, 
         deviations = np.sqrt(np.diag(sure.covariance))
         tables[label] = {
             u.name: _Told(
-                float(estimate.values[k] - step[i] * scale[k]), float(deviations[i] * scale[k]),
-                sure.freedom, u.unit,
+                float(estimate.values[k] - step[i] * scale[k]),
+                float(deviations[i] * scale[k]),
+                sure.freedom,
+                u.unit,
             )
-            for i, k in enumerate(columns) if not (u := estimate.unknowns[k]).trial
-        }  # fmt: skip
+            for i, k in enumerate(columns)
+            if not (u := estimate.unknowns[k]).trial
+        }
     return _apart(tables)
 
 
@@ -173,17 +175,21 @@ def _apart(tables: Mapping[str, Mapping[str, _Told]]) -> tuple[Disagreement, ...
             if others and alone.deviation > 0.0:
                 mean, deviation = _mean(others)
                 freedom = min(alone.freedom, *(other.freedom for other in others))
-                compared.append((
-                    Disagreement(label, name, alone.unit, alone.value, alone.deviation, mean,
-                                 deviation),
-                    freedom,
-                ))  # fmt: skip
+                compared.append(
+                    (
+                        Disagreement(
+                            label, name, alone.unit, alone.value, alone.deviation, mean, deviation
+                        ),
+                        freedom,
+                    )
+                )
     level = _LEVEL / max(len(compared), 1)
     apart = [
-        each for each, freedom in compared
+        each
+        for each, freedom in compared
         if each.apart > special.stdtrit(max(freedom, 1.0), 1.0 - 0.5 * level)
         and abs(each.value - each.others) > _SMALL * abs(each.others)
-    ]  # fmt: skip
+    ]
     return tuple(sorted(apart, key=lambda each: -each.apart))
 
 

@@ -34,11 +34,13 @@ def misfit(estimate: Estimate) -> str:
     """
     worst = max(
         (
-            left for left in estimate.leftovers()
+            left
+            for left in estimate.leftovers()
             if left.over_noise > _MISFIT and not left.is_numerical
         ),
-        key=lambda left: left.over_noise, default=None,
-    )  # fmt: skip
+        key=lambda left: left.over_noise,
+        default=None,
+    )
     if worst is None:
         return ""
     low, high = _AS_ASSUMED

@@ -112,13 +112,23 @@ def inverse_dynamics(
     Z = W if other is None else rows(other)[1]
     sure = uncertainty(W, e, instruments=None if other is None else Z)
     estimate = Estimate(
-        unknowns=tuple(unknowns), values=values,
+        unknowns=tuple(unknowns),
+        values=values,
         covariance=sure.covariance * np.outer(scale, scale),
         singular_values=np.asarray(np.linalg.svd(W, compute_uv=False), dtype=float),
-        residuals=e / np.where(root > 0.0, root, 1.0), freedom=sure.freedom, colored=sure.colored,
-        parts=(Part(f"equation of {equation.state}", "", len(e), equation.unit,
-                    spread=float(np.std(W @ (values / scale) - e))),),
-    )  # fmt: skip
+        residuals=e / np.where(root > 0.0, root, 1.0),
+        freedom=sure.freedom,
+        colored=sure.colored,
+        parts=(
+            Part(
+                f"equation of {equation.state}",
+                "",
+                len(e),
+                equation.unit,
+                spread=float(np.std(W @ (values / scale) - e)),
+            ),
+        ),
+    )
     if wrong := misfit(estimate):
         warnings.warn(wrong, MisfitWarning, stacklevel=2)
     return estimate.noted(notes_of(estimate))

@@ -105,11 +105,17 @@ def solve(
     margin = 1e-9
     inner = np.clip(start / scale, low + margin, high - margin)
     ended = optimize.least_squares(
-        residuals, inner, jacobian, bounds=(low, high),
-        loss=of_data_alone(loss, priors), x_scale="jac",
-        xtol=max(1e-9, problem.resolved), ftol=max(share, problem.resolved), gtol=1e-9,
+        residuals,
+        inner,
+        jacobian,
+        bounds=(low, high),
+        loss=of_data_alone(loss, priors),
+        x_scale="jac",
+        xtol=max(1e-9, problem.resolved),
+        ftol=max(share, problem.resolved),
+        gtol=1e-9,
         max_nfev=most,
-    )  # fmt: skip
+    )
     solution = Solution(np.asarray(ended.x) * scale, float(ended.cost))
     return _at_bounds(problem, solution, loss)
 

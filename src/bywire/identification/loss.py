@@ -38,9 +38,9 @@ def rho(z: Array, loss: Loss) -> Array:
     if loss == "huber":
         root = np.sqrt(np.maximum(z, 1.0))
         inner = z <= 1.0
-        return np.stack((
-            np.where(inner, z, 2.0 * root - 1.0), 1.0 / root, np.where(inner, 0.0, -0.5 / root**3)
-        ))  # fmt: skip
+        return np.stack(
+            (np.where(inner, z, 2.0 * root - 1.0), 1.0 / root, np.where(inner, 0.0, -0.5 / root**3))
+        )
     return np.stack((np.log1p(z), 1.0 / (1.0 + z), -1.0 / (1.0 + z) ** 2))
 
 

@@ -202,6 +202,7 @@ class Method:
     key: str = ""
 
 
-METHODS = Kind("method", ("methods",), instances(Method), "bywire.identification.methods",
-               declared="a Method")  # fmt: skip
+METHODS = Kind(
+    "method", ("methods",), instances(Method), "bywire.identification.methods", declared="a Method"
+)
 """every method that needs no bench"""

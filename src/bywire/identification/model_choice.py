@@ -139,11 +139,16 @@ def choose(
         s2 = _innovation_variance(left[k], coefficients)
         judged.append(
             Judged(
-                candidate, fit, float(np.sqrt(np.mean(left[k] ** 2))),
-                float(np.sqrt(np.mean(errors[k] ** 2))), float(more.mean()), scatter,
-                n * math.log(s2) + 2 * unknowns, n * math.log(s2) + unknowns * math.log(n),
+                candidate,
+                fit,
+                float(np.sqrt(np.mean(left[k] ** 2))),
+                float(np.sqrt(np.mean(errors[k] ** 2))),
+                float(more.mean()),
+                scatter,
+                n * math.log(s2) + 2 * unknowns,
+                n * math.log(s2) + unknowns * math.log(n),
             )
-        )  # fmt: skip
+        )
     chosen = next(j for j in judged if j.excess <= j.excess_error)
     if wrong := misfit(chosen.estimate):
         warnings.warn(wrong, MisfitWarning, stacklevel=2)
@@ -162,9 +167,10 @@ def _folds(records: Mapping[str, xr.Dataset]) -> tuple[list[_Fold], str]:
         folds = [_Fold([r for r in parts if r is not part], [part]) for part in parts]
         return folds, f"each of {len(parts)} records in turn"
     blocks = [
-        part.isel(time=rows) for part in parts
+        part.isel(time=rows)
+        for part in parts
         for rows in np.array_split(np.arange(part.sizes["time"]), _BLOCKS)
-    ]  # fmt: skip
+    ]
     if min(b.sizes["time"] for b in blocks) < 2:
         raise ParameterError("too few samples to hold some out: measure longer, or more records")
     folds = []
@@ -188,9 +194,7 @@ def _fitted(candidate: Candidate, parts: Sequence[xr.Dataset], signal: str) -> E
         return estimate(Problem(unknowns, evaluate))
 
 
-def _left(
-    candidate: Candidate, fit: Estimate, parts: Sequence[xr.Dataset], signal: str
-) -> Array:
+def _left(candidate: Candidate, fit: Estimate, parts: Sequence[xr.Dataset], signal: str) -> Array:
     values = _values(candidate, fit, xr.concat(parts, "time", combine_attrs="override"))
     return np.concatenate(
         [part[signal].values - candidate.predict(part, values)[0] for part in parts]

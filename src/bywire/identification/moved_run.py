@@ -50,9 +50,7 @@ def moved_run(run: Run, values: Mapping[str, float], start: Start | None = None)
         fields, inner = run.model.Stimulus._fields, run.stimulus
         add = np.array([shift.get(name, 0.0) for name in fields])
         run = replace(run, stimulus=lambda t: inner(t) + add)
-    return replace(
-        run, par=run.par.replace(par), state=state._replace(**fixed), memory=memory
-    )
+    return replace(run, par=run.par.replace(par), state=state._replace(**fixed), memory=memory)
 
 
 def start_slopes(

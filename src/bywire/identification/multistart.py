@@ -158,8 +158,13 @@ def search(
             k = jobs[job]
             try:
                 solutions[k] = job.result()
-                kept.append({"key": keys[k], "values": solutions[k].values.tolist(),
-                             "cost": solutions[k].cost})  # fmt: skip
+                kept.append(
+                    {
+                        "key": keys[k],
+                        "values": solutions[k].values.tolist(),
+                        "cost": solutions[k].cost,
+                    }
+                )
             except NO_TRIAL as error:
                 failed += 1
                 refused = error if isinstance(error, ParameterError) else refused

@@ -131,9 +131,15 @@ def trial(
     else:
         stimulus = partial(_held, columns, len(model.Stimulus._fields), interval)
     run = Run(
-        model, par, state, zeros(model.Memory) if memory is None else memory, stimulus,
-        (t.size - 1) * interval, step, interval,
-    )  # fmt: skip
+        model,
+        par,
+        state,
+        zeros(model.Memory) if memory is None else memory,
+        stimulus,
+        (t.size - 1) * interval,
+        step,
+        interval,
+    )
     return Trial(run, {name: data[name].values for name in outputs}, dict(outputs), label)
 
 
@@ -196,9 +202,7 @@ def _held(columns: Mapping[int, Array], count: int, interval: float, t: Array) -
     return rows
 
 
-def _joined(
-    columns: Mapping[int, Array], count: int, times: Array, lead: float, t: Array
-) -> Array:
+def _joined(columns: Mapping[int, Array], count: int, times: Array, lead: float, t: Array) -> Array:
     rows = np.zeros((t.size, count))
     for column, values in columns.items():
         rows[:, column] = np.interp(t + lead, times, values)
@@ -232,9 +236,11 @@ def output_error(trials: Sequence[Trial], unknowns: Sequence[Unknown]) -> Proble
         return np.concatenate([r for r, _ in parts]), np.vstack([J for _, J in parts])
 
     return Problem(
-        tuple(unknowns), partial(evaluate, 1.0), parts=tuple(_parts(trials)),
+        tuple(unknowns),
+        partial(evaluate, 1.0),
+        parts=tuple(_parts(trials)),
         finer=partial(evaluate, 0.5),
-    )  # fmt: skip
+    )
 
 
 def _parts(trials: Sequence[Trial]) -> Iterator[Part]:
@@ -245,8 +251,9 @@ def _parts(trials: Sequence[Trial]) -> Iterator[Part]:
             counted = values[trial.rows(name)]
             spread = float(np.std(counted)) if counted.size else 0.0
             size = float(np.abs(counted).max()) if counted.size else 0.0
-            yield Part(name, trial.label, counted.size, signals[name].unit, trial.noise[name],
-                       spread, size)  # fmt: skip
+            yield Part(
+                name, trial.label, counted.size, signals[name].unit, trial.noise[name], spread, size
+            )
 
 
 def _residuals(trial: Trial, unknowns: Sequence[Unknown], values: Array) -> tuple[Array, Array]:

@@ -80,8 +80,11 @@ def _accepted(
 def _alternatives(parameters: str) -> list[str]:
     """Return the experiments of a parameter set's assembly that bring all they need."""
     assembly = PARAMETER_SETS.find(parameters).assembly
-    return [experiment.name for experiment in EXPERIMENTS.all().values()
-            if experiment.assembly == assembly and experiment.driven_unit is None]  # fmt: skip
+    return [
+        experiment.name
+        for experiment in EXPERIMENTS.all().values()
+        if experiment.assembly == assembly and experiment.driven_unit is None
+    ]
 
 
 def _written(name: str, value: Any, par: ParameterSet) -> str:

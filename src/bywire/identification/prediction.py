@@ -64,10 +64,12 @@ def predict(trial: Trial, estimate: Estimate) -> Prediction:
     for name, values in trial.measured.items():
         attrs = {"units": signals[name].unit, "long_name": signals[name].label}
         pairs[name] = xr.Dataset(
-            {"measured": ("time", np.where(trial.rows(name), values, np.nan), attrs),
-             "modeled": ("time", modeled[name], attrs)},
+            {
+                "measured": ("time", np.where(trial.rows(name), values, np.nan), attrs),
+                "modeled": ("time", modeled[name], attrs),
+            },
             {"time": ("time", time, {"units": "s"})},
-        )  # fmt: skip
+        )
     return Prediction(trial.label, pairs)
 
 

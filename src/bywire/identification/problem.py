@@ -63,9 +63,7 @@ class Problem:
             return r, np.delete(J, index, axis=1)
 
         finer = None if self.finer is None else partial(without, self.finer)
-        return replace(
-            self, unknowns=rest, evaluate=partial(without, self.evaluate), finer=finer
-        )
+        return replace(self, unknowns=rest, evaluate=partial(without, self.evaluate), finer=finer)
 
 
 def with_priors(problem: Problem, values: Array) -> tuple[Array, Array]:

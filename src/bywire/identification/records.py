@@ -65,8 +65,11 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
     names = " ".join(label.replace(" ", "_") for label in records)
     begins = [float(record["time"].values[0]) for record in records.values()]
     whole[RECORD].attrs = {
-        "units": "1", "long_name": "record", "flag_meanings": names, "begins": begins
-    }  # fmt: skip
+        "units": "1",
+        "long_name": "record",
+        "flag_meanings": names,
+        "begins": begins,
+    }
     return whole
 
 

@@ -59,10 +59,13 @@ def lack_of_fit(
     slow = 1.0 if is_white(rest) else autoregression(rest).at_zero_frequency / within
     value = float(e @ e - rest @ rest) / more / (within * max(slow, 1.0))
     return Check(
-        name, value, limit=float(special.fdtri(more, left, 1.0 - _LEVEL)), note=note,
+        name,
+        value,
+        limit=float(special.fdtri(more, left, 1.0 - _LEVEL)),
+        note=note,
         next_step="see in the curve where it bends, and identify the part of the range that is "
         "straight, or a law that bends",
-    )  # fmt: skip
+    )
 
 
 def by_output(

@@ -25,9 +25,7 @@ from bywire.identification.unknown import parameters_of, scattered
 from bywire.simulation.job_store import JobStore
 
 _TRIES = 20
-_KILLED = (
-    "what was finished is kept where there is an output folder, and the same command goes on"
-)
+_KILLED = "what was finished is kept where there is an output folder, and the same command goes on"
 
 
 @dataclass(frozen=True)
@@ -149,9 +147,10 @@ def _key(method: Method, par: Any, options: Any, effort: Effort) -> str:
     model = ASSEMBLIES.find(method.assembly) if method.assembly else None
     name = f"{method.name}{method.key}"
     computed = functions_digest(
-        (method.identify, method.synthetic, method.truth, model), "bywire.identification",
+        (method.identify, method.synthetic, method.truth, model),
+        "bywire.identification",
         with_equations=True,
-    )  # fmt: skip
+    )
     text = f"{name} {values} {options.model_dump_json()} {effort.starts} {effort.spread} {computed}"
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 

@@ -122,9 +122,15 @@ def trust(
         When interrupted; finished experiments are in the store.
     """
     outcomes = experiments(
-        method, par, options, seeds, effort or Effort(starts=1), processes=processes,
-        store=store, progress=progress,
-    )  # fmt: skip
+        method,
+        par,
+        options,
+        seeds,
+        effort or Effort(starts=1),
+        processes=processes,
+        store=store,
+        progress=progress,
+    )
     return Trust(outcomes, tuple(_recovered(method, par, options, outcomes)))
 
 
@@ -163,7 +169,14 @@ def _recovered(
         bias = float(values.mean() - truth[label])
         ends = stats.binomtest(inside, len(telling)).proportion_ci(0.95)
         yield Recovered(
-            label, telling[0].units[label], float(truth[label]), len(telling), bias,
+            label,
+            telling[0].units[label],
+            float(truth[label]),
+            len(telling),
+            bias,
             bias / error if error > 0.0 else math.copysign(math.inf, bias) if bias else 0.0,
-            inside / len(telling), (float(ends.low), float(ends.high)), scatter, claimed,
-        )  # fmt: skip
+            inside / len(telling),
+            (float(ends.low), float(ends.high)),
+            scatter,
+            claimed,
+        )

@@ -29,9 +29,7 @@ CONDITIONS = StopConditions(pause=600.0, T_air=293.15)
 """a stop every ten minutes at 20 degC"""
 
 
-def read_life(
-    source: str | Path, overrides: Mapping[str, str] = MappingProxyType({})
-) -> LifePlan:
+def read_life(source: str | Path, overrides: Mapping[str, str] = MappingProxyType({})) -> LifePlan:
     """Read a life file.
 
     Parameters
@@ -85,9 +83,14 @@ def _plan(content: Mapping[str, Any], name: str, overrides: Mapping[str, str]) -
     varied = tuple(_varied(bench, conditions, content.get("vary", population)))
     _require_free(life, bench, wear, varied)
     return LifePlan(
-        content.get("name", name), life, bench, wear, conditions, varied,
+        content.get("name", name),
+        life,
+        bench,
+        wear,
+        conditions,
+        varied,
         **_projection(content.get("projection", {})),
-    )  # fmt: skip
+    )
 
 
 def _is_of_life(name: str) -> bool:
@@ -104,18 +107,14 @@ def _texts(changes: Mapping[str, Any]) -> dict[str, str]:
     return dict(changes)
 
 
-def _given(
-    kind: type[ParameterSet], changes: Mapping[str, str], prefix: str
-) -> dict[str, Any]:
+def _given(kind: type[ParameterSet], changes: Mapping[str, str], prefix: str) -> dict[str, Any]:
     """Return the changes of a parameter set whose names begin with a prefix [SI]."""
     named = {k.removeprefix(prefix): v for k, v in changes.items() if k.startswith(prefix)}
     require_units(kind, named)
     return parsed(kind, named, f"name behind {prefix!r}")
 
 
-def _varied(
-    bench: Bench, conditions: StopConditions, section: Mapping[str, Any]
-) -> list[Varied]:
+def _varied(bench: Bench, conditions: StopConditions, section: Mapping[str, Any]) -> list[Varied]:
     """Return what varies of the bench, and of the conditions of its stops."""
     leaves = {f"{CONDITION}{k}": leaf for k, leaf in leaf_fields(StopConditions).items()}
     each = entries_of(section, {*quantities_of(bench), *leaves})
@@ -132,9 +131,7 @@ def _varied(
     return varied
 
 
-def _require_free(
-    life: Life, bench: Bench, wear: ParameterSet, varied: tuple[Varied, ...]
-) -> None:
+def _require_free(life: Life, bench: Bench, wear: ParameterSet, varied: tuple[Varied, ...]) -> None:
     """Refuse what varies from stop to stop although it follows from slow states."""
     slow = life.follows(life.begin(bench.par, wear), bench.par, wear)
     for each in varied:
@@ -150,8 +147,10 @@ def _require_free(
 
 def _projection(section: Mapping[str, Any]) -> dict[str, Any]:
     known: dict[str, tuple[float, float]] = {
-        "stops": (2, _MOST), "seed": (0, 2**63 - 1), "longest": (1, 1_000_000),
-    }  # fmt: skip
+        "stops": (2, _MOST),
+        "seed": (0, 2**63 - 1),
+        "longest": (1, 1_000_000),
+    }
     shares = {"share": (0.001, 0.5), "tolerance": (1e-6, 0.5)}
     settings: dict[str, Any] = {}
     for key, value in section.items():

@@ -86,10 +86,13 @@ class LifePlan:
         Stops that differ in their conditions alone are simulated once.
         """
         rows = [
-            tuple(values[k].item() for name, values in self.population.items()
-                  if not name.startswith(CONDITION))
+            tuple(
+                values[k].item()
+                for name, values in self.population.items()
+                if not name.startswith(CONDITION)
+            )
             for k in range(self.count)
-        ]  # fmt: skip
+        ]
         first: dict[tuple[Any, ...], int] = {}
         for k, row in enumerate(rows):
             first.setdefault(row, k)

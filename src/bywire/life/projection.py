@@ -121,9 +121,13 @@ def projected(plan: LifePlan, progress: Progress = silent) -> Projection:
     states = {name: np.array([each[name] for each in path]) for name in plan.life.states}
     left = [plan.life.left(each, plan.bench.par, plan.wear) for each in path]
     return Projection(
-        plan, states, {name: np.array([each[name] for each in left]) for name in plan.life.limits},
-        ended, tuple(steps), _interval(plan, steps, ended),
-    )  # fmt: skip
+        plan,
+        states,
+        {name: np.array([each[name] for each in left]) for name in plan.life.limits},
+        ended,
+        tuple(steps),
+        _interval(plan, steps, ended),
+    )
 
 
 def _require_alive(plan: LifePlan, z: Values) -> None:
@@ -161,9 +165,7 @@ def _walked(
     return path, ""
 
 
-def _step(
-    plan: LifePlan, before: Rates, held: Sequence[Values], whole: int
-) -> tuple[int, Rates]:
+def _step(plan: LifePlan, before: Rates, held: Sequence[Values], whole: int) -> tuple[int, Rates]:
     """Return how many stops to step over, and the rates behind them."""
     count = min(math.ceil(max(plan.share * len(held), _LEAST * whole)), len(held))
     while True:

@@ -30,9 +30,7 @@ class Parameters(ParameterSet):
     """time constant of its cooling"""
 
 
-def temperatures(
-    work: Array, pause: Array, T_air: Array, par: Parameters
-) -> tuple[Array, Array]:
+def temperatures(work: Array, pause: Array, T_air: Array, par: Parameters) -> tuple[Array, Array]:
     """Return the temperature of the disc before and after each of stops that repeat for ever.
 
     Parameters

@@ -190,9 +190,7 @@ def held(slip: Slip, ground: Surface, par: Parameters) -> Rising:
     if par.curve == "magic-formula":
         # As much is left at an angle beyond pi/2 as there is the same way before it.
         theta = ops.fmax(angle(slip, ground), 0.5 * math.pi)
-        return Rising(
-            ground.D * ops.sin(theta), magic_rising(math.pi - theta, ground)
-        )
+        return Rising(ground.D * ops.sin(theta), magic_rising(math.pi - theta, ground))
     peak = burckhardt_peak(ground)
     mu = ops.where(slip > peak, burckhardt(slip, ground), burckhardt(peak, ground))
     return Rising(mu, ops.where(slip > peak, burckhardt_rising(mu, ground), peak))

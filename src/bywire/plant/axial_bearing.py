@@ -45,9 +45,7 @@ class Parameters(ParameterSet):
     """speed over which the Stribeck peak falls"""
 
 
-FAULTS = (
-    ParameterFault("worn", "more friction", ("C_0", "C_1", "C_2", "T_nu"), 5.0),
-)
+FAULTS = (ParameterFault("worn", "more friction", ("C_0", "C_1", "C_2", "T_nu"), 5.0),)
 
 
 class Input(NamedTuple):

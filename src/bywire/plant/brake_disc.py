@@ -32,8 +32,12 @@ class Parameters(ParameterSet):
 
 FAULTS = (
     ParameterFault("glazed", "less friction of the pads", ("mu_pad",), 0.7),
-    ParameterFault("dragging", "a piston sticks in its caliper: pads drag, by the torque",
-                   replaced="T_drag", value=10.0),
+    ParameterFault(
+        "dragging",
+        "a piston sticks in its caliper: pads drag, by the torque",
+        replaced="T_drag",
+        value=10.0,
+    ),
 )
 
 

@@ -44,10 +44,20 @@ class Parameters(ParameterSet):
 
 
 FAULTS = (
-    ParameterFault("air", "gas bubbles in the chamber, by their volume", replaced="V_air",
-                   value=8.8e-9, with_it={"air": "entrained"}),
-    ParameterFault("air-in-line", "gas bubbles in line and caliper, by their volume",
-                   replaced="V_air", value=1.28e-6, with_it={"air": "caliper"}),
+    ParameterFault(
+        "air",
+        "gas bubbles in the chamber, by their volume",
+        replaced="V_air",
+        value=8.8e-9,
+        with_it={"air": "entrained"},
+    ),
+    ParameterFault(
+        "air-in-line",
+        "gas bubbles in line and caliper, by their volume",
+        replaced="V_air",
+        value=1.28e-6,
+        with_it={"air": "caliper"},
+    ),
     ParameterFault("cold", "thicker fluid", ("nu",), 3.0),
 )
 

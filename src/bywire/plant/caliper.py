@@ -70,10 +70,20 @@ class Parameters(ParameterSet):
 
 FAULTS = (
     ParameterFault("soft", "softer pads or a hose that swells", ("K_pd",), 0.5),
-    ParameterFault("leaking", "fluid is lost to the outside, by the leak's conductance",
-                   replaced="G_leak", value=1e-13, with_it={"leak": "leaking"}),
-    ParameterFault("heated", "fluid in the caliper warms and expands, by the rate",
-                   replaced="T_rate", value=1.0, with_it={"fluid_heat": "warming"}),
+    ParameterFault(
+        "leaking",
+        "fluid is lost to the outside, by the leak's conductance",
+        replaced="G_leak",
+        value=1e-13,
+        with_it={"leak": "leaking"},
+    ),
+    ParameterFault(
+        "heated",
+        "fluid in the caliper warms and expands, by the rate",
+        replaced="T_rate",
+        value=1.0,
+        with_it={"fluid_heat": "warming"},
+    ),
 )
 
 

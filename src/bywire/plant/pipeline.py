@@ -30,9 +30,7 @@ class Parameters(ParameterSet):
     """Reynolds number above which the flow is not laminar and the element warns"""
 
 
-FAULTS = (
-    ParameterFault("kinked", "narrower pipe", ("d_pl",), 0.3),
-)
+FAULTS = (ParameterFault("kinked", "narrower pipe", ("d_pl",), 0.3),)
 
 
 class Input(NamedTuple):

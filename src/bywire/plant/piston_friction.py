@@ -40,9 +40,14 @@ class Parameters(ParameterSet):
 
 
 FAULTS = (
-    ParameterFault("stuck", "the piston sticks in its seal, by the friction force",
-                   replaced="F_fr", value=60.0, with_it={"law": "sticking"}),
-)  # fmt: skip
+    ParameterFault(
+        "stuck",
+        "the piston sticks in its seal, by the friction force",
+        replaced="F_fr",
+        value=60.0,
+        with_it={"law": "sticking"},
+    ),
+)
 
 
 class Input(NamedTuple):

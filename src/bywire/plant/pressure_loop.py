@@ -20,9 +20,7 @@ class Parameters(ParameterSet):
     """its damping ratio"""
 
 
-FAULTS = (
-    ParameterFault("slow", "a slower loop: weak drive, cold fluid", ("f_n",), 0.3),
-)
+FAULTS = (ParameterFault("slow", "a slower loop: weak drive, cold fluid", ("f_n",), 0.3),)
 
 
 class State(NamedTuple):

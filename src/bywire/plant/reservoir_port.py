@@ -33,8 +33,13 @@ class Parameters(ParameterSet):
 
 FAULTS = (
     ParameterFault("blocked", "the uncovered port lets nothing back", ("G_port",), 0.0),
-    ParameterFault("leaking", "the cup seal lets fluid back, by its conductance",
-                   replaced="G_port", value=1e-13, with_it={"law": "leaking"}),
+    ParameterFault(
+        "leaking",
+        "the cup seal lets fluid back, by its conductance",
+        replaced="G_port",
+        value=1e-13,
+        with_it={"law": "leaking"},
+    ),
 )
 
 

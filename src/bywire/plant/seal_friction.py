@@ -41,8 +41,12 @@ class Parameters(ParameterSet):
 
 
 FAULTS = (
-    ParameterFault("swollen", "more friction, the same multiple everywhere",
-                   ("T_pr", "f_cfr_p", "f_cfr_n"), 1.9),
+    ParameterFault(
+        "swollen",
+        "more friction, the same multiple everywhere",
+        ("T_pr", "f_cfr_p", "f_cfr_n"),
+        1.9,
+    ),
 )
 
 

@@ -169,9 +169,13 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
         for block in figures:
             save_figure(block.figure, place.scratch / f"{block.name}.png")
         write_page(
-            place.scratch / document.page_name, document.title, document.summary, document.page,
-            banner=document.banner, files=names,
-        )  # fmt: skip
+            place.scratch / document.page_name,
+            document.title,
+            document.summary,
+            document.page,
+            banner=document.banner,
+            files=names,
+        )
     if document.record:
         _record(document, place, names)
     return names

@@ -101,15 +101,24 @@ def bode(
         line = "o" if response.measured else ("-", "--", "-.")[k // len(style.SEQUENCE) % 3]
         for axes, values in ((upper, response.magnitude_db), (lower, response.phase_deg)):
             axes.plot(
-                response.frequency, values, line, color=style.SEQUENCE[k % len(style.SEQUENCE)],
-                markersize=3.5, linewidth=1.3, markerfacecolor="white",
+                response.frequency,
+                values,
+                line,
+                color=style.SEQUENCE[k % len(style.SEQUENCE)],
+                markersize=3.5,
+                linewidth=1.3,
+                markerfacecolor="white",
                 label=style.plain(response.label),
             )
     for k, (label, frequency) in enumerate((marks or {}).items()):
         for axes in (upper, lower):
             axes.axvline(
-                frequency, color=style.GRAY, linewidth=1.0, zorder=1.5,
-                linestyle=(":", "--", "-.")[k % 3], label=style.plain(label),
+                frequency,
+                color=style.GRAY,
+                linewidth=1.0,
+                zorder=1.5,
+                linestyle=(":", "--", "-.")[k % 3],
+                label=style.plain(label),
             )
     upper.set_xscale("log")
     upper.margins(x=0.01)

@@ -66,11 +66,15 @@ def value_changes(
     units = {name: leaves[name].unit.symbol if name in leaves else "1" for name in values}
     return tuple(
         Change(
-            prefix + name, value_text(value, units[name]),
-            value_text(before.get(name), units[name]), of, (origins or {}).get(name, ""),
+            prefix + name,
+            value_text(value, units[name]),
+            value_text(before.get(name), units[name]),
+            of,
+            (origins or {}).get(name, ""),
         )
-        for name, value in values.items() if value != before.get(name)
-    )  # fmt: skip
+        for name, value in values.items()
+        if value != before.get(name)
+    )
 
 
 def defaults_of(name: str) -> str:
@@ -98,10 +102,15 @@ def changes_block(
         rows = [(each.name, each.now, each.before, each.where or each.of) for each in changes]
         heads = ("changed", "value", "instead of", "source")
         return TableBlock(text_table(heads, rows), "What was changed.")
-    unchanged = ", ".join(filter(None, [
-        f"all parameters are those of {parameters}" if parameters else "",
-        f"all options are those of {defaults}" if defaults else "",
-    ]))  # fmt: skip
+    unchanged = ", ".join(
+        filter(
+            None,
+            [
+                f"all parameters are those of {parameters}" if parameters else "",
+                f"all options are those of {defaults}" if defaults else "",
+            ],
+        )
+    )
     if varied:
         return Paragraph(f"Only {', '.join(varied)} varied; apart from that, {unchanged}.")
     return Paragraph(f"Nothing was changed: {unchanged}.")

@@ -58,17 +58,25 @@ def contour(data: xr.Dataset, shown: Map) -> Figure:
     z = np.clip(z, None if below else levels[0], None if above else levels[-1])
     extend: _Extend = ("both" if above else "min") if below else ("max" if above else "neither")
     filled = axes.contourf(
-        x, y, z, levels=levels, extend=extend, cmap=colors,
-        norm=BoundaryNorm(levels, colors.N, extend=extend), alpha=0.75,
-    )  # fmt: skip
+        x,
+        y,
+        z,
+        levels=levels,
+        extend=extend,
+        cmap=colors,
+        norm=BoundaryNorm(levels, colors.N, extend=extend),
+        alpha=0.75,
+    )
     between = levels[0 if below else 1 : None if above else -1]
     axes.contour(x, y, z, levels=between, colors="white", linewidths=0.5)
     bar = figure.colorbar(filled, ax=axes, ticks=levels, format="%g")
     bar.ax.tick_params(labelsize=style.TEXT_SIZE)
     bar.set_label(_label(data[shown.values]), fontsize=style.TEXT_SIZE)
     handles = [
-        *_limits(axes, data, shown, x, y), *_curves(axes, data, shown), *_marks(axes, data, shown)
-    ]  # fmt: skip
+        *_limits(axes, data, shown, x, y),
+        *_curves(axes, data, shown),
+        *_marks(axes, data, shown),
+    ]
     axes.set_xlabel(_label(data[shown.x]))
     axes.set_ylabel(_label(data[shown.y]))
     if handles:
@@ -98,9 +106,7 @@ def levels_between(low: float, high: float) -> list[float]:
     return [float(f"{k * step:.6g}") for k in range(first, max(last, first + 2) + 1)]
 
 
-def _limits(
-    axes: Axes, data: xr.Dataset, shown: Map, x: Array, y: Array
-) -> list[Line2D | Patch]:
+def _limits(axes: Axes, data: xr.Dataset, shown: Map, x: Array, y: Array) -> list[Line2D | Patch]:
     """Draw the borders of what is possible, hatched beyond; return the legend's entries."""
     handles: list[Line2D | Patch] = []
     for k, (label, (name, level)) in enumerate(shown.limits.items()):
@@ -115,9 +121,14 @@ def _limits(
             x, y, values, levels=[level], colors=style.BLACK, linewidths=1.0, linestyles=line
         )
         handles.append(
-            Patch(facecolor="none", edgecolor=style.BLACK, hatch=hatch,
-                  linewidth=0.8, label=style.plain(label))
-        )  # fmt: skip
+            Patch(
+                facecolor="none",
+                edgecolor=style.BLACK,
+                hatch=hatch,
+                linewidth=0.8,
+                label=style.plain(label),
+            )
+        )
     return handles
 
 
@@ -128,9 +139,13 @@ def _curves(axes: Axes, data: xr.Dataset, shown: Map) -> list[Line2D | Patch]:
     for k, (label, points) in enumerate(shown.curves.items()):
         at = [in_display_unit(np.array(part), u)[0] for part, u in zip(points, units, strict=True)]
         (handle,) = axes.plot(
-            *at, color=style.VERMILLION, linewidth=1.3, linestyle=_CURVES[k % len(_CURVES)],
-            zorder=4, label=style.plain(label),
-        )  # fmt: skip
+            *at,
+            color=style.VERMILLION,
+            linewidth=1.3,
+            linestyle=_CURVES[k % len(_CURVES)],
+            zorder=4,
+            label=style.plain(label),
+        )
         handles.append(handle)
     return handles
 
@@ -151,9 +166,15 @@ def _marks(axes: Axes, data: xr.Dataset, shown: Map) -> list[Line2D | Patch]:
         ]
         marker = _MARKERS[k % len(_MARKERS)]
         (handle,) = axes.plot(
-            *at, marker, color=style.VERMILLION, markersize=11 if marker == "*" else 6,
-            markeredgecolor="white", linestyle="none", zorder=5, label=style.plain(mark.label),
-        )  # fmt: skip
+            *at,
+            marker,
+            color=style.VERMILLION,
+            markersize=11 if marker == "*" else 6,
+            markeredgecolor="white",
+            linestyle="none",
+            zorder=5,
+            label=style.plain(mark.label),
+        )
         handles.append(handle)
     return handles
 

@@ -26,10 +26,14 @@ def correlation_matrix(estimate: Estimate) -> Figure:
     if size <= _NUMBERED:
         for (row, column), value in np.ndenumerate(c):
             axes.text(
-                column, row, f"{value:.2f}", ha="center", va="center",
+                column,
+                row,
+                f"{value:.2f}",
+                ha="center",
+                va="center",
                 fontsize=style.TEXT_SIZE - 1.5,
                 color="white" if abs(value) > 0.6 else style.BLACK,
-            )  # fmt: skip
+            )
     bar = figure.colorbar(image, ax=axes, shrink=0.9)
     bar.set_label("correlation [-]", fontsize=style.TEXT_SIZE)
     bar.ax.tick_params(labelsize=style.TEXT_SIZE)

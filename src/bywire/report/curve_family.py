@@ -47,10 +47,13 @@ def draw_family(
             else value_color(family.values, k)
         )
         axes.plot(
-            *points(curve), color=color, linestyle="-" if stable else "--",
-            linewidth=1.8 if top else 0.9, zorder=3.5 if top else 3.0,
+            *points(curve),
+            color=color,
+            linestyle="-" if stable else "--",
+            linewidth=1.8 if top else 0.9,
+            zorder=3.5 if top else 3.0,
             label=_name(family, label) if top else "_",
-        )  # fmt: skip
+        )
 
 
 def value_bar(figure: Figure, panels: list[Axes], family: Family) -> None:

@@ -144,6 +144,4 @@ def _spans(time: Array, active: NDArray[np.bool_]) -> list[tuple[float, float]]:
     change = np.diff(padded)
     starts = np.flatnonzero(change == 1)
     ends = np.minimum(np.flatnonzero(change == -1), len(time) - 1)
-    return [
-        (float(time[a]), float(time[b])) for a, b in zip(starts, ends, strict=True) if b > a
-    ]
+    return [(float(time[a]), float(time[b])) for a, b in zip(starts, ends, strict=True) if b > a]

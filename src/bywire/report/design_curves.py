@@ -56,20 +56,42 @@ def loop_gains(curves: Sequence[DesignCurve], phase_margin: float | None) -> Fig
         f = design.curve.frequency
         margins = design.curve.margins
         label = f"{design.label}: {margins.phase:.3g}° at {margins.phase_at:.3g} Hz"
-        upper.plot(f, 20.0 * np.log10(np.abs(design.curve.L)), line, color=color, linewidth=1.6,
-                   label=label if margins.stable else f"{design.label}: unstable")  # fmt: skip
+        upper.plot(
+            f,
+            20.0 * np.log10(np.abs(design.curve.L)),
+            line,
+            color=color,
+            linewidth=1.6,
+            label=label if margins.stable else f"{design.label}: unstable",
+        )
         lower.plot(f, design.curve.phase, line, color=color, linewidth=1.6)
         if math.isfinite(margins.phase_at):
-            lower.plot([margins.phase_at] * 2, [-180.0, margins.phase - 180.0], color=color,
-                       linewidth=3.0, alpha=0.6, zorder=4)  # fmt: skip
+            lower.plot(
+                [margins.phase_at] * 2,
+                [-180.0, margins.phase - 180.0],
+                color=color,
+                linewidth=3.0,
+                alpha=0.6,
+                zorder=4,
+            )
     upper.axhline(0.0, color=style.GRAY, linewidth=0.8, zorder=1)
     lower.axhline(-180.0, color=style.GRAY, linewidth=0.8, zorder=1)
     if phase_margin is not None:
         look = style.STROKES[Role.LIMIT]
-        lower.axhline(phase_margin - 180.0, color=look.color, linestyle=look.linestyle,
-                      linewidth=look.linewidth)  # fmt: skip
-        upper.plot([], [], color=look.color, linestyle=look.linestyle, linewidth=look.linewidth,
-                   label=f"required phase margin {phase_margin:.3g}°")  # fmt: skip
+        lower.axhline(
+            phase_margin - 180.0,
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+        )
+        upper.plot(
+            [],
+            [],
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            label=f"required phase margin {phase_margin:.3g}°",
+        )
     span = max(float(np.ptp(design.curve.phase)) for design in curves)
     lower.yaxis.set_major_locator(MultipleLocator(45.0 if span < 300.0 else 90.0))
     upper.set_ylabel("magnitude of L [dB]")
@@ -85,8 +107,13 @@ def sensitivities(curves: Sequence[DesignCurve]) -> Figure:
     figure, panels = style.new_figure(4.8, (1.0, 1.0))
     for axes, quantity, limit in ((panels[0], "S", MOST_S), (panels[1], "T", MOST_T)):
         look = style.STROKES[Role.LIMIT]
-        axes.axhline(20.0 * math.log10(limit), color=look.color, linestyle=look.linestyle,
-                     linewidth=look.linewidth, label=f"usual limit {limit:g}")  # fmt: skip
+        axes.axhline(
+            20.0 * math.log10(limit),
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            label=f"usual limit {limit:g}",
+        )
         axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
         highest, lowest = 20.0 * math.log10(limit), 0.0
         for design, color, line in zip(curves, _COLORS, _LINES, strict=False):
@@ -95,8 +122,14 @@ def sensitivities(curves: Sequence[DesignCurve]) -> Figure:
             size = 20.0 * np.log10(np.abs(getattr(design.curve, quantity)))
             highest, lowest = max(highest, float(size.max())), min(lowest, float(size.min()))
             peak = 10.0 ** (float(size.max()) / 20.0)
-            axes.plot(design.curve.frequency, size, line, color=color, linewidth=1.6,
-                      label=f"{design.label}: max |{quantity}| {peak:.3g}")  # fmt: skip
+            axes.plot(
+                design.curve.frequency,
+                size,
+                line,
+                color=color,
+                linewidth=1.6,
+                label=f"{design.label}: max |{quantity}| {peak:.3g}",
+            )
         axes.set_ylim(max(lowest, _LOWEST) - 2.0, highest + 3.0)
         axes.set_ylabel(f"|{quantity}| [dB]")
         style.legend_above(axes)
@@ -122,13 +155,23 @@ def steps(curves: Sequence[DesignCurve], overshoot: float | None) -> Figure:
     for design, color, line in zip(curves, _COLORS, _LINES, strict=False):
         if design.curve.margins.stable:
             time = np.append(design.time, max(end, design.time[-1]))
-            axes.plot(time, np.append(design.step, design.step[-1]), line, color=color,
-                      linewidth=1.6, label=design.label)  # fmt: skip
+            axes.plot(
+                time,
+                np.append(design.step, design.step[-1]),
+                line,
+                color=color,
+                linewidth=1.6,
+                label=design.label,
+            )
     if overshoot is not None:
         look = style.STROKES[Role.LIMIT]
-        axes.axhline(1.0 + 0.01 * overshoot, color=look.color, linestyle=look.linestyle,
-                     linewidth=look.linewidth,
-                     label=f"required overshoot {overshoot:.3g} %")  # fmt: skip
+        axes.axhline(
+            1.0 + 0.01 * overshoot,
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            label=f"required overshoot {overshoot:.3g} %",
+        )
     axes.set_xlim(0.0, end)
     axes.set_xlabel(style.axis_label("time", "s"))
     axes.set_ylabel("output over step [-]")

@@ -54,9 +54,10 @@ def differences_from_first(recordings: Mapping[str, xr.Dataset]) -> dict[str, xr
     if base.sizes["time"] < 2:
         return {}
     names = [
-        str(name) for name in base.data_vars
+        str(name)
+        for name in base.data_vars
         if all(_is_comparable(base[name], each, str(name)) for _, each in others)
-    ]  # fmt: skip
+    ]
     apart = {f"{k} less {base_label}": _less(each, base, names) for k, each in others}
     differ = any(bool(np.any(each[name].values)) for each in apart.values() for name in names)
     return apart if differ else {}

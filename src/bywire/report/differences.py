@@ -48,14 +48,22 @@ def differences(
         for k, (name, values) in enumerate(sizes.items()):
             size = np.abs(values[n])
             axes.plot(
-                frequency, np.where(np.isfinite(size), np.maximum(size, floor), np.nan),
+                frequency,
+                np.where(np.isfinite(size), np.maximum(size, floor), np.nan),
                 color=style.SEQUENCE[k % len(style.SEQUENCE)],
                 linestyle=_DASHES[k // len(style.SEQUENCE) % len(_DASHES)],
-                marker=_MARKERS[k % len(_MARKERS)], markersize=4.5, linewidth=1.2,
+                marker=_MARKERS[k % len(_MARKERS)],
+                markersize=4.5,
+                linewidth=1.2,
                 label=style.plain(name),
-            )  # fmt: skip
-        axes.axhline(tolerance[n], color=look.color, linestyle=look.linestyle,
-                     linewidth=look.linewidth, label="counts as agreement")  # fmt: skip
+            )
+        axes.axhline(
+            tolerance[n],
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            label="counts as agreement",
+        )
         axes.set_yscale("log")
         axes.set_ylabel(f"difference of {label}")
     panels[1].set_xscale("log")

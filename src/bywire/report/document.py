@@ -251,10 +251,13 @@ class Document:
         data = {"headline": self.headline, **data} if self.headline else data
         if self.changes is None:
             return data
-        return {**data, "changes": {
-            each.name: {"value": each.now, "instead_of": each.before, "of": each.of}
-            for each in self.changes
-        }}  # fmt: skip
+        return {
+            **data,
+            "changes": {
+                each.name: {"value": each.now, "instead_of": each.before, "of": each.of}
+                for each in self.changes
+            },
+        }
 
     def flat(self) -> Iterator[Flat]:
         """Yield the blocks of all sections, folded ones among them."""

@@ -84,9 +84,17 @@ class _Vector(RendererSVG):
         super().__init__(width, height, self._text, metadata=_ANONYMOUS)
 
     def draw_text(
-        self, gc: GraphicsContextBase, x: float, y: float, s: str, prop: FontProperties,
-        angle: float, ismath: Any = False, mtext: Text | None = None, width: float = 0.0,
-    ) -> None:  # fmt: skip
+        self,
+        gc: GraphicsContextBase,
+        x: float,
+        y: float,
+        s: str,
+        prop: FontProperties,
+        angle: float,
+        ismath: Any = False,
+        mtext: Text | None = None,
+        width: float = 0.0,
+    ) -> None:
         size = self._points * float(prop.get_size_in_points())
         if ismath:
             scaled = prop.copy()
@@ -106,20 +114,26 @@ class _Vector(RendererSVG):
         if angle:
             place["transform"] = f"rotate({-angle:g} {x:.1f} {y:.1f})"
         style = "; ".join(f"{key}: {value}" for key, value in look.items())
-        self.writer.element("text", text=s, attrib=place, lengthAdjust="spacingAndGlyphs",
-                            style=style)  # fmt: skip
+        self.writer.element(
+            "text", text=s, attrib=place, lengthAdjust="spacingAndGlyphs", style=style
+        )
 
     def draw_pixels(self, x: int, y: int, pixels: _Pixels) -> None:
         """Draw an image, upside down, whose lower left corner is at (x, y)."""
         data = _png(pixels)
         height, width, _ = pixels.shape
-        self.writer.element("image", attrib={
-            "id": self._make_id("image", data),
-            "xlink:href": "data:image/png;base64,\n" + base64.b64encode(data).decode("ascii"),
-            "transform": f"scale(1 -1) translate(0 {-height})",
-            "x": f"{x}", "y": f"{y + height - self.height:g}",
-            "width": f"{width}", "height": f"{height}",
-        })  # fmt: skip
+        self.writer.element(
+            "image",
+            attrib={
+                "id": self._make_id("image", data),
+                "xlink:href": "data:image/png;base64,\n" + base64.b64encode(data).decode("ascii"),
+                "transform": f"scale(1 -1) translate(0 {-height})",
+                "x": f"{x}",
+                "y": f"{y + height - self.height:g}",
+                "width": f"{width}",
+                "height": f"{height}",
+            },
+        )
 
     def _get_style_dict(self, gc: GraphicsContextBase, rgbFace: Any) -> dict[str, Any]:
         scaled = self.new_gc()
@@ -149,11 +163,22 @@ class _Both(RendererBase):
         self._image: Any = None
         self.width, self.height, self.dpi = agg.width, agg.height, agg.dpi
         self._sizes: dict[tuple[str, int, Any], tuple[float, float, float]] = {}
-        for name in ("new_gc", "points_to_pixels", "get_canvas_width_height",
-                     "get_image_magnification", "flipy"):  # fmt: skip
+        for name in (
+            "new_gc",
+            "points_to_pixels",
+            "get_canvas_width_height",
+            "get_image_magnification",
+            "flipy",
+        ):
             setattr(self, name, getattr(agg, name))
-        for name in ("draw_path", "draw_markers", "draw_path_collection", "draw_quad_mesh",
-                     "draw_image", "draw_gouraud_triangles"):  # fmt: skip
+        for name in (
+            "draw_path",
+            "draw_markers",
+            "draw_path_collection",
+            "draw_quad_mesh",
+            "draw_image",
+            "draw_gouraud_triangles",
+        ):
             setattr(self, name, self._twice(name))
 
     @property
@@ -162,9 +187,16 @@ class _Both(RendererBase):
         return np.asarray(self._agg.buffer_rgba())
 
     def draw_text(
-        self, gc: GraphicsContextBase, x: float, y: float, s: str, prop: FontProperties,
-        angle: float, ismath: Any = False, mtext: Text | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        gc: GraphicsContextBase,
+        x: float,
+        y: float,
+        s: str,
+        prop: FontProperties,
+        angle: float,
+        ismath: Any = False,
+        mtext: Text | None = None,
+    ) -> None:
         self._agg.draw_text(gc, x, y, s, prop, angle, ismath, mtext)
         width, _, _ = self.get_text_width_height_descent(s, prop, ismath)
         self.vector.draw_text(gc, x, y, s, prop, angle, ismath, mtext, width)
@@ -200,8 +232,9 @@ class _Both(RendererBase):
         rows, columns = (np.flatnonzero(pixels[..., 3].any(axis=axis)) for axis in (1, 0))
         self._image = None
         if rows.size:
-            image = pixels[rows[-1] : rows[0] - 1 if rows[0] else None : -1,
-                           columns[0] : columns[-1] + 1]  # fmt: skip
+            image = pixels[
+                rows[-1] : rows[0] - 1 if rows[0] else None : -1, columns[0] : columns[-1] + 1
+            ]
             below = len(pixels) - int(rows[-1]) - 1
             self.vector.draw_pixels(int(columns[0]), below, image)
 
@@ -228,12 +261,14 @@ def _png(pixels: _Pixels, dpi: float = 0.0) -> bytes:
     per_meter = round(dpi / 0.0254)
     size = _chunk(b"pHYs", struct.pack(">IIB", per_meter, per_meter, 1)) if dpi else b""
     kind = {3: 2, 4: 6}[colors]  # of opaque colors, or with their opacity
-    return b"\x89PNG\r\n\x1a\n" + b"".join([
-        _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, kind, 0, 0, 0)),
-        size,
-        _chunk(b"IDAT", zlib.compress(rows.data, _COMPRESSION)),
-        _chunk(b"IEND", b""),
-    ])
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        [
+            _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, kind, 0, 0, 0)),
+            size,
+            _chunk(b"IDAT", zlib.compress(rows.data, _COMPRESSION)),
+            _chunk(b"IEND", b""),
+        ]
+    )
 
 
 def _chunk(name: bytes, data: bytes) -> bytes:

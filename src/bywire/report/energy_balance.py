@@ -167,7 +167,12 @@ def _stack(axes: Axes, row: float, entries: list[Entry], total: float) -> None:
         digits = max(3, len(f"{entry.energy:.0f}"))  # no powers of ten where kilojoules are turned
         label = f"{entry.label}: {amount(entry.energy, 'J', digits)} ({share})"
         axes.barh(
-            row, entry.energy, left=left, height=0.62, color=entry.color, linewidth=0,
+            row,
+            entry.energy,
+            left=left,
+            height=0.62,
+            color=entry.color,
+            linewidth=0,
             label=style.plain(label),
         )
         left += entry.energy
@@ -178,7 +183,13 @@ def _draw_missing(axes: Axes, missing: float, total: float) -> None:
     if abs(missing) <= 1e-6 * total:
         return
     axes.barh(
-        0.0 if missing > 0 else 1.0, abs(missing), left=total - abs(missing), height=0.62,
-        facecolor="white", edgecolor=style.BLACK, hatch="///", linewidth=0.8,
+        0.0 if missing > 0 else 1.0,
+        abs(missing),
+        left=total - abs(missing),
+        height=0.62,
+        facecolor="white",
+        edgecolor=style.BLACK,
+        hatch="///",
+        linewidth=0.8,
         label=f"not accounted for: {amount(abs(missing), 'J', 2)}",
     )

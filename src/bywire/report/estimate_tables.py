@@ -33,16 +33,20 @@ def estimate_table(
     """
     beside: dict[str, Mapping[str, float]] = {"put in": put_in or {}, "start": start or {}}
     beside = {
-        title: known for title, known in beside.items()
+        title: known
+        for title, known in beside.items()
         if any(u.label in known for u in estimate.all_unknowns)
-    }  # fmt: skip
+    }
     rows = []
     steps = estimate.step_errors
     unknown_errors = [math.nan] * len(estimate.unknowns)
     for unknown, value, (low, high), error in zip(
-        estimate.unknowns, estimate.values, estimate.intervals(),
-        unknown_errors if steps is None else steps, strict=True,
-    ):  # fmt: skip
+        estimate.unknowns,
+        estimate.values,
+        estimate.intervals(),
+        unknown_errors if steps is None else steps,
+        strict=True,
+    ):
         number, half, unit = with_interval(float(value), 0.5 * float(high - low), unknown.unit)
         share = _percent(50.0 * float(high - low) / abs(value)) if value else "-"
         shown = in_display_unit(float(value), unknown.unit)[0]
@@ -50,25 +54,36 @@ def estimate_table(
         off = display_factor(unknown.unit) * abs(float(error))
         by_step = [] if steps is None else [Cell(f"{off:.1g}", value=off)]
         rows.append(
-            (unknown, [Cell(number, value=shown), Cell(half, value=reach), *by_step, Cell(share),
-                       Cell(unit)])
-        )  # fmt: skip
+            (
+                unknown,
+                [
+                    Cell(number, value=shown),
+                    Cell(half, value=reach),
+                    *by_step,
+                    Cell(share),
+                    Cell(unit),
+                ],
+            )
+        )
     for u in (kept.unknown for kept in estimate.kept):
         number, _, unit = with_interval(u.start, 0.0, u.unit)
         by_step = [] if steps is None else [Cell("-")]
-        rows.append(
-            (u, [Cell(number), Cell("not told", "bad"), *by_step, Cell("-"), Cell(unit)])
-        )
+        rows.append((u, [Cell(number), Cell("not told", "bad"), *by_step, Cell("-"), Cell(unit)]))
     return Table(
-        (Column("parameter"), Column("estimate", numeric=True), Column("± (95 %)", numeric=True),
-         *([] if steps is None else [Column("by the step", numeric=True)]),
-         Column("share", numeric=True), Column("unit"),
-         *(Column(title, numeric=True) for title in beside)),
+        (
+            Column("parameter"),
+            Column("estimate", numeric=True),
+            Column("± (95 %)", numeric=True),
+            *([] if steps is None else [Column("by the step", numeric=True)]),
+            Column("share", numeric=True),
+            Column("unit"),
+            *(Column(title, numeric=True) for title in beside),
+        ),
         tuple(
             (Cell(clean(u.label)), *cells, *(_known(known, u) for known in beside.values()))
             for u, cells in rows
         ),
-    )  # fmt: skip
+    )
 
 
 def with_interval(value: float, half: float, symbol: str) -> tuple[str, str, str]:
@@ -104,14 +119,24 @@ def check_table(checks: Sequence[Check]) -> Table:
         if check.limit is not None:
             verdict = Cell("ok", "good") if check.holds else Cell("failed", "bad")
         rows.append(
-            (Cell(clean(check.name)), Cell(amount(check.value, check.unit)), Cell(limit), verdict,
-             Cell(clean(check.note)))
-        )  # fmt: skip
+            (
+                Cell(clean(check.name)),
+                Cell(amount(check.value, check.unit)),
+                Cell(limit),
+                verdict,
+                Cell(clean(check.note)),
+            )
+        )
     return Table(
-        (Column("check"), Column("value", numeric=True), Column("limit", numeric=True),
-         Column("result"), Column("meaning")),
+        (
+            Column("check"),
+            Column("value", numeric=True),
+            Column("limit", numeric=True),
+            Column("result"),
+            Column("meaning"),
+        ),
         tuple(rows),
-    )  # fmt: skip
+    )
 
 
 def figure_table(identified: Identified) -> Table:
@@ -132,16 +157,25 @@ def trust_table(trust: Trust) -> Table:
         low, high = recovered.coverage_range
         ratio = recovered.claimed / recovered.scatter if recovered.scatter > 0.0 else float("nan")
         rows.append(
-            (Cell(clean(recovered.label)), Cell(amount(recovered.truth, recovered.unit)),
-             Cell(str(recovered.count)),
-             Cell(f"{recovered.bias_in_errors:+.2f}"),
-             Cell(f"{100 * recovered.coverage:.1f} % ({100 * low:.0f} to {100 * high:.0f} %)"),
-             Cell(f"{ratio:.2f}"),
-             Cell("ok", "good") if recovered.holds else Cell("failed", "bad"))
-        )  # fmt: skip
+            (
+                Cell(clean(recovered.label)),
+                Cell(amount(recovered.truth, recovered.unit)),
+                Cell(str(recovered.count)),
+                Cell(f"{recovered.bias_in_errors:+.2f}"),
+                Cell(f"{100 * recovered.coverage:.1f} % ({100 * low:.0f} to {100 * high:.0f} %)"),
+                Cell(f"{ratio:.2f}"),
+                Cell("ok", "good") if recovered.holds else Cell("failed", "bad"),
+            )
+        )
     return Table(
-        (Column("parameter"), Column("put in", numeric=True), Column("count", numeric=True),
-         Column("bias / standard error", numeric=True), Column("intervals that hold it"),
-         Column("claimed / real scatter", numeric=True), Column("result")),
+        (
+            Column("parameter"),
+            Column("put in", numeric=True),
+            Column("count", numeric=True),
+            Column("bias / standard error", numeric=True),
+            Column("intervals that hold it"),
+            Column("claimed / real scatter", numeric=True),
+            Column("result"),
+        ),
         tuple(rows),
-    )  # fmt: skip
+    )

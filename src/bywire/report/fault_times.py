@@ -33,18 +33,31 @@ def fault_times(faults: Sequence[FaultTimes]) -> Figure:
     figure, (axes,) = style.new_figure(0.9 + _ROW * len(ordered))
     places = np.arange(len(ordered))[::-1]
     for label, color, marker, column in (
-        ("too much", style.VERMILLION, "s", 0), ("seen", style.BLUE, "o", 1)
-    ):  # fmt: skip
+        ("too much", style.VERMILLION, "s", 0),
+        ("seen", style.BLUE, "o", 1),
+    ):
         for place, fault in zip(places, ordered, strict=True):
             times = fault[1:][column]
             there = np.maximum(times[~np.isnan(times)], _LEAST) * 1e3
             shift = 0.14 * (1 - 2 * column)
             if there.size > 1:
-                axes.plot([there.min(), there.max()], [place + shift] * 2, color=color,
-                          linewidth=1.0, zorder=2)  # fmt: skip
-            axes.plot(there, np.full(there.size, place + shift), marker, color=color,
-                      markersize=3.5, linestyle="none", zorder=3,
-                      label=label if place == places[0] else None)  # fmt: skip
+                axes.plot(
+                    [there.min(), there.max()],
+                    [place + shift] * 2,
+                    color=color,
+                    linewidth=1.0,
+                    zorder=2,
+                )
+            axes.plot(
+                there,
+                np.full(there.size, place + shift),
+                marker,
+                color=color,
+                markersize=3.5,
+                linestyle="none",
+                zorder=3,
+                label=label if place == places[0] else None,
+            )
     axes.set_xscale("log")
     style.log_ticks(axes.xaxis)
     axes.set_yticks(places, [style.plain(fault.name) for fault in ordered])
@@ -75,13 +88,25 @@ def alarm_curves(curves: Mapping[str, Curve], healthy: int) -> Figure:
             continue
         color = style.SEQUENCE[k % len(style.SEQUENCE)]
         x, y = ([row[n] for row in shown] for n in (1, 2))
-        axes.plot(np.array(x) / healthy * 100, np.array(y) * 1e3, color=color, linewidth=1.0,
-                  marker=markers[k % len(markers)], markersize=4,
-                  label=style.plain(name))  # fmt: skip
+        axes.plot(
+            np.array(x) / healthy * 100,
+            np.array(y) * 1e3,
+            color=color,
+            linewidth=1.0,
+            marker=markers[k % len(markers)],
+            markersize=4,
+            label=style.plain(name),
+        )
         for factor, alarms, delay, _ in shown:
             if factor == 1.0:
-                axes.plot(alarms / healthy * 100, delay * 1e3, "o", markersize=9, fillstyle="none",
-                          color=color)  # fmt: skip
+                axes.plot(
+                    alarms / healthy * 100,
+                    delay * 1e3,
+                    "o",
+                    markersize=9,
+                    fillstyle="none",
+                    color=color,
+                )
     axes.set_xscale("symlog", linthresh=100.0 / healthy)
     axes.set_yscale("log")
     style.log_ticks(axes.yaxis)

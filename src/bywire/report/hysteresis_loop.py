@@ -65,7 +65,10 @@ def hysteresis_loop(
         if average > 0:
             kept = np.union1d(kept_samples(x.time, x.values), kept_samples(x.time, y.values))
             axes.plot(
-                x.values[kept], y.values[kept], color=color, linewidth=0.4,
+                x.values[kept],
+                y.values[kept],
+                color=color,
+                linewidth=0.4,
                 alpha=style.PALE_OPACITY,
             )
             x, y = (replace(v, values=smoothed(v.time, v.values, average)) for v in (x, y))
@@ -80,9 +83,7 @@ def hysteresis_loop(
     if average > 0:
         label = f"ripple around the average over {duration(average)}"
         opacity = style.PALE_OPACITY
-        handles.append(
-            Line2D([], [], color=style.GRAY, linewidth=6.0, alpha=opacity, label=label)
-        )
+        handles.append(Line2D([], [], color=style.GRAY, linewidth=6.0, alpha=opacity, label=label))
     style.legend_above(axes, handles)
     axes.set_xlabel(style.channel_label(x))
     axes.set_ylabel(style.channel_label(y))
@@ -116,8 +117,12 @@ def _draw_branch(
                 xy=(tip_x, tip_y),
                 xytext=(tail_x, tail_y),
                 arrowprops={
-                    "arrowstyle": "-|>", "color": color, "linewidth": 0.0,
-                    "mutation_scale": 15.0, "shrinkA": 0.0, "shrinkB": 0.0,
+                    "arrowstyle": "-|>",
+                    "color": color,
+                    "linewidth": 0.0,
+                    "mutation_scale": 15.0,
+                    "shrinkA": 0.0,
+                    "shrinkB": 0.0,
                 },
             )
 

@@ -60,8 +60,9 @@ def kpi_curves(varied: Varied) -> Figure:
     shown = shown or _curves(varied)
     count = max(len(shown), 1)
     rows = -(-count // _COLUMNS)
-    figure = Figure(figsize=(style.WIDTH, 0.6 + _HEIGHT * rows), layout="constrained",
-                    facecolor="white")  # fmt: skip
+    figure = Figure(
+        figsize=(style.WIDTH, 0.6 + _HEIGHT * rows), layout="constrained", facecolor="white"
+    )
     grid = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False)
     abscissa = in_display_unit(np.array(varied.values), varied.unit)[0]
     for axes, name in zip(grid.flat, shown, strict=False):
@@ -70,18 +71,31 @@ def kpi_curves(varied: Varied) -> Figure:
         scale = scale_of(values, unit)
         values, errors = scale(values), scale.factor * errors
         known = np.isfinite(errors)
-        axes.errorbar(abscissa[known], values[known], errors[known],
-                      fmt="none", ecolor=style.BLUE, elinewidth=0.8, capsize=2.0)  # fmt: skip
-        axes.plot(abscissa, values, color=style.BLUE, linewidth=1.0, marker="o",
-                  markersize=3.0)  # fmt: skip
+        axes.errorbar(
+            abscissa[known],
+            values[known],
+            errors[known],
+            fmt="none",
+            ecolor=style.BLUE,
+            elinewidth=0.8,
+            capsize=2.0,
+        )
+        axes.plot(abscissa, values, color=style.BLUE, linewidth=1.0, marker="o", markersize=3.0)
         if name in varied.bench.requirements:
             look = style.STROKES[Role.LIMIT]
             bound = limit_of(name, varied.bench.requirements[name], unit)[1]
-            axes.axhline(scale(bound), color=look.color, linestyle=look.linestyle,
-                         linewidth=look.linewidth)  # fmt: skip
+            axes.axhline(
+                scale(bound), color=look.color, linestyle=look.linestyle, linewidth=look.linewidth
+            )
             missed = _missed(name, varied.results)
-            axes.plot(abscissa[missed], values[missed], color=look.color, marker="x",
-                      linestyle="none", markersize=6.0)  # fmt: skip
+            axes.plot(
+                abscissa[missed],
+                values[missed],
+                color=look.color,
+                marker="x",
+                linestyle="none",
+                markersize=6.0,
+            )
         style.few_ticks(axes, 4)
         axes.set_ylabel(scale.label(name.replace("_", " "), "\n"))
     for spare in list(grid.flat)[len(shown) :]:

@@ -14,11 +14,17 @@ _COLUMNS = 4  # that have room
 
 
 def legend_outside(
-    figure: Figure, handles: Sequence[Artist], place: Literal["left", "right"] = "left", *,
+    figure: Figure,
+    handles: Sequence[Artist],
+    place: Literal["left", "right"] = "left",
+    *,
     columns: int = _COLUMNS,
-) -> None:  # fmt: skip
+) -> None:
     """Put one legend above all panels of a figure, at its left or right end."""
     figure.legend(
-        handles=list(handles), ncols=columns, frameon=False, fontsize=style.TEXT_SIZE,
+        handles=list(handles),
+        ncols=columns,
+        frameon=False,
+        fontsize=style.TEXT_SIZE,
         loc="outside upper left" if place == "left" else "outside upper right",
-    )  # fmt: skip
+    )

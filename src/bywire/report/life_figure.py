@@ -52,12 +52,17 @@ def life_figure(courses: Sequence[Course], marks: Sequence[int]) -> Figure:
         shown = in_display_unit(course.values, course.unit)[0]
         stops = np.arange(shown.size, dtype=float)
         axes.plot(*decimate(stops, shown), color=style.BLUE, linewidth=1.2)
-        axes.plot(marks, shown[list(marks)], color=style.BLUE, marker="o", markersize=2.2,
-                  linestyle="none")  # fmt: skip
+        axes.plot(
+            marks,
+            shown[list(marks)],
+            color=style.BLUE,
+            marker="o",
+            markersize=2.2,
+            linestyle="none",
+        )
         if course.is_left:
             look = style.STROKES[Role.LIMIT]
-            axes.axhline(0.0, color=look.color, linestyle=look.linestyle,
-                         linewidth=look.linewidth)  # fmt: skip
+            axes.axhline(0.0, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth)
         style.few_ticks(axes, 4)
         axes.set_ylabel(style.axis_label(course.label, course.unit, "\n"))
     rows[-1].set_xlabel("stops")

@@ -43,8 +43,13 @@ def _spans(upper: Axes, lower: Axes, worst: LoopCurve) -> None:
     margins = worst.margins
     if math.isfinite(margins.phase_at):
         text = f"phase margin {margins.phase:.3g}° at {margins.phase_at:.3g} Hz"
-        lower.plot([margins.phase_at] * 2, [-180.0, margins.phase - 180.0], color=style.GREEN,
-                   linewidth=2.2, zorder=4)  # fmt: skip
+        lower.plot(
+            [margins.phase_at] * 2,
+            [-180.0, margins.phase - 180.0],
+            color=style.GREEN,
+            linewidth=2.2,
+            zorder=4,
+        )
         _line(upper, lower, margins.phase_at, style.GREEN, text)
     factors = (
         ("gain margin", margins.gain, margins.gain_at, style.PURPLE),
@@ -55,8 +60,9 @@ def _spans(upper: Axes, lower: Axes, worst: LoopCurve) -> None:
             continue
         text = f"{name} {factor:.3g} at {at:.3g} Hz"
         if at > 0.0:  # rest lies beyond the axis
-            upper.plot([at] * 2, [-20.0 * math.log10(factor), 0.0], color=color,
-                       linewidth=2.2, zorder=4)  # fmt: skip
+            upper.plot(
+                [at] * 2, [-20.0 * math.log10(factor), 0.0], color=color, linewidth=2.2, zorder=4
+            )
             _line(upper, lower, at, color, text)
         else:
             upper.plot([], [], color=color, linestyle="--", label=text)
@@ -64,8 +70,14 @@ def _spans(upper: Axes, lower: Axes, worst: LoopCurve) -> None:
 
 def _line(upper: Axes, lower: Axes, frequency: float, color: str, text: str) -> None:
     for axes in (upper, lower):
-        axes.axvline(frequency, color=color, linewidth=0.9, linestyle="--", zorder=1.6,
-                     label=text if axes is upper else "_")  # fmt: skip
+        axes.axvline(
+            frequency,
+            color=color,
+            linewidth=0.9,
+            linestyle="--",
+            zorder=1.6,
+            label=text if axes is upper else "_",
+        )
 
 
 def _magnitude(curve: LoopCurve) -> tuple[Array, Array]:

@@ -52,10 +52,13 @@ def _beside(curve: Curve) -> Figure:
     for name in (str(k) for k in data.data_vars if k not in ("measured", "modeled")):
         look = style.STROKES[Role.SECOND]
         upper.plot(
-            *_drawn(_abscissa(data, x, 0), _row(data[name], data[x], 0)), color=look.color,
-            zorder=look.zorder, linestyle=look.linestyle, linewidth=look.linewidth,
+            *_drawn(_abscissa(data, x, 0), _row(data[name], data[x], 0)),
+            color=look.color,
+            zorder=look.zorder,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
             label=style.plain(name),
-        )  # fmt: skip
+        )
     lower.axhline(0.0, color=style.GRAY, linewidth=0.6)
     for axes in (upper, lower):
         axes.margins(x=0.02 if sparse else 0.0)
@@ -99,11 +102,17 @@ def _draw_pair(
         look = style.STROKES[role]
         wide = bool(color) and role is Role.MEASURED and not few
         _draw(
-            axes, at, values, few and role is Role.MEASURED, color=color or look.color,
-            zorder=look.zorder, linestyle=look.linestyle, alpha=0.4 if wide else 1.0,
+            axes,
+            at,
+            values,
+            few and role is Role.MEASURED,
+            color=color or look.color,
+            zorder=look.zorder,
+            linestyle=look.linestyle,
+            alpha=0.4 if wide else 1.0,
             linewidth=3.0 if wide else look.linewidth,
             label=style.plain(f"{label} {word}".strip()),
-        )  # fmt: skip
+        )
 
 
 def _draw(axes: Axes, at: Array, values: Array, alone: bool, **look: object) -> None:
@@ -126,14 +135,21 @@ def _bands(axes: Axes, curve: Curve) -> None:
             low, high = _row(data["low"], data[x], k), _row(data["high"], data[x], k)
             axes.fill_between(at, low, high, color=color, alpha=0.25, linewidth=0.0)
         axes.plot(
-            at, _row(data["value"], data[x], k), color=color, linewidth=_LINE,
+            at,
+            _row(data["value"], data[x], k),
+            color=color,
+            linewidth=_LINE,
             label=style.plain(label or "modeled"),
-        )  # fmt: skip
+        )
         if "measured" in data:
             axes.plot(
-                at, _row(data["measured"], data[x], k), "o", color=color, markersize=3.0,
+                at,
+                _row(data["measured"], data[x], k),
+                "o",
+                color=color,
+                markersize=3.0,
                 label=style.plain(f"{label} measured".strip()),
-            )  # fmt: skip
+            )
     axes.margins(x=0.01)
     axes.set_xlabel(_x_label(data, x))
     value = data["value"]

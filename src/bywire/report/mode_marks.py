@@ -27,10 +27,15 @@ def mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
     spans = _scaled(recording, panel.saturation) if panel.saturation is not None else []
     if spans:
         axes.broken_barh(
-            spans, (1.0 - _HEIGHT, _HEIGHT), transform=axes.get_xaxis_transform(),
-            facecolor=style.VERMILLION, edgecolor=style.VERMILLION, linewidth=0.8, zorder=2.0,
+            spans,
+            (1.0 - _HEIGHT, _HEIGHT),
+            transform=axes.get_xaxis_transform(),
+            facecolor=style.VERMILLION,
+            edgecolor=style.VERMILLION,
+            linewidth=0.8,
+            zorder=2.0,
             label=panel.saturated,
-        )  # fmt: skip
+        )
 
 
 def mark_faults(axes: Axes, recording: xr.Dataset, *, named: bool) -> None:
@@ -79,9 +84,15 @@ def _draw_fault(
     axes: Axes, spans: list[tuple[float, float]], low: float, color: str | Color, label: str | None
 ) -> None:
     axes.broken_barh(
-        spans, (low, _HEIGHT), transform=axes.get_xaxis_transform(), facecolor=color,
-        edgecolor=color, linewidth=0.8, zorder=2.0, label=label,
-    )  # fmt: skip
+        spans,
+        (low, _HEIGHT),
+        transform=axes.get_xaxis_transform(),
+        facecolor=color,
+        edgecolor=color,
+        linewidth=0.8,
+        zorder=2.0,
+        label=label,
+    )
 
 
 def _scaled(recording: xr.Dataset, variable: str) -> list[tuple[float, float]]:

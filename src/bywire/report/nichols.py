@@ -36,8 +36,9 @@ def nichols(family: Family) -> Figure:
     with np.errstate(divide="ignore", invalid="ignore"):
         T = 20.0 * np.log10(np.abs(L / (1.0 + L)))
         apart = np.abs((1.0 - L) / (1.0 + L))
-    lines = axes.contour(phase, gain, T, levels=CONTOURS, colors=style.GRAY, linewidths=0.6,
-                         linestyles="-")  # fmt: skip
+    lines = axes.contour(
+        phase, gain, T, levels=CONTOURS, colors=style.GRAY, linewidths=0.6, linestyles="-"
+    )
     axes.clabel(lines, fmt="%g dB", fontsize=0.85 * style.TEXT_SIZE)
     handles: list[Line2D | Patch] = [
         Line2D([], [], color=style.GRAY, linewidth=0.6, label="|T| constant")
@@ -46,10 +47,23 @@ def nichols(family: Family) -> Figure:
     if worst.margins.stable:
         limit = 2.0 / worst.margins.disk
         axes.contourf(phase, gain, apart, levels=[limit, np.inf], colors=[style.SHADE], zorder=0.9)
-        axes.contour(phase, gain, apart, levels=[limit], colors=style.VERMILLION,
-                     linestyles=":", linewidths=1.0)  # fmt: skip
-        handles.append(Patch(facecolor=style.SHADE, edgecolor=style.VERMILLION, linestyle=":",
-                             label=f"disk margin {worst.margins.disk:.2f}"))  # fmt: skip
+        axes.contour(
+            phase,
+            gain,
+            apart,
+            levels=[limit],
+            colors=style.VERMILLION,
+            linestyles=":",
+            linewidths=1.0,
+        )
+        handles.append(
+            Patch(
+                facecolor=style.SHADE,
+                edgecolor=style.VERMILLION,
+                linestyle=":",
+                label=f"disk margin {worst.margins.disk:.2f}",
+            )
+        )
     draw_family(axes, family, _points, label="loop gain L")
     _crossings(axes, worst)
     axes.set_xlim(left, right)
@@ -83,11 +97,28 @@ def _points(curve: LoopCurve) -> tuple[Array, Array]:
 def _crossings(axes: Axes, worst: LoopCurve) -> None:
     """Mark -1 and where phase and gain margin are read."""
     margins = worst.margins
-    axes.plot(-180.0, 0.0, "+", color=style.BLACK, markersize=10, markeredgewidth=1.6, zorder=5,
-              linestyle="none", label="-1")  # fmt: skip
+    axes.plot(
+        -180.0,
+        0.0,
+        "+",
+        color=style.BLACK,
+        markersize=10,
+        markeredgewidth=1.6,
+        zorder=5,
+        linestyle="none",
+        label="-1",
+    )
     if math.isfinite(margins.crossover):
-        axes.plot(margins.phase - 180.0, 0.0, "o", color=style.BLACK, markersize=5, zorder=5,
-                  linestyle="none", label=f"phase margin {margins.phase:.3g}°")  # fmt: skip
+        axes.plot(
+            margins.phase - 180.0,
+            0.0,
+            "o",
+            color=style.BLACK,
+            markersize=5,
+            zorder=5,
+            linestyle="none",
+            label=f"phase margin {margins.phase:.3g}°",
+        )
     factors = (
         ("gain margin", "s", margins.gain, margins.gain_at),
         ("lower gain margin", "D", margins.lower_gain, margins.lower_gain_at),
@@ -97,5 +128,13 @@ def _crossings(axes: Axes, worst: LoopCurve) -> None:
             continue
         phase = float(np.interp(frequency, worst.frequency, worst.phase))
         at = 360.0 * round((phase - 180.0) / 360.0) + 180.0  # the odd half turn next to it
-        axes.plot(at, -20.0 * math.log10(factor), mark, color=style.BLACK, markersize=5,
-                  zorder=5, linestyle="none", label=f"{name} {factor:.3g}")  # fmt: skip
+        axes.plot(
+            at,
+            -20.0 * math.log10(factor),
+            mark,
+            color=style.BLACK,
+            markersize=5,
+            zorder=5,
+            linestyle="none",
+            label=f"{name} {factor:.3g}",
+        )

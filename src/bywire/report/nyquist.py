@@ -29,12 +29,22 @@ def nyquist(family: Family) -> Figure:
     worst = family.curves[family.worst]
     _disk(axes, worst)
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
-    axes.plot(np.cos(turn), np.sin(turn), color=style.GRAY, linewidth=0.7, linestyle=":",
-              label="gain 1")  # fmt: skip
+    axes.plot(
+        np.cos(turn), np.sin(turn), color=style.GRAY, linewidth=0.7, linestyle=":", label="gain 1"
+    )
     draw_family(axes, family, _points, label="loop gain L")
     _crossings(axes, worst)
-    axes.plot(-1.0, 0.0, "+", color=style.BLACK, markersize=10, markeredgewidth=1.6, zorder=5,
-              label="-1", linestyle="none")  # fmt: skip
+    axes.plot(
+        -1.0,
+        0.0,
+        "+",
+        color=style.BLACK,
+        markersize=10,
+        markeredgewidth=1.6,
+        zorder=5,
+        label="-1",
+        linestyle="none",
+    )
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     axes.axvline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     axes.set_xlim(_LEFT, _RIGHT, auto=True)  # fixed ones matplotlib would complain about
@@ -56,9 +66,12 @@ def _disk(axes: Axes, worst: LoopCurve) -> None:
         return
     free = disk(min(worst.margins.disk, 2.0))
     look: dict[str, Any] = {
-        "facecolor": style.SHADE, "edgecolor": style.VERMILLION, "linestyle": ":",
-        "label": f"disk margin {worst.margins.disk:.2f}", "zorder": 1.2,
-    }  # fmt: skip
+        "facecolor": style.SHADE,
+        "edgecolor": style.VERMILLION,
+        "linestyle": ":",
+        "label": f"disk margin {worst.margins.disk:.2f}",
+        "zorder": 1.2,
+    }
     if math.isinf(free.radius):
         axes.axvspan(10.0 * _LEFT, 0.0, **look)
     else:
@@ -70,16 +83,29 @@ def _crossings(axes: Axes, worst: LoopCurve) -> None:
     margins = worst.margins
     if math.isfinite(margins.phase_at):
         angle = math.radians(margins.phase - 180.0)
-        axes.plot(math.cos(angle), math.sin(angle), "o", color=style.BLACK, markersize=5, zorder=5,
-                  linestyle="none",
-                  label=f"phase margin {margins.phase:.3g}° at {margins.phase_at:.3g} Hz",
-                  )  # fmt: skip
+        axes.plot(
+            math.cos(angle),
+            math.sin(angle),
+            "o",
+            color=style.BLACK,
+            markersize=5,
+            zorder=5,
+            linestyle="none",
+            label=f"phase margin {margins.phase:.3g}° at {margins.phase_at:.3g} Hz",
+        )
     factors = (
         ("gain margin", "s", margins.gain, margins.gain_at),
         ("lower gain margin", "D", margins.lower_gain, margins.lower_gain_at),
     )
     for name, mark, factor, at in factors:
         if 0.0 < factor < math.inf:
-            axes.plot(-1.0 / factor, 0.0, mark, color=style.BLACK, markersize=5, zorder=5,
-                      linestyle="none", label=f"{name} {factor:.3g} at {at:.3g} Hz",
-                      )  # fmt: skip
+            axes.plot(
+                -1.0 / factor,
+                0.0,
+                mark,
+                color=style.BLACK,
+                markersize=5,
+                zorder=5,
+                linestyle="none",
+                label=f"{name} {factor:.3g} at {at:.3g} Hz",
+            )

@@ -43,10 +43,13 @@ def draw_line(axes: Axes, shown: Channel, look: Look, factor: float, *, second: 
     average = inside(shown)
     shown, width = (shown, 0.0) if average is None else average
     axes.plot(
-        *decimate(factor * shown.time, shown.values), color=look.color,
-        linestyle=DOTS if second else look.dash, linewidth=0.9 if second else 1.2,
-        zorder=2.8 if second else 3.0, label="_",
-    )  # fmt: skip
+        *decimate(factor * shown.time, shown.values),
+        color=look.color,
+        linestyle=DOTS if second else look.dash,
+        linewidth=0.9 if second else 1.2,
+        zorder=2.8 if second else 3.0,
+        label="_",
+    )
     return width
 
 
@@ -77,9 +80,13 @@ def draw_target(
         average = inside(each)
         each = each if average is None else average[0]
         axes.plot(
-            *decimate(factor * each.time, each.values), color=color, linestyle=stroke.linestyle,
-            linewidth=0.9, zorder=3.2 if same else 2.9, label="_",
-        )  # fmt: skip
+            *decimate(factor * each.time, each.values),
+            color=color,
+            linestyle=stroke.linestyle,
+            linewidth=0.9,
+            zorder=3.2 if same else 2.9,
+            label="_",
+        )
     return [entry(shown[0].label, stroke.color if same else style.GRAY, stroke.linestyle)]
 
 
@@ -95,9 +102,12 @@ def _are_seen(targets: Sequence[Channel], followed: Sequence[Channel]) -> bool:
 
 
 def draw_limits_of(
-    axes: Axes, panel: Panel, recordings: Sequence[xr.Dataset], looks: Sequence[Look],
+    axes: Axes,
+    panel: Panel,
+    recordings: Sequence[xr.Dataset],
+    looks: Sequence[Look],
     first: Channel,
-) -> list[Line2D]:  # fmt: skip
+) -> list[Line2D]:
     """Draw the limits of a panel's first trace where it comes near; each once."""
     stroke = style.STROKES[Role.LIMIT]
     levels = [limit_of(recording, panel) for recording in recordings]
@@ -114,9 +124,13 @@ def draw_limits_of(
                 continue
             drawn.add(at)
             axes.axhline(
-                at, color=stroke.color if is_one else look.color, linestyle=stroke.linestyle,
-                linewidth=stroke.linewidth, zorder=stroke.zorder, label="_",
-            )  # fmt: skip
+                at,
+                color=stroke.color if is_one else look.color,
+                linestyle=stroke.linestyle,
+                linewidth=stroke.linewidth,
+                zorder=stroke.zorder,
+                label="_",
+            )
     color = stroke.color if is_one else style.GRAY
     return [entry("limit", color, stroke.linestyle)] if drawn else []
 

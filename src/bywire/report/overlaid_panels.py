@@ -125,9 +125,10 @@ def _shared(recordings: Sequence[xr.Dataset]) -> list[xr.Dataset]:
         for each in recordings
     ]
     names = [
-        name for name, unit in signals[0].items()
+        name
+        for name, unit in signals[0].items()
         if all(name in each and each[name] == unit for each in signals[1:])
-    ]  # fmt: skip
+    ]
     return [each[names] for each in recordings]
 
 

@@ -21,9 +21,7 @@ _ROOM = "  "  # short labels of wide letters need more than the legend's mean wi
 _DASHES: tuple[style.Dash, ...] = ("-", (0, (4, 2)), (0, (1.5, 1.5)))
 
 
-def overlaid_traces(
-    recordings: Mapping[str, xr.Dataset], variables: Mapping[str, str]
-) -> Figure:
+def overlaid_traces(recordings: Mapping[str, xr.Dataset], variables: Mapping[str, str]) -> Figure:
     """Draw variables over time, one panel each, with a line for every recording.
 
     Parameters
@@ -71,9 +69,11 @@ def _draw(axes: Axes, recordings: Mapping[str, xr.Dataset], name: str) -> str:
             continue
         line, turn = channel(recording, name), k // len(style.SEQUENCE)
         axes.plot(
-            *decimate(scale * line.time, line.values), linewidth=1.1,
+            *decimate(scale * line.time, line.values),
+            linewidth=1.1,
             color=style.SEQUENCE[k % len(style.SEQUENCE)],
-            linestyle=_DASHES[turn % len(_DASHES)], label=style.plain(label) + _ROOM,
+            linestyle=_DASHES[turn % len(_DASHES)],
+            label=style.plain(label) + _ROOM,
         )
         unit = line.symbol
     return unit

@@ -73,9 +73,13 @@ def write_page(
 
 
 def page_html(
-    title: str, summary: str, sections: Sequence[Section], *, banner: Banner | None = None,
+    title: str,
+    summary: str,
+    sections: Sequence[Section],
+    *,
+    banner: Banner | None = None,
     names: Sequence[str] = (),
-) -> str:  # fmt: skip
+) -> str:
     """Return a report as one HTML page; see :func:`write_page`."""
     numbered = _numbered(sections)
     style, script = _file("page.css"), bare(_file("zoom.js")) if numbered.has_figures else ""

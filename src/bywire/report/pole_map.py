@@ -42,14 +42,21 @@ def pole_map(rates: NDArray[np.complex128], period: float, bandwidth: float) -> 
             if not part.size:
                 continue
             axes.plot(
-                part.real, part.imag, "x", markersize=7, markeredgewidth=1.6, zorder=4,
+                part.real,
+                part.imag,
+                "x",
+                markersize=7,
+                markeredgewidth=1.6,
+                zorder=4,
                 color=style.VERMILLION if unstable else style.BLUE,
-            )  # fmt: skip
-    beyond = int(np.sum((moving.real < panels[0].get_xlim()[0])
-                        | (moving.imag > panels[0].get_ylim()[1])))  # fmt: skip
+            )
+    beyond = int(
+        np.sum((moving.real < panels[0].get_xlim()[0]) | (moving.imag > panels[0].get_ylim()[1]))
+    )
     if beyond:
-        panels[0].set_title(f"poles ({beyond} faster, not shown)", fontsize=style.TEXT_SIZE,
-                            loc="left")  # fmt: skip
+        panels[0].set_title(
+            f"poles ({beyond} faster, not shown)", fontsize=style.TEXT_SIZE, loc="left"
+        )
     return figure
 
 

@@ -177,6 +177,8 @@ def name_beyond(
         Where it stands; at that side by default.
     """
     axes.set_title(
-        f"{text} →" if far > 0 else f"← {text}", loc=place or ("right" if far > 0 else "left"),
-        fontsize=style.TEXT_SIZE, color=color,
-    )  # fmt: skip
+        f"{text} →" if far > 0 else f"← {text}",
+        loc=place or ("right" if far > 0 else "left"),
+        fontsize=style.TEXT_SIZE,
+        color=color,
+    )

@@ -44,6 +44,11 @@ def mark_records(panels: Sequence[Axes], at: xr.DataArray) -> None:
         if len(ends) <= _NAMED:
             middle = 0.5 * float(places[start] + places[end - 1])
             panels[0].annotate(
-                style.plain(names[start], 16), (middle, 1.0), xycoords=("data", "axes fraction"),
-                ha="center", va="top", color=style.GRAY, fontsize=style.TEXT_SIZE - 1.5,
-            )  # fmt: skip
+                style.plain(names[start], 16),
+                (middle, 1.0),
+                xycoords=("data", "axes fraction"),
+                ha="center",
+                va="top",
+                color=style.GRAY,
+                fontsize=style.TEXT_SIZE - 1.5,
+            )

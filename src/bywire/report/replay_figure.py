@@ -45,9 +45,11 @@ def replay_figure(
         color = style.SEQUENCE[k % len(style.SEQUENCE)] if len(inputs.data_vars) > 1 else None
         look = style.STROKES[Role.SET_POINT]
         top.plot(
-            *decimate(scale * shown.time, shown.values), color=color or look.color,
-            linewidth=look.linewidth, label=style.plain(shown.label),
-        )  # fmt: skip
+            *decimate(scale * shown.time, shown.values),
+            color=color or look.color,
+            linewidth=look.linewidth,
+            label=style.plain(shown.label),
+        )
         top.set_ylabel(style.axis_label("demand", shown.symbol, "\n"))
     symbol = str(pair["measured"].attrs.get("units", "1"))
     for values, role, word in (
@@ -58,8 +60,11 @@ def replay_figure(
         middle.plot(
             *decimate(scale * pair["time"].values, in_display_unit(values, symbol)[0]),
             color=look.color,
-            linestyle=look.linestyle, linewidth=look.linewidth, zorder=look.zorder, label=word,
-        )  # fmt: skip
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            zorder=look.zorder,
+            label=word,
+        )
     error = display_factor(symbol) * (pair["modeled"].values - pair["measured"].values)
     bottom.plot(*decimate(scale * pair["time"].values, error), color=style.PURPLE, linewidth=0.9)
     bottom.axhline(0.0, color=style.GRAY, linewidth=0.6)
@@ -88,14 +93,23 @@ def _segments(panels: Sequence[Axes], fits: Sequence[SegmentFit], scale: float) 
             axes.axvline(scale * fit.segment.start, color=style.GRAY, linewidth=0.5, zorder=1.0)
             if missed:
                 axes.axvspan(
-                    scale * fit.segment.start, scale * fit.segment.stop, color=style.ORANGE,
-                    alpha=0.15, linewidth=0.0, zorder=0.5, label=label,
-                )  # fmt: skip
+                    scale * fit.segment.start,
+                    scale * fit.segment.stop,
+                    color=style.ORANGE,
+                    alpha=0.15,
+                    linewidth=0.0,
+                    zorder=0.5,
+                    label=label,
+                )
                 label = None
         if len(fits) <= _NAMED:
             middle = scale * float(np.mean([fit.segment.start, fit.segment.stop]))
             panels[0].annotate(
-                style.plain(fit.segment.name, 16), (middle, 1.0),
-                xycoords=("data", "axes fraction"), ha="center", va="top", color=style.GRAY,
+                style.plain(fit.segment.name, 16),
+                (middle, 1.0),
+                xycoords=("data", "axes fraction"),
+                ha="center",
+                va="top",
+                color=style.GRAY,
                 fontsize=style.TEXT_SIZE - 1.5,
-            )  # fmt: skip
+            )

@@ -48,8 +48,9 @@ def root_locus(locus: Locus, bandwidth: float) -> Figure:
         inside = rates[np.isfinite(rates) & (np.abs(rates) <= radius)]
         draw_plane(axes, radius, locus.period, float(np.max(inside.real, initial=0.0)))
         _ways(axes, locus, norm, values)
-    bar = figure.colorbar(ScalarMappable(norm, _COLORS), ax=panels, aspect=40, pad=0.02,
-                          format="%g")  # fmt: skip
+    bar = figure.colorbar(
+        ScalarMappable(norm, _COLORS), ax=panels, aspect=40, pad=0.02, format="%g"
+    )
     bar.ax.tick_params(labelsize=style.TEXT_SIZE)
     bar.set_label(style.axis_label(locus.name, locus.unit), fontsize=style.TEXT_SIZE)
     handles, _ = panels[0].get_legend_handles_labels()
@@ -86,20 +87,38 @@ def _ways(axes: Axes, locus: Locus, norm: Normalize, values: Array) -> None:
         line = np.where(upper, column, np.nan)
         axes.plot(line.real, line.imag, color=style.GRAY, linewidth=0.6, zorder=2.0)
         axes.scatter(
-            line.real, line.imag, c=values, cmap=_COLORS, norm=norm, s=7, zorder=3,
+            line.real,
+            line.imag,
+            c=values,
+            cmap=_COLORS,
+            norm=norm,
+            s=7,
+            zorder=3,
             linewidths=0.0,
-        )  # fmt: skip
+        )
     for k, marker, text in ((0, "x", "first"), (-1, "o", "last")):
         ends = rates[k]
         shown = ends[np.isfinite(ends) & (np.abs(ends) > STILL) & (ends.imag >= -STILL)]
         axes.plot(
-            shown.real, shown.imag, marker, color=style.BLACK, markersize=5, zorder=4,
-            markerfacecolor="none", linestyle="none",
+            shown.real,
+            shown.imag,
+            marker,
+            color=style.BLACK,
+            markersize=5,
+            zorder=4,
+            markerfacecolor="none",
+            linestyle="none",
             label=style.plain(f"{text}: {locus.name} = {amount(locus.values[k], locus.unit)}"),
-        )  # fmt: skip
+        )
     for border in locus.borders:
         axes.plot(
-            border.rate.real, border.rate.imag, "*", color=style.VERMILLION, markersize=11,
-            markeredgecolor="white", zorder=5, linestyle="none",
+            border.rate.real,
+            border.rate.imag,
+            "*",
+            color=style.VERMILLION,
+            markersize=11,
+            markeredgecolor="white",
+            zorder=5,
+            linestyle="none",
             label=style.plain(border_text(border, locus.name, locus.unit)),
-        )  # fmt: skip
+        )

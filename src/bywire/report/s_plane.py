@@ -50,20 +50,47 @@ def draw_plane(axes: Axes, radius: float, period: float, growth: float = 0.0) ->
     for ratio in RATIOS:
         x, y = -ratio * radius, math.sqrt(1.0 - ratio**2) * radius
         axes.plot([0.0, x], [0.0, y], color=style.GRAY, linewidth=0.5, linestyle="--", zorder=1.0)
-        axes.text(x, y, f"{ratio:g}", fontsize=0.8 * style.TEXT_SIZE, color=style.GRAY,
-                  ha="right", va="bottom")  # fmt: skip
+        axes.text(
+            x,
+            y,
+            f"{ratio:g}",
+            fontsize=0.8 * style.TEXT_SIZE,
+            color=style.GRAY,
+            ha="right",
+            va="bottom",
+        )
     turn = np.linspace(0.5 * np.pi, np.pi, 60)
     for hertz in MaxNLocator(4).tick_values(0.0, radius / (2.0 * np.pi)):
         size = 2.0 * np.pi * hertz
         if 0.0 < size <= 1.001 * radius:
-            axes.plot(size * np.cos(turn), size * np.sin(turn), color=style.GRAY, linewidth=0.5,
-                      linestyle=":", zorder=1.0)  # fmt: skip
-            axes.text(0.02 * radius, size, f"{hertz:g} Hz", fontsize=0.8 * style.TEXT_SIZE,
-                      color=style.GRAY, ha="left", va="center")  # fmt: skip
+            axes.plot(
+                size * np.cos(turn),
+                size * np.sin(turn),
+                color=style.GRAY,
+                linewidth=0.5,
+                linestyle=":",
+                zorder=1.0,
+            )
+            axes.text(
+                0.02 * radius,
+                size,
+                f"{hertz:g} Hz",
+                fontsize=0.8 * style.TEXT_SIZE,
+                color=style.GRAY,
+                ha="left",
+                va="center",
+            )
     if period and np.pi / period < 1.15 * radius:
         axes.axhline(np.pi / period, color=style.VERMILLION, linestyle=":", linewidth=1.0)
-        axes.text(right, np.pi / period, r"$f_\mathrm{s}/2$ ", va="bottom", ha="right",
-                  fontsize=0.8 * style.TEXT_SIZE, color=style.VERMILLION)  # fmt: skip
+        axes.text(
+            right,
+            np.pi / period,
+            r"$f_\mathrm{s}/2$ ",
+            va="bottom",
+            ha="right",
+            fontsize=0.8 * style.TEXT_SIZE,
+            color=style.VERMILLION,
+        )
     axes.set_xlim(-1.05 * radius, right)
     axes.set_ylim(-0.05 * radius, 1.15 * radius)
     axes.xaxis.set_major_locator(MaxNLocator(5))

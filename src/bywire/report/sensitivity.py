@@ -44,19 +44,32 @@ def _panel(axes: Axes, family: Family, quantity: str, limit: float) -> None:
         return curve.frequency, 20.0 * np.log10(np.abs(getattr(curve, quantity)))
 
     look = style.STROKES[Role.LIMIT]
-    axes.axhline(20.0 * math.log10(limit), color=look.color, linestyle=look.linestyle,
-                 linewidth=look.linewidth, label=f"usual limit {limit:g}")  # fmt: skip
+    axes.axhline(
+        20.0 * math.log10(limit),
+        color=look.color,
+        linestyle=look.linestyle,
+        linewidth=look.linewidth,
+        label=f"usual limit {limit:g}",
+    )
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     draw_family(axes, family, points, stable_only=True, label=f"|{quantity}|")
     worst = family.curves[family.worst]
     if worst.margins.stable:
         size = np.abs(getattr(worst, quantity))
         k = int(np.argmax(size))
-        axes.plot(worst.frequency[k], 20.0 * math.log10(size[k]), "o", color=style.BLACK,
-                  markersize=5, zorder=5, linestyle="none",
-                  label=f"max |{quantity}| {size[k]:.3g}")  # fmt: skip
+        axes.plot(
+            worst.frequency[k],
+            20.0 * math.log10(size[k]),
+            "o",
+            color=style.BLACK,
+            markersize=5,
+            zorder=5,
+            linestyle="none",
+            label=f"max |{quantity}| {size[k]:.3g}",
+        )
     lowest = min((float(points(c)[1].min()) for c in family.curves), default=0.0)
-    highest = max((float(points(c)[1].max()) for c in family.curves if c.margins.stable),
-                  default=0.0)  # fmt: skip
+    highest = max(
+        (float(points(c)[1].max()) for c in family.curves if c.margins.stable), default=0.0
+    )
     axes.set_ylim(max(lowest, _LOWEST) - 2.0, max(highest, 20.0 * math.log10(limit)) + 3.0)
     axes.set_ylabel(f"|{quantity}| [dB]")

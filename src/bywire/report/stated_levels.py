@@ -19,9 +19,7 @@ _DASHES: tuple[style.Dash, ...] = ((0, (7, 3)), (0, (7, 2, 2, 2)), (0, (2, 2)))
 _OPACITY = 0.15  # of a band: the curves' grid shines through
 
 
-def draw_stated(
-    axes: Axes, levels: Sequence[StatedLevel | StatedRange], shown: Channel
-) -> None:
+def draw_stated(axes: Axes, levels: Sequence[StatedLevel | StatedRange], shown: Channel) -> None:
     """Draw levels as lines across an axes and ranges as bands, each with its own legend entry.
 
     They lie below the curves. ``shown``: a channel of the axes, for its unit.
@@ -32,14 +30,16 @@ def draw_stated(
             for value in (each.low, each.high, *each.levels)
         )
         if high > low:
-            axes.axhspan(
-                low, high, facecolor=style.GREEN, alpha=_OPACITY, linewidth=0, zorder=1.4
-            )
+            axes.axhspan(low, high, facecolor=style.GREEN, alpha=_OPACITY, linewidth=0, zorder=1.4)
         for at, line in enumerate(lines):
             axes.axhline(
-                line, color=style.GREEN, linewidth=1.4, linestyle=_DASHES[k % len(_DASHES)],
-                zorder=2.3, label=None if at else style.plain(f"stated: {each.label}"),
-            )  # fmt: skip
+                line,
+                color=style.GREEN,
+                linewidth=1.4,
+                linestyle=_DASHES[k % len(_DASHES)],
+                zorder=2.3,
+                label=None if at else style.plain(f"stated: {each.label}"),
+            )
 
 
 def stated_level(level: StatedLevel | StatedRange, unit: str) -> str:

@@ -111,14 +111,24 @@ def draw_limits(axes: Axes, limits: StepLimits, shown: Channel) -> None:
         for side in (-1.0, 1.0)
     )
     axes.fill_between(
-        span, min(low, high), max(low, high), color=style.GREEN, alpha=0.25, linewidth=0,
-        zorder=1.5, label=f"±{100 * limits.band:g} % band",
+        span,
+        min(low, high),
+        max(low, high),
+        color=style.GREEN,
+        alpha=0.25,
+        linewidth=0,
+        zorder=1.5,
+        label=f"±{100 * limits.band:g} % band",
     )
     if limits.overshoot is not None:
         level = convert(limits.level(1.0 + limits.overshoot), shown.symbol, shown.unit)
         look = style.STROKES[Role.LIMIT]
         axes.plot(
-            span, [level, level], color=look.color, linestyle=look.linestyle,
-            linewidth=look.linewidth, zorder=look.zorder,
+            span,
+            [level, level],
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            zorder=look.zorder,
             label=f"overshoot limit {100 * limits.overshoot:g} %",
         )

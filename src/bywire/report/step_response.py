@@ -71,8 +71,11 @@ def step_response(
         judged = replace(shown, values=smoothed(shown.time, shown.values, smoothing))
         scale, _ = style.time_scale(shown.time)
         axes.plot(
-            *decimate(scale * judged.time, judged.values), linewidth=0.9, zorder=3.3,
-            color=style.STROKES[role].color, label=f"averaged over {duration(smoothing)}",
+            *decimate(scale * judged.time, judged.values),
+            linewidth=0.9,
+            zorder=3.3,
+            color=style.STROKES[role].color,
+            label=f"averaged over {duration(smoothing)}",
         )
     if set_point is not None:
         style.draw_channel(axes, channel(recording, set_point), Role.SET_POINT)
@@ -103,13 +106,22 @@ def _mark_facts(axes: Axes, shown: Channel, limits: StepLimits, facts: StepFacts
         marker = "v" if limits.after > limits.before else "^"
         point = ([scale * time], [peak]) if facts.overshoot > 0 else ([], [])
         axes.plot(
-            *point, marker, color=style.VERMILLION, markersize=5.5, zorder=4, linestyle="none",
+            *point,
+            marker,
+            color=style.VERMILLION,
+            markersize=5.5,
+            zorder=4,
+            linestyle="none",
             label=label,
         )
     if _given(facts.settling_time):
         settled = scale * (limits.start + facts.settling_time)
         axes.axvline(
-            settled, color=style.GREEN, linestyle="-.", linewidth=1.2, zorder=2.4,
+            settled,
+            color=style.GREEN,
+            linestyle="-.",
+            linewidth=1.2,
+            zorder=2.4,
             label=f"settling ({100 * limits.band:g} %): {duration(facts.settling_time)}",
         )
 

@@ -65,7 +65,12 @@ def stribeck_curve(
         axes.plot(speed.values, values, color=color, linewidth=1.4, zorder=above, label=label)
         if measured is not None and p in measured:
             axes.plot(
-                *measured[p], "o", color=color, markersize=3.5, markerfacecolor="white", zorder=4,
+                *measured[p],
+                "o",
+                color=color,
+                markersize=3.5,
+                markerfacecolor="white",
+                zorder=4,
                 label=f"{label}, measured",
             )
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)

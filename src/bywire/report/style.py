@@ -95,9 +95,12 @@ def new_figure(
 
     figure = Figure(figsize=(WIDTH, height), layout="constrained", facecolor="white")
     grid = figure.subplots(
-        len(heights), 1, sharex=is_shared, squeeze=False,
+        len(heights),
+        1,
+        sharex=is_shared,
+        squeeze=False,
         gridspec_kw={"height_ratios": list(heights)},
-    )  # fmt: skip
+    )
     panels: list[Axes] = list(grid[:, 0])
     for axes in panels:
         dress(axes)
@@ -197,15 +200,23 @@ def draw_channel(
     if average is not None:
         if role is not Role.SET_POINT:
             axes.plot(
-                *decimate(scale * shown.time, shown.values), color=look.color,
-                alpha=opacity * PALE_OPACITY, linewidth=0.8, zorder=BAND_ORDER,
+                *decimate(scale * shown.time, shown.values),
+                color=look.color,
+                alpha=opacity * PALE_OPACITY,
+                linewidth=0.8,
+                zorder=BAND_ORDER,
             )
         shown, width = average
         pale = "" if role is Role.SET_POINT else " (pale: ripple)"
         label = f"{label}, {duration(width)} average{pale}"
     axes.plot(
-        *decimate(scale * shown.time, shown.values), color=look.color, linestyle=look.linestyle,
-        linewidth=look.linewidth, zorder=look.zorder, alpha=opacity, label=plain(label),
+        *decimate(scale * shown.time, shown.values),
+        color=look.color,
+        linestyle=look.linestyle,
+        linewidth=look.linewidth,
+        zorder=look.zorder,
+        alpha=opacity,
+        label=plain(label),
     )
 
 

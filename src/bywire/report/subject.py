@@ -45,17 +45,26 @@ class Subject:
 
     @classmethod
     def of_bench(
-        cls, bench: Bench, name: str = "", summary: str = "", varied: Collection[str] = (),
+        cls,
+        bench: Bench,
+        name: str = "",
+        summary: str = "",
+        varied: Collection[str] = (),
         further: tuple[Change, ...] = (),
-    ) -> Subject:  # fmt: skip
+    ) -> Subject:
         """Return a bench as a subject, called as it is itself unless something is given.
 
         ``varied``: quantities that take several values; ``further``: what else was changed.
         """
         return cls(
-            name or bench.name or bench.experiment, summary or bench.summary(varied),
-            bench.parameters, bench.par, bench=bench, varied=tuple(varied), further=further,
-        )  # fmt: skip
+            name or bench.name or bench.experiment,
+            summary or bench.summary(varied),
+            bench.parameters,
+            bench.par,
+            bench=bench,
+            varied=tuple(varied),
+            further=further,
+        )
 
     @property
     def changes(self) -> tuple[Change, ...]:

@@ -180,9 +180,13 @@ def reproduction_table(rows: Iterable[ReproductionRow]) -> Table:
     """Return the table of statements of a source beside what we compute."""
     return Table(
         (
-            Column("statement"), Column("kind"), Column("stated", numeric=True),
-            Column("computed", numeric=True), Column("tolerance", numeric=True),
-            Column("agrees"), Column("note"),
+            Column("statement"),
+            Column("kind"),
+            Column("stated", numeric=True),
+            Column("computed", numeric=True),
+            Column("tolerance", numeric=True),
+            Column("agrees"),
+            Column("note"),
         ),
         tuple(
             (
@@ -203,8 +207,11 @@ def verdict_table(rows: Iterable[ReproductionRow]) -> Table:
     """Return the same without tolerances and notes, narrow enough for a terminal."""
     return Table(
         (
-            Column("statement"), Column("kind"), Column("stated", numeric=True),
-            Column("computed", numeric=True), Column("verdict"),
+            Column("statement"),
+            Column("kind"),
+            Column("stated", numeric=True),
+            Column("computed", numeric=True),
+            Column("verdict"),
         ),
         tuple(
             (
@@ -223,8 +230,11 @@ def parameter_table(rows: Iterable[ParameterRow]) -> Table:
     """Return the table of parameters in their display units, with range and provenance."""
     return Table(
         (
-            Column("parameter"), Column("value", numeric=True), Column("range"),
-            Column("provenance"), Column("where"),
+            Column("parameter"),
+            Column("value", numeric=True),
+            Column("range"),
+            Column("provenance"),
+            Column("where"),
         ),
         tuple(
             (

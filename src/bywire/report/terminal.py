@@ -65,9 +65,13 @@ def _text(block: str | Flat) -> str:
 def _bullet(text: str) -> str:
     width = max(min(shutil.get_terminal_size().columns, WIDTH), 20)
     return textwrap.fill(
-        text, width, initial_indent="- ", subsequent_indent="  ", break_long_words=False,
+        text,
+        width,
+        initial_indent="- ",
+        subsequent_indent="  ",
+        break_long_words=False,
         break_on_hyphens=False,
-    )  # fmt: skip
+    )
 
 
 def table_text(table: Table, width: int = 100) -> str:
@@ -106,10 +110,13 @@ def _longest_word(rows: list[list[str]], column: int) -> int:
 def _lines(table: Table, row: list[str], widths: list[int]) -> list[str]:
     """Return the lines of one row."""
     wrapped = [
-        [part for line in text.splitlines() or [""]
-         for part in textwrap.wrap(line, w, break_on_hyphens=False) or [""]]
+        [
+            part
+            for line in text.splitlines() or [""]
+            for part in textwrap.wrap(line, w, break_on_hyphens=False) or [""]
+        ]
         for text, w in zip(row, widths, strict=True)
-    ]  # fmt: skip
+    ]
     height = max(len(parts) for parts in wrapped)
     lines = []
     for k in range(height):

@@ -113,9 +113,7 @@ def shown_panels(recording: xr.Dataset) -> list[tuple[Panel, list[Trace]]]:
     return most or drawable(recording, panels_by_unit(recording))
 
 
-def drawable(
-    recording: xr.Dataset, panels: Sequence[Panel]
-) -> list[tuple[Panel, list[Trace]]]:
+def drawable(recording: xr.Dataset, panels: Sequence[Panel]) -> list[tuple[Panel, list[Trace]]]:
     """Return the panels that show something, with their traces."""
     present = [(panel, _present(panel, recording)) for panel in panels]
     present = [(panel, traces) for panel, traces in present if traces]
@@ -179,9 +177,10 @@ def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: boo
     scale, _ = style.time_scale(mode.time)
     for is_lasting in (True, False):
         found = [
-            each for each in lasting_phases(mode.time, mode.values > 0.5)
+            each
+            for each in lasting_phases(mode.time, mode.values > 0.5)
             if (each.share > _LASTING) == is_lasting
-        ]  # fmt: skip
+        ]
         if not found:
             continue
         label = style.plain(mode.label)
@@ -190,11 +189,15 @@ def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: boo
             share = lasting / sum(each.end - each.start for each in found)
             label += f" again and again, {100 * share:.2g} % of the shade"
         axes.broken_barh(
-            [(scale * each.start, scale * (each.end - each.start)) for each in found], (0.0, 1.0),
-            transform=axes.get_xaxis_transform(), zorder=0.4, linewidth=0,
+            [(scale * each.start, scale * (each.end - each.start)) for each in found],
+            (0.0, 1.0),
+            transform=axes.get_xaxis_transform(),
+            zorder=0.4,
+            linewidth=0,
             facecolor=style.SHADE if is_lasting else style.SHADE_AGAIN,
-            alpha=0.7, label=label if named else None,
-        )  # fmt: skip
+            alpha=0.7,
+            label=label if named else None,
+        )
 
 
 def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel) -> None:
@@ -207,8 +210,12 @@ def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel)
     sides = [s for s in (1.0, -1.0) if float(np.nanmax(s * first.values)) >= NEAR * level]
     for k, side in enumerate(sides):
         axes.axhline(
-            side * level, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth,
-            zorder=look.zorder, label="limit" if k == 0 else None,
+            side * level,
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            zorder=look.zorder,
+            label="limit" if k == 0 else None,
         )
 
 

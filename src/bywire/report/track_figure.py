@@ -31,21 +31,33 @@ def track_figure(track: Track, known: float | None = None) -> Figure:
         in_display_unit(data[n].values, symbol)[0] for n in ("low", "high", "value")
     )
     axes.fill_between(
-        t[begun], low[begun], high[begun], color=style.SKY, alpha=0.45, linewidth=0.0,
+        t[begun],
+        low[begun],
+        high[begun],
+        color=style.SKY,
+        alpha=0.45,
+        linewidth=0.0,
         label="95 % band",
-    )  # fmt: skip
+    )
     axes.plot(t[begun], value[begun], color=style.BLUE, linewidth=1.2, label="tracked")
     axes.plot(
-        t[used], value[used], "o", color=style.BLUE, markersize=2.5,
+        t[used],
+        value[used],
+        "o",
+        color=style.BLUE,
+        markersize=2.5,
         label="where the relation holds",
-    )  # fmt: skip
+    )
     if known is not None:
         known = in_display_unit(known, symbol)[0]
         look = style.STROKES[Role.SET_POINT]
         axes.axhline(
-            known, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth,
+            known,
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
             label="parameter set",
-        )  # fmt: skip
+        )
     if begun.any():
         center = np.concatenate((value[used], [] if known is None else [known]))
         reach = float(np.median((high - low)[used]))

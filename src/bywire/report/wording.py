@@ -55,9 +55,7 @@ def readable_units(symbol: str) -> str:
     return " or ".join(dict.fromkeys(readable_unit(size, symbol) for size in (0.0, math.inf)))
 
 
-def amount(
-    value: float | None, symbol: str, digits: int = 4, like: float | None = None
-) -> str:
+def amount(value: float | None, symbol: str, digits: int = 4, like: float | None = None) -> str:
     """Return a value with its unit in ``digits`` significant digits.
 
     Parameters
@@ -139,9 +137,7 @@ def measured_amount(value: float | None, symbol: str, error: float, digits: int 
     return figures + (f" {written}" if written else "")
 
 
-def error_text(
-    value: float | None, symbol: str, error: float, converges: bool = True
-) -> str:
+def error_text(value: float | None, symbol: str, error: float, converges: bool = True) -> str:
     """Return an error in one digit, in the unit in which `measured_amount` writes the value.
 
     ``converges``: whether it is an error, rather than a bound of one that is not known.

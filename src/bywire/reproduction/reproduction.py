@@ -144,7 +144,10 @@ class Reproduction(Answer):
             self.citation,
             sections=lambda: self._sections(short),
             brief=[
-                *self._tables(), "In short", short, "",
+                *self._tables(),
+                "In short",
+                short,
+                "",
                 f"Report with notes, tolerances and figures: {hint}",
             ],
             data=self._data(),
@@ -154,7 +157,7 @@ class Reproduction(Answer):
                 for name, recording in self.recordings.items()
             ],
             record="results.json",
-        )  # fmt: skip
+        )
 
     def _tables(self) -> list[str | Flat]:
         """Return what a terminal shows: parts' own tables, and the verdicts of all others."""

@@ -86,8 +86,14 @@ def loop(hint: str = texts.LOOP, *kinds: str) -> Field:
 
 def parameters(fits: Fits | None = None) -> Field:
     """Return the field of a parameter set."""
-    return Field("parameters", "Parameter set", "choice", texts.PARAMETERS, names("parameter_sets"),
-                 fits=fits)  # fmt: skip
+    return Field(
+        "parameters",
+        "Parameter set",
+        "choice",
+        texts.PARAMETERS,
+        names("parameter_sets"),
+        fits=fits,
+    )
 
 
 def changes(fits: Fits | None = None) -> Field:
@@ -113,10 +119,14 @@ def of_loops() -> tuple[Field, ...]:
     return (
         loop(),
         parameters(lambda asked, _: case_of({**asked, "at": "", "set": {}})),
-        Field("at", "Operating point", hint=texts.AT,
-              fits=lambda asked, _: case_of({**asked, "set": {}})),
+        Field(
+            "at",
+            "Operating point",
+            hint=texts.AT,
+            fits=lambda asked, _: case_of({**asked, "set": {}}),
+        ),
         changes(lambda asked, _: case_of(asked)),
-    )  # fmt: skip
+    )
 
 
 def side() -> Field:

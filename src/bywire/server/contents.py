@@ -117,8 +117,12 @@ def _note_toml(there: Contents, path: Path, name: str) -> None:
     kind = kind_of(content)
     subject = content.get(HEADS.get(kind, ""))
     if isinstance(subject, str):
-        places = {BENCH: there.benches, STUDY: there.studies, CAMPAIGN: there.campaigns,
-                  LIFE: there.lives}  # fmt: skip
+        places = {
+            BENCH: there.benches,
+            STUDY: there.studies,
+            CAMPAIGN: there.campaigns,
+            LIFE: there.lives,
+        }
         places[kind][name] = subject
     else:
         there.maps.append(name)

@@ -16,9 +16,19 @@ from bywire.server.place import Place, require_inside
 _LONGEST = 20_000  # characters of a field
 
 Kind = Literal[
-    "text", "whole", "lines", "pairs", "changes", "names", "flag", "choice", "file", "files",
-    "thing", "things",
-]  # fmt: skip
+    "text",
+    "whole",
+    "lines",
+    "pairs",
+    "changes",
+    "names",
+    "flag",
+    "choice",
+    "file",
+    "files",
+    "thing",
+    "things",
+]
 Fits = Callable[[Mapping[str, Any], Place], object]
 
 

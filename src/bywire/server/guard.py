@@ -54,9 +54,7 @@ def require_place(method: str, headers: Message, port: int) -> None:
         raise RefusedError(403, "a page of another site asked: use the pages of this server")
 
 
-def require_token(
-    headers: Message, query: Mapping[str, str], port: int, token: str
-) -> None:
+def require_token(headers: Message, query: Mapping[str, str], port: int, token: str) -> None:
     """Refuse who has not the token, in the link or kept as a cookie.
 
     Raises

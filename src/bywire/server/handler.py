@@ -82,9 +82,10 @@ class Handler(BaseHTTPRequestHandler):
         except Exception as error:  # a defect ends a request, not the server
             traceback.print_exception(error)
             return self._refused(
-                500, "this is a defect of bywire; please report it with the lines that the server "
-                "printed"
-            )  # fmt: skip
+                500,
+                "this is a defect of bywire; please report it with the lines that the server "
+                "printed",
+            )
 
     def _answered(self) -> Reply:
         port = int(self.connection.getsockname()[1])
@@ -143,10 +144,13 @@ class Handler(BaseHTTPRequestHandler):
         if any(name in self.headers for name in ("Content-Length", "Transfer-Encoding")):
             self.close_connection = True  # what nobody read of a body is no further request
         headers = {
-            **_HEADERS, "Content-Type": reply.kind, "Content-Length": str(size),
-            "Content-Security-Policy": reply.policy, **reply.headers,
+            **_HEADERS,
+            "Content-Type": reply.kind,
+            "Content-Length": str(size),
+            "Content-Security-Policy": reply.policy,
+            **reply.headers,
             **({"Connection": "close"} if self.close_connection else {}),
-        }  # fmt: skip
+        }
         for name, value in headers.items():
             self.send_header(name, value)
         self.end_headers()
@@ -168,9 +172,7 @@ class Handler(BaseHTTPRequestHandler):
                 if not self.connection.recv(1 << 16):
                     return
 
-    def send_error(
-        self, code: int, message: str | None = None, explain: str | None = None
-    ) -> None:
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
         """Say what of a request HTTP itself does not understand, always with a status line."""
         self.close_connection = True
         self.request_version = self.protocol_version
@@ -182,9 +184,12 @@ class Handler(BaseHTTPRequestHandler):
         body = refusal_page(code, message or status.phrase).encode()
         self.send_response(code)
         for name, value in {
-            **_HEADERS, "Content-Type": "text/html; charset=utf-8", "Connection": "close",
-            "Content-Length": str(len(body)), "Content-Security-Policy": REFUSAL,
-        }.items():  # fmt: skip
+            **_HEADERS,
+            "Content-Type": "text/html; charset=utf-8",
+            "Connection": "close",
+            "Content-Length": str(len(body)),
+            "Content-Security-Policy": REFUSAL,
+        }.items():
             self.send_header(name, value)
         self.end_headers()
         self.wfile.write(body)

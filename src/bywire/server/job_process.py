@@ -97,11 +97,14 @@ def _compute(order: Mapping[str, Any]) -> None:
         files = [] if task.is_file else write_document(document, out)
         others = [str(w.message) for w in caught if not issubclass(w.category, AnswerWarning)]
         said = [*others, *answer.warnings, *answer.notes, *answer.failures, *document.remarks]
-        tell(done={
-            "page": document.page_name if document.is_paged and files else "",
-            "holds": answer.holds, "said": list(dict.fromkeys(said)),
-            "headline": document.banner.text if document.banner is not None else "",
-        })  # fmt: skip
+        tell(
+            done={
+                "page": document.page_name if document.is_paged and files else "",
+                "holds": answer.holds,
+                "said": list(dict.fromkeys(said)),
+                "headline": document.banner.text if document.banner is not None else "",
+            }
+        )
 
 
 class _Words:

@@ -64,15 +64,22 @@ class Job:
         page = str(self.result.get("page", page))
         label, share = self.progress
         return {
-            "number": self.number, "task": self.task.name, "title": self.task.title,
-            "subject": self.task.said_of(self.asked), "state": self.state, "label": label,
-            "share": share, "message": self.message, "reports": self.reports,
+            "number": self.number,
+            "task": self.task.name,
+            "title": self.task.title,
+            "subject": self.task.said_of(self.asked),
+            "state": self.state,
+            "label": label,
+            "share": share,
+            "message": self.message,
+            "reports": self.reports,
             "so_far": self.so_far if self.state == "running" else [],
-            "said": list(self.result.get("said", ())), "holds": self.result.get("holds"),
+            "said": list(self.result.get("said", ())),
+            "holds": self.result.get("holds"),
             "headline": self.result.get("headline", ""),
             "folder": place.named(self.out) if is_inside else "",
             "report": f"{place.named(self.out)}/{page}" if is_inside and page else "",
-        }  # fmt: skip
+        }
 
 
 class Jobs:
@@ -114,7 +121,9 @@ class Jobs:
             job = Job(max(self._jobs, default=0) + 1, task, asked, out)
             self._jobs[job.number] = job
             over = len(self._jobs) - _KEPT
-            for old in [each for each in self._jobs.values() if each.ended.is_set()][:max(over, 0)]:
+            for old in [each for each in self._jobs.values() if each.ended.is_set()][
+                : max(over, 0)
+            ]:
                 del self._jobs[old.number]
         threading.Thread(target=self._run, args=(job,), daemon=True).start()
         return job
@@ -189,9 +198,12 @@ class Jobs:
                 return
             job.state, job.process = "running", started(self._place.root)
         order = {
-            "task": job.task.name, "asked": dict(job.asked), "folder": str(self._place.root),
-            "out": str(job.out), "systems": list(loaded_files()),
-        }  # fmt: skip
+            "task": job.task.name,
+            "asked": dict(job.asked),
+            "folder": str(self._place.root),
+            "out": str(job.out),
+            "systems": list(loaded_files()),
+        }
         process = job.process
         assert process.stdin is not None
         assert process.stdout is not None

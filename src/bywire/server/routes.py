@@ -28,9 +28,11 @@ from bywire.server.uploads import uploaded
 Route = Callable[[Service, Request, str], Reply]
 
 _KINDS: Final = {
-    ".html": "text/html; charset=utf-8", ".png": "image/png",
-    ".json": "application/json", ".toml": "text/plain; charset=utf-8",
-}  # fmt: skip
+    ".html": "text/html; charset=utf-8",
+    ".png": "image/png",
+    ".json": "application/json",
+    ".toml": "text/plain; charset=utf-8",
+}
 _ASSETS: Final = {
     "page.css": ("bywire.report", "page.css", "text/css; charset=utf-8"),
     "serve.css": ("bywire.server", "assets/serve.css", "text/css; charset=utf-8"),
@@ -59,9 +61,7 @@ def answer(service: Service, request: Request) -> Reply:
             if first == "/" and request.path != "/":
                 continue
             return route[method](service, request, request.path.removeprefix(first))
-    raise RefusedError(
-        404, f"there is no page {quoted(request.path)}: the start page leads to all"
-    )
+    raise RefusedError(404, f"there is no page {quoted(request.path)}: the start page leads to all")
 
 
 def _index(service: Service, request: Request, rest: str) -> Reply:
@@ -106,8 +106,9 @@ def _study(service: Service, request: Request, rest: str) -> Reply:
         raise ParameterError(f"{name} is no study file: it has no bench and section [vary]")
     folder = f"{RESULTS}/{folder_name(name)}"
     said = how_far(service.place.root / folder)
-    text = study_page(name, there.studies[name], f"{folder}/report.html", said, there,
-                      service.largest)  # fmt: skip
+    text = study_page(
+        name, there.studies[name], f"{folder}/report.html", said, there, service.largest
+    )
     return page(text)
 
 

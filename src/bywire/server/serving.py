@@ -54,7 +54,10 @@ class Opened:
 
 @contextmanager
 def opened(
-    subject: str | Path = "", *, port: int = PORT, folder: str | Path = "",
+    subject: str | Path = "",
+    *,
+    port: int = PORT,
+    folder: str | Path = "",
     largest: int = LARGEST_FILE,
 ) -> Iterator[Opened]:
     """Yield a server that listens; it answers when its ``server.serve_forever()`` is called.
@@ -95,9 +98,12 @@ def opened(
 
 @checked
 def serve(
-    subject: str | Path = "", *, port: int = PORT, folder: str | Path = "",
+    subject: str | Path = "",
+    *,
+    port: int = PORT,
+    folder: str | Path = "",
     say: Callable[[str], None] = print,
-) -> None:  # fmt: skip
+) -> None:
     """Show a folder's benches, results and studies in a browser of this machine, until Ctrl-C.
 
     Pages compute in the browser as those of `bywire.page` do; what needs Python (reports,
@@ -181,6 +187,4 @@ def _taken(port: int, error: OSError) -> ParameterError:
             f"port {port} is taken, perhaps by another 'bywire serve': use the link that it "
             "printed, or --port 0 for any free one"
         )
-    return ParameterError(
-        f"port {port}: {error.strerror or error}: try --port 0 for any free one"
-    )
+    return ParameterError(f"port {port}: {error.strerror or error}: try --port 0 for any free one")

@@ -42,9 +42,12 @@ def _judged(findings: Findings) -> Iterator[tuple[str, str]]:
     for each in findings.judgments:
         share = each.share
         low, high = percent(share.low, share), percent(share.high, share)
-        yield each.demand.kpi, (
-            f"{each.demand.text}: {share.count} of {share.cases} cases, probability "
-            f"{percent(share.value, share)} ({confidence} interval: {low} to {high})"
+        yield (
+            each.demand.kpi,
+            (
+                f"{each.demand.text}: {share.count} of {share.cases} cases, probability "
+                f"{percent(share.value, share)} ({confidence} interval: {low} to {high})"
+            ),
         )
 
 

@@ -72,8 +72,9 @@ def advance_all(
             interrupt_heard()
             vector[:] = saved
             return begin
-        require_finite(engine.layout, vector, f"the run left the numbers before t = "
-                       f"{end * schedule.frame:g} s")  # fmt: skip
+        require_finite(
+            engine.layout, vector, f"the run left the numbers before t = {end * schedule.frame:g} s"
+        )
         begin = end
         require_work(work_of(schedule, engine.layout, begin, vector), most)
         try:

@@ -73,10 +73,13 @@ def branched(
             continue
         truth = graph.nodes[node].args[0]
         alike = [
-            n for n in order
-            if n not in inside and n not in arms and graph.nodes[n].op in _SELECTIONS
+            n
+            for n in order
+            if n not in inside
+            and n not in arms
+            and graph.nodes[n].op in _SELECTIONS
             and graph.nodes[n].args[0] == truth
-        ]  # fmt: skip
+        ]
         if len(alike) > 1 and (together := _together(graph, order, alike, users, fixed)):
             arms.update(together)
             fixed.update(together)  # they stay where the first of them computes for all
@@ -92,9 +95,12 @@ def branched(
 
 
 def _together(
-    graph: Graph, order: Sequence[Node], selections: Sequence[Node],
-    users: Mapping[Node, Sequence[Node]], kept: Collection[Node],
-) -> dict[Node, Arms]:  # fmt: skip
+    graph: Graph,
+    order: Sequence[Node],
+    selections: Sequence[Node],
+    users: Mapping[Node, Sequence[Node]],
+    kept: Collection[Node],
+) -> dict[Node, Arms]:
     """Return the arms of selections by one condition; none where they share nothing costly."""
     pinned = {*kept, *selections}
     cones, pays = [], False
@@ -117,10 +123,14 @@ def _together(
             left -= needs
         for node in selections:
             later = set().union(*(read[n] for n in selections if n != node))
-            shared[node].append(Arm(*(
-                tuple(n for n in order if n in part)
-                for part in (computed[node], computed[node] & later, read[node])
-            )))  # fmt: skip
+            shared[node].append(
+                Arm(
+                    *(
+                        tuple(n for n in order if n in part)
+                        for part in (computed[node], computed[node] & later, read[node])
+                    )
+                )
+            )
     return {node: (first, last) for node, (first, last) in shared.items() if first or last}
 
 
@@ -166,9 +176,12 @@ def worth(graph: Graph, cone: Collection[Node]) -> bool:
 
 
 def _cone(
-    graph: Graph, selections: Sequence[Node], place: int, users: Mapping[Node, Sequence[Node]],
+    graph: Graph,
+    selections: Sequence[Node],
+    place: int,
+    users: Mapping[Node, Sequence[Node]],
     kept: Collection[Node],
-) -> set[Node]:  # fmt: skip
+) -> set[Node]:
     """Return what one arm of selections needs and nothing else does."""
     ends: dict[Node, set[Node]] = {}
     for selection in selections:

@@ -88,9 +88,13 @@ class LaneKernel:
 
     @classmethod
     def of(
-        cls, program: Program, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool,
+        cls,
+        program: Program,
+        compiler: Compiler,
+        selection: tuple[int, ...],
+        in_pairs: bool,
         ends: int = 0,
-    ) -> LaneKernel:  # fmt: skip
+    ) -> LaneKernel:
         """Emit the kernel of a program, and compile it unless the cache has it.
 
         ``in_pairs``: whether there are cases enough for two vectors, should they pay; ``ends``: see
@@ -103,9 +107,7 @@ class LaneKernel:
         stages = build_stages(program, outputs=selection)
         in_turn = in_pairs and takes_turns(stages)
         flags = IN_TURN if in_turn else VECTOR
-        _, library = load_library(
-            emit_lanes(stages, in_turn, ends), flags, compiler, cls.ENTRY
-        )
+        _, library = load_library(emit_lanes(stages, in_turn, ends), flags, compiler, cls.ENTRY)
         return cls(layout_of(stages), library, compiler, len(selection), ends)
 
     def rows(self, cases: int, rows: int) -> Array:
@@ -176,9 +178,13 @@ def is_side_by_side(engine: str) -> bool:
 
 
 def case_kernel(
-    prepared: Prepared, engine: str, selection: tuple[int, ...], count: int, schedule: Schedule,
+    prepared: Prepared,
+    engine: str,
+    selection: tuple[int, ...],
+    count: int,
+    schedule: Schedule,
     ends: int = 0,
-) -> CaseKernel:  # fmt: skip
+) -> CaseKernel:
     """Return the kernel of so many cases that records some outputs, by index.
 
     ``ends``: see `LaneKernel`; a graphics processor has none.
@@ -208,9 +214,12 @@ def cuda_kernel(prepared: Prepared, device: CudaDevice, selection: tuple[int, ..
 
 @built_once
 def lane_kernel(
-    prepared: Prepared, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool = False,
+    prepared: Prepared,
+    compiler: Compiler,
+    selection: tuple[int, ...],
+    in_pairs: bool = False,
     ends: int = 0,
-) -> LaneKernel:  # fmt: skip
+) -> LaneKernel:
     """Return the kernel that records some outputs, by index; built once.
 
     What an earlier command kept is taken as it is. ``in_pairs``, ``ends``: see `LaneKernel.of`.

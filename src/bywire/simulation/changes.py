@@ -92,11 +92,12 @@ def put_in_signals(output: type) -> Mapping[str, Signal]:
     first = "" if "" in books else next(iter(books), "")
     return {
         _PUT_IN if book == first else f"{_PUT_IN}_{book.replace(' ', '_')}": Signal(
-            "J", "energy put in by changed parameters",
+            "J",
+            "energy put in by changed parameters",
             role=Role("source", "changed parameters", book=book),
         )
         for book in sorted(books, key=lambda book: book != first)
-    }  # fmt: skip
+    }
 
 
 def energies(output: type, names: Sequence[str]) -> Array:

@@ -21,9 +21,12 @@ from bywire.simulation.kernel_cache import digest_of, is_intact, load, sha256, u
 # fuses a product and a sum where it sees fit rounds a case in lanes otherwise than alone, and on
 # another processor otherwise again: 1 % of the time in lanes is not worth that.
 KERNEL_MATH = (
-    "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffinite-math-only",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-fno-signed-zeros",
+    "-ffinite-math-only",
     "-ffp-contract=off",
-)  # fmt: skip
+)
 _STRICT = ("-Werror=implicit-function-declaration",)
 _COMMON = ("-shared", "-fPIC", "-std=c11", *KERNEL_MATH, *_STRICT)
 # Packing a few scalars costs more than it saves. So does computing both sides of a choice that goes
@@ -211,9 +214,7 @@ def compile_library(
     return library
 
 
-def _compiled_into(
-    library: Path, source: str, flags: tuple[str, ...], compiler: Compiler
-) -> bool:
+def _compiled_into(library: Path, source: str, flags: tuple[str, ...], compiler: Compiler) -> bool:
     """Write a library with its digest; return False if somebody deleted its folder meanwhile."""
     try:
         with scratch_folder(library.parent) as scratch:

@@ -43,9 +43,11 @@ class CudaDevice:
         kinds = driver.CUdevice_attribute
         major, minor = (
             self._checked(driver.cuDeviceGetAttribute(kind, self._device))
-            for kind in (kinds.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR,
-                         kinds.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR)
-        )  # fmt: skip
+            for kind in (
+                kinds.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR,
+                kinds.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR,
+            )
+        )
         self._capability = 10 * int(major) + int(minor)
         self._context = self._checked(driver.cuDevicePrimaryCtxRetain(self._device))
 
@@ -97,8 +99,10 @@ class CudaDevice:
             return values[0] if len(values) == 1 else values
         if int(status) == _OUT_OF_MEMORY:
             unknown, *sizes = self._driver.cuMemGetInfo()  # it may have no room to begin with
-            left = "" if int(unknown) else "{:.4g} of {:.4g} MB are free: ".format(
-                *(size / _MEGA for size in sizes)
+            left = (
+                ""
+                if int(unknown)
+                else "{:.4g} of {:.4g} MB are free: ".format(*(size / _MEGA for size in sizes))
             )
             what = f"no room for {wanted / _MEGA:.3g} MB" if wanted else "no memory left"
             raise DeviceError(
@@ -153,9 +157,11 @@ class Memory:
             for each in arguments
         ]
         addresses = (ctypes.c_void_p * len(values))(*map(ctypes.addressof, values))
-        self._checked(self._driver.cuLaunchKernel(
-            function, blocks, 1, 1, threads, 1, 1, 0, 0, ctypes.addressof(addresses), 0
-        ))  # fmt: skip
+        self._checked(
+            self._driver.cuLaunchKernel(
+                function, blocks, 1, 1, threads, 1, 1, 0, 0, ctypes.addressof(addresses), 0
+            )
+        )
         self._checked(self._driver.cuCtxSynchronize())
 
     def give_back(self) -> None:

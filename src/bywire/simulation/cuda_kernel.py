@@ -114,9 +114,11 @@ class CudaKernel:
                 said += [self.lanes, own, ahead, *recording.apart]
                 memory.put(plan, np.array(said, dtype=np.int64))
                 memory.run(
-                    self._function, -(-self.lanes // THREADS), THREADS,
+                    self._function,
+                    -(-self.lanes // THREADS),
+                    THREADS,
                     (par, float(schedule.step), given, state, plan, room),
-                )  # fmt: skip
+                )
                 memory.get(room, recording.place)
                 recording.end()
             memory.get(state, vector)

@@ -23,16 +23,16 @@ def unread(stages: Stages) -> frozenset[str]:
 
     They need not be kept. Those of velocities with dry friction are read where a substep is cut.
     """
-    roots = [node for pass_ in (stages.fast, stages.exact) for nodes in pass_.values()
-             for node in nodes]  # fmt: skip
+    roots = [
+        node for pass_ in (stages.fast, stages.exact) for nodes in pass_.values() for node in nodes
+    ]
     roots += [node for tick in stages.ticks for node in tick] + stages.output + stages.posed
     read = stages.graph.read_by(roots)
     return frozenset(
         f"{kind}{k}"
         for kind in ("d", "r")
         for k in range(len(stages.fast[kind]))
-        if stages.graph.leaf(kind, k) not in read
-        and not (kind == "d" and k in stages.velocities)
+        if stages.graph.leaf(kind, k) not in read and not (kind == "d" and k in stages.velocities)
     )
 
 

@@ -23,6 +23,7 @@ from bywire.simulation.stages import STATE, Stages
 _TRIES = 200_000
 APART = "__attribute__((noinline))"  # but fast: what is cold is compiled to be short
 
+
 def rare_substep(stages: Stages) -> str:
     """Return the C functions of a substep that is repeated or cut.
 
@@ -88,9 +89,10 @@ def _constants(stages: Stages) -> dict[Node, int]:
     readers = [node for node in order if level[node] or graph.is_boolean(node)]
     read = [*roots, *(a for node in readers for a in graph.arguments(node))]
     chosen = [
-        node for node in dict.fromkeys(read)
+        node
+        for node in dict.fromkeys(read)
         if not level[node] and not graph.is_boolean(node) and graph.nodes[node].op != "const"
-    ]  # fmt: skip
+    ]
     return {node: k for k, node in enumerate(chosen)}
 
 
@@ -123,9 +125,12 @@ def _exact(stages: Stages, slots: dict[Node, int]) -> list[str]:
 
 
 def _lines(
-    stages: Stages, roots: list[Node], slots: dict[Node, int], target: str = "o",
+    stages: Stages,
+    roots: list[Node],
+    slots: dict[Node, int],
+    target: str = "o",
     known: Collection[Node] = frozenset(),
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     """Return the statements that compute roots, of which some operations are known."""
     graph = stages.graph
     other = leaf_namer(graph, _leaf, lambda node: f"v{node}")

@@ -163,9 +163,14 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
         ticks.append(f"if (f % plan[{8 + k}] == 0) {{\n      {indented(lines, 6)}\n    }}")
     outputs = block(needed(graph, stages.output, lambda n: level[n] == 0))
     outputs += [f"o[{j}] = {as_number(graph, n, name)};" for j, n in enumerate(stages.output)]
-    parts = {"nu": leaf_count(stages, "u"), "np": leaf_count(stages, "p"),
-             "tasks": len(stages.ticks), "count": len(stages.output),
-             "most": most_tries(stages), "tries": layout.start["counters"] + 2}  # fmt: skip
+    parts = {
+        "nu": leaf_count(stages, "u"),
+        "np": leaf_count(stages, "p"),
+        "tasks": len(stages.ticks),
+        "count": len(stages.output),
+        "most": most_tries(stages),
+        "tries": layout.start["counters"] + 2,
+    }
     return f"""{caller.runtime}{rare_substep(stages)}
 {caller.head} {{
   {PLAN}

@@ -83,9 +83,7 @@ class _Tangents:
             *(f"for (int l = 0; l < L; ++l) K[{k} * L + l] = {v};" for k, v in enumerate(values)),
         ]
 
-    def lines(
-        self, order: Sequence[Node], lane: bool, dialect: Dialect = PLAIN_C
-    ) -> list[str]:
+    def lines(self, order: Sequence[Node], lane: bool, dialect: Dialect = PLAIN_C) -> list[str]:
         """Return the statements of the nodes that differ between lanes, or of those that do not."""
         chosen = [n for n in order if self.lane[n] == lane]
         stored = [n for n in chosen if n in self.slot]

@@ -22,11 +22,41 @@ from bywire.simulation.simplify import RULES
 @cache
 def _names() -> dict[int, str]:
     wanted = [
-        "add", "sub", "mul", "div", "neg", "exp", "log", "sqrt", "sin", "cos", "fabs", "floor",
-        "fmin", "fmax", "lt", "le", "eq", "ne", "not", "and", "or", "inv", "sq", "twice",
-        "if_else_zero", "assign", "pow", "constpow", "sign", "tan", "atan", "tanh", "ceil",
+        "add",
+        "sub",
+        "mul",
+        "div",
+        "neg",
+        "exp",
+        "log",
+        "sqrt",
+        "sin",
+        "cos",
+        "fabs",
+        "floor",
+        "fmin",
+        "fmax",
+        "lt",
+        "le",
+        "eq",
+        "ne",
+        "not",
+        "and",
+        "or",
+        "inv",
+        "sq",
+        "twice",
+        "if_else_zero",
+        "assign",
+        "pow",
+        "constpow",
+        "sign",
+        "tan",
+        "atan",
+        "tanh",
+        "ceil",
         "copysign",
-    ]  # fmt: skip
+    ]
     return {getattr(ca, f"OP_{name.upper()}"): name for name in wanted}
 
 

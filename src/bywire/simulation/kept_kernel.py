@@ -109,23 +109,24 @@ class Place:
                 return None
             load(library, entry_point)
             layout = Layout(entry["start"], entry["length"])
-            return KeptKernel(
-                layout, library, entry["compiler"], entry["jacobians"], entry["text"]
-            )
+            return KeptKernel(layout, library, entry["compiler"], entry["jacobians"], entry["text"])
         except (OSError, ValueError, KeyError, TypeError, CompilerError):
             return None
 
     def keep(self, kernel: Keepable, contact_jacobians: Any = None, digest: str = "") -> None:
         """Keep a kernel with the digest of its C, unless a file has changed since it was loaded."""
-        self._keep(contact_jacobians, {
-            "start": kernel.layout.start,
-            "length": kernel.layout.length,
-            "library": kernel.library.name,
-            "entry": kernel.ENTRY,
-            "digest": sha256(kernel.library),
-            "compiler": kernel.compiler.label,
-            "text": digest,
-        })  # fmt: skip
+        self._keep(
+            contact_jacobians,
+            {
+                "start": kernel.layout.start,
+                "length": kernel.layout.length,
+                "library": kernel.library.name,
+                "entry": kernel.ENTRY,
+                "digest": sha256(kernel.library),
+                "compiler": kernel.compiler.label,
+                "text": digest,
+            },
+        )
 
     def keep_model(self, contact_jacobians: Any, digest: str) -> None:
         """Keep that a model is sound, with its contacts' Jacobians and digest, but no kernel."""

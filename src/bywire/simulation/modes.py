@@ -45,8 +45,12 @@ class Modes:
 
     def without(self, known: Collection[Node]) -> Modes:
         """Return the parts less nodes that are known already."""
-        return Modes(*([n for n in each if n not in known] for each in
-                       (self.first, self.atoms, self.values, self.rest)))  # fmt: skip
+        return Modes(
+            *(
+                [n for n in each if n not in known]
+                for each in (self.first, self.atoms, self.values, self.rest)
+            )
+        )
 
 
 def modes(graph: Graph, roots: Sequence[Node], level: Levels) -> Modes:

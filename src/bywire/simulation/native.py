@@ -132,9 +132,7 @@ class SingleKernel:
     ENTRY = "bw_run"
     """its function in the library"""
 
-    def __init__(
-        self, layout: Layout, library: Path, compiler: Compiler, digest: str = ""
-    ) -> None:
+    def __init__(self, layout: Layout, library: Path, compiler: Compiler, digest: str = "") -> None:
         self.layout, self.library, self.compiler = layout, library, compiler
         self.digest = digest
         self.label = f"compiled C, {compiler.label}"

@@ -35,8 +35,10 @@ class Quadrature:
 
     def of(self, wanted: Sequence[bool]) -> Quadrature:
         """Return what the wanted integrals take; the others stay as they are."""
-        chosen = [pairs if is_wanted else [] for pairs, is_wanted in
-                  zip(self.combinations, wanted, strict=True)]  # fmt: skip
+        chosen = [
+            pairs if is_wanted else []
+            for pairs, is_wanted in zip(self.combinations, wanted, strict=True)
+        ]
         places = sorted({k for pairs in chosen for _, k in pairs})
         return Quadrature(
             [self.products[k] for k in places],

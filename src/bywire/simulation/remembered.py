@@ -41,9 +41,12 @@ class Remembered:
 
 
 def remembered(
-    graph: Graph, order: Sequence[Node], kept: Collection[Node], states: Collection[Node],
+    graph: Graph,
+    order: Sequence[Node],
+    kept: Collection[Node],
+    states: Collection[Node],
     level: Levels,
-) -> tuple[list[Node], tuple[Remembered, ...], list[Node]]:  # fmt: skip
+) -> tuple[list[Node], tuple[Remembered, ...], list[Node]]:
     """Return what is worth remembering of a substep, what that follows from, and all else.
 
     Parameters

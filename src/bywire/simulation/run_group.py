@@ -198,9 +198,15 @@ def simulate_group(
         vectors = list(pool.map(computed, range(0, len(runs), kernel.lanes)))
     vector = np.concatenate(vectors, axis=1)[:, : len(runs)]
     return RunGroup(
-        tuple(runs), schedule.record_times[first:], values, recorded, vector, kernel, at_ends,
+        tuple(runs),
+        schedule.record_times[first:],
+        values,
+        recorded,
+        vector,
+        kernel,
+        at_ends,
         tuple(ends),
-    )  # fmt: skip
+    )
 
 
 def _edges(schedule: Schedule, first: int, runs: Sequence[Run]) -> list[int]:
@@ -289,9 +295,10 @@ class _Carried:
                 rows = np.empty((self._count, 1, signals))
                 self._advance(silent, rows, begin, end)
             require_finite(
-                self._kernel.layout, self._vector,
+                self._kernel.layout,
+                self._vector,
                 f"one of {self._count} runs left the numbers before t = {end * schedule.frame:g} s",
-            )  # fmt: skip
+            )
             require_work(work_of(schedule, self._kernel.layout, end, self._vector), self._most)
             watch.piece()
         return self._vector

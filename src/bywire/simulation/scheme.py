@@ -112,10 +112,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     mass = column(model.mass(symbol_tuple(model.State, y), par))
     rubbing = [_index(model, name) for name in model.frictions]
     jump = column(
-        [
-            0.5 * s.h * (high - low) / mass[k]
-            for k, (low, high) in zip(rubbing, bounds, strict=True)
-        ]
+        [0.5 * s.h * (high - low) / mass[k] for k, (low, high) in zip(rubbing, bounds, strict=True)]
     )
     A = ca.diag(2.0 / s.h * mass) - linear.J
     right = dict(enumerate(linear.rows))

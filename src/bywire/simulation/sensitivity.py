@@ -85,9 +85,16 @@ class TangentKernel:
         self.rounds = rounds(stages)
 
     def advance(
-        self, request: Request, state: Array, begin: int, end: int, rows: Array,
-        seeds: Array, tangents: Array, rows_t: Array,
-    ) -> None:  # fmt: skip
+        self,
+        request: Request,
+        state: Array,
+        begin: int,
+        end: int,
+        rows: Array,
+        seeds: Array,
+        tangents: Array,
+        rows_t: Array,
+    ) -> None:
         """Run frames begin..end; renews ``state`` and ``tangents``, fills ``rows`` and ``rows_t``.
 
         Parameters
@@ -103,9 +110,15 @@ class TangentKernel:
         def call(first: int, last: int, row: int) -> int:
             plan = plan_array(request.schedule, first, last, request.selection.size)
             arrays: list[NDArray[Any]] = [
-                request.stimulus, state, plan, request.selection, rows[row:], seeds, tangents,
+                request.stimulus,
+                state,
+                plan,
+                request.selection,
+                rows[row:],
+                seeds,
+                tangents,
                 rows_t[row:],
-            ]  # fmt: skip
+            ]
             step = ctypes.c_double(request.schedule.step)
             places = [pointer(array) for array in arrays]
             return int(self._run(pointer(request.parameters), step, *places))

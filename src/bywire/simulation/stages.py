@@ -99,10 +99,18 @@ def build_stages(
     fixed = frozenset(kind for kind, level in LEVEL.items() if level < 2)
     graph = Graph({**ranges, ("h", 0): NOT_NEGATIVE}, fixed)
     lengths = {
-        "x": n.x, "d": n.x, "m": n.memory, "u": n.stimulus, "r": n.reaction,
-        "q": n.flow, "p": n.parameters, "h": 1, "w": program.rows, "force": program.rows,
+        "x": n.x,
+        "d": n.x,
+        "m": n.memory,
+        "u": n.stimulus,
+        "r": n.reaction,
+        "q": n.flow,
+        "p": n.parameters,
+        "h": 1,
+        "w": program.rows,
+        "force": program.rows,
         "failed": 1,
-    }  # fmt: skip
+    }
     leaves = {
         kind: [graph.leaf(kind, k) for k in range(length)] for kind, length in lengths.items()
     }

@@ -69,9 +69,7 @@ def unresolved(
     return texts
 
 
-def _too_fast(
-    opened: NDArray[np.float64], closed: NDArray[np.float64], step: float
-) -> list[str]:
+def _too_fast(opened: NDArray[np.float64], closed: NDArray[np.float64], step: float) -> list[str]:
     modes = np.linalg.eigvals(closed)
     omega = np.abs(modes)
     likely = (modes.imag != 0.0) & (-modes.real < DAMPED * omega) & (step * omega > SAFE)

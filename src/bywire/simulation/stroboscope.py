@@ -203,9 +203,12 @@ def _by_substeps(schedule: Schedule) -> Schedule:
     """Return the same plan in frames of one substep, at each of which a run can be cut."""
     n = schedule.substeps
     return Schedule(
-        schedule.step, 1, schedule.frames * n, tuple(n * every for every in schedule.task_frames),
+        schedule.step,
+        1,
+        schedule.frames * n,
+        tuple(n * every for every in schedule.task_frames),
         schedule.record_frames * n,
-    )  # fmt: skip
+    )
 
 
 @built_once

@@ -93,10 +93,15 @@ class Tapped(Wrapping):
     @property
     def Stimulus(self) -> type[NamedTuple]:
         """That of the model inside, then what falsifies."""
-        controls = [(name, Signal("1", name.replace("_", " ")))
-                    for tap in self.taps for name in tap.controls().values()]  # fmt: skip
-        tasks = [(rests(task), Signal("1", f"task {task} fails: 1 misses its tick, 2 is dead"))
-                 for task in self.resting]  # fmt: skip
+        controls = [
+            (name, Signal("1", name.replace("_", " ")))
+            for tap in self.taps
+            for name in tap.controls().values()
+        ]
+        tasks = [
+            (rests(task), Signal("1", f"task {task} fails: 1 misses its tick, 2 is dead"))
+            for task in self.resting
+        ]
         return _extended(self.inner.Stimulus, (*controls, *tasks))
 
     def started(self, state: Any, memory: Any) -> Any:
@@ -134,18 +139,24 @@ class Tapped(Wrapping):
             if tap.side == "reading":
                 x = x._replace(**{tap.field: _tapped(tap, x, memory, stimulus, last)})
             elif tap.side == "demand":
-                u = u._replace(**{tap.field: self._inside_range(
-                    tap.field, _tapped(tap, u, memory, stimulus, last)
-                )})  # fmt: skip
+                u = u._replace(
+                    **{
+                        tap.field: self._inside_range(
+                            tap.field, _tapped(tap, u, memory, stimulus, last)
+                        )
+                    }
+                )
         after = tick(x, before, u, par)
         if name in self.resting:
             fails = getattr(stimulus, rests(name))
             empty = self.inner.rest(par)[1]
             # What a task hands on as it was is no memory of its own.
-            after = type(after)(*(
-                new if new is old else _failing(fails, old, new, none)
-                for old, new, none in zip(before, after, empty, strict=True)
-            ))  # fmt: skip
+            after = type(after)(
+                *(
+                    new if new is old else _failing(fails, old, new, none)
+                    for old, new, none in zip(before, after, empty, strict=True)
+                )
+            )
         for tap in self.taps:
             if tap.side == "drive" and (name == tap.task or not tap.late):
                 _tapped(tap, after, memory, stimulus, last)
@@ -163,8 +174,9 @@ class Tapped(Wrapping):
 
     def memory_inside(self, memory: Any) -> Any:
         """Return the memory as the plant feels it: with the drives behind their taps."""
-        drives = {t.field: getattr(memory, f"last_{t.name}") for t in self.taps
-                  if t.side == "drive"}  # fmt: skip
+        drives = {
+            t.field: getattr(memory, f"last_{t.name}") for t in self.taps if t.side == "drive"
+        }
         return self._inside(memory)._replace(**drives)
 
 
@@ -198,22 +210,24 @@ def _fields(tap: Tap) -> tuple[str, ...]:
 
 @cache
 def _memory(
-    memory: type[NamedTuple], state: type[NamedTuple], stimulus: type[NamedTuple],
+    memory: type[NamedTuple],
+    state: type[NamedTuple],
+    stimulus: type[NamedTuple],
     taps: tuple[Tap, ...],
-) -> type[NamedTuple]:  # fmt: skip
+) -> type[NamedTuple]:
     sides = {"reading": state, "demand": stimulus, "drive": memory}
     kept = []
     for tap in taps:
         signal = signals_of(sides[tap.side])[tap.field]
-        kept += [(name, Signal(signal.unit, f"{signal.label} behind its tap", signal.nominal))
-                 for name in _fields(tap)]  # fmt: skip
+        kept += [
+            (name, Signal(signal.unit, f"{signal.label} behind its tap", signal.nominal))
+            for name in _fields(tap)
+        ]
     return _extended(memory, tuple(kept))
 
 
 @cache
-def _extended(
-    kind: type[NamedTuple], further: tuple[tuple[str, Signal], ...]
-) -> type[NamedTuple]:
+def _extended(kind: type[NamedTuple], further: tuple[tuple[str, Signal], ...]) -> type[NamedTuple]:
     hints = typing.get_type_hints(kind, include_extras=True)
     fields = [(name, hints[name]) for name in kind._fields]
     fields += [(name, Annotated[float, signal]) for name, signal in further]

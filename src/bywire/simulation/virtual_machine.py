@@ -26,8 +26,12 @@ class VirtualMachine:
     def __init__(self, program: Program) -> None:
         n = program.sizes
         lengths = {
-            "x": n.x, "d": n.x, "r": n.reaction, "q": n.flow, "m": n.memory,
-        }  # fmt: skip
+            "x": n.x,
+            "d": n.x,
+            "r": n.reaction,
+            "q": n.flow,
+            "m": n.memory,
+        }
         starts = np.concatenate(([0], np.cumsum(list(lengths.values()))))
         start = dict(zip([*lengths, "counters"], map(int, starts), strict=True))
         self.layout = Layout(start, lengths)

@@ -54,8 +54,9 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
     beyond = made.below(leaf.low) + made.above(leaf.high)
     if beyond > NEVER:
         often = f", with a probability of {beyond:.2g}" if beyond < 1.0 else ""
-        raise ParameterError(f"{where}: {made.text} leaves what is admissible, {wanted}{often}: "
-                             f"{advice}")  # fmt: skip
+        raise ParameterError(
+            f"{where}: {made.text} leaves what is admissible, {wanted}{often}: {advice}"
+        )
     low, high = (_at_limit(end, leaf, made.high - made.low) for end in (made.low, made.high))
     if made.kind == "normal":
         low = -math.inf if leaf.low_open and low == leaf.low else low
@@ -134,9 +135,7 @@ def require_following(where: str, made: Distribution, leaf: Leaf, unit: Unit, ra
     """
     low, high = (leaf.low, leaf.low_open), (leaf.high, leaf.high_open)
     low, high = (low, high) if ratio > 0.0 else (high, low)
-    admitted(
-        where, made, Leaf(leaf.name, unit, low[0] / ratio, high[0] / ratio, low[1], high[1])
-    )
+    admitted(where, made, Leaf(leaf.name, unit, low[0] / ratio, high[0] / ratio, low[1], high[1]))
 
 
 def _require_singles(where: str, values: Sequence[float], leaf: Leaf) -> None:

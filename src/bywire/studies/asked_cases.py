@@ -63,9 +63,10 @@ def require_extensible(plan: StudyPlan, cases: int) -> None:
     if plan.is_sampled or plan.sought is not None:
         return
     why = (
-        "it lists them by quantities and levels" if plan.design in SPANNED
+        "it lists them by quantities and levels"
+        if plan.design in SPANNED
         else "its groups belong together"
-    )  # fmt: skip
+    )
     raise ParameterError(
         f"cases = {cases}: none are added to a study of {plan.design!r}, for {why}: change the "
         "study file, and run it into another folder"

@@ -19,9 +19,10 @@ def in_order(
     correlated = {name for pair in correlations for name in pair}
     return tuple(
         replace(each, distribution=rising(each.distribution))
-        if each.name in correlated and each.distribution.is_discrete else each
+        if each.name in correlated and each.distribution.is_discrete
+        else each
         for each in varied
-    )  # fmt: skip
+    )
 
 
 def read_correlations(

@@ -28,9 +28,10 @@ def require_agreement(plan: StudyPlan) -> None:
     others = ", ".join(map(repr, SAMPLED))
     if plan.correlations:
         why = (
-            "exchanges each quantity for itself, so that none may depend on another" if is_indexed
+            "exchanges each quantity for itself, so that none may depend on another"
+            if is_indexed
             else "goes to the ends of each quantity for itself"
-        )  # fmt: skip
+        )
         raise ParameterError(
             f"[[correlation]]: {plan.design!r} {why}: leave it out, or take {others}"
         )
@@ -54,7 +55,7 @@ def require_agreement(plan: StudyPlan) -> None:
         if not plan.demands:
             raise ParameterError(
                 f"[requirements]: {plan.design!r} searches for the worst case of each, and there "
-                "is none: write for instance overshoot = \"<= 15 %\""
+                'is none: write for instance overshoot = "<= 15 %"'
             )
         plan.sought.require_budget()
         return
@@ -66,7 +67,7 @@ def _require_rare(plan: StudyPlan, design: SoughtDesign) -> None:
     if not plan.judged_demands:
         raise ParameterError(
             f"[requirements]: {plan.design!r} asks how probable it is that one is missed, and none "
-            "has a probability: write for instance \"<= 15 % with 99.99 %\""
+            'has a probability: write for instance "<= 15 % with 99.99 %"'
         )
     singles = [each.name for each in plan.varied if each.distribution.is_discrete]
     if singles and plan.design == IMPORTANCE:

@@ -39,9 +39,11 @@ def read_design(section: Mapping[str, Any]) -> dict[str, Any]:
     if (default := DEFAULT_CASES.get(design.get("design", ""))) is not None:
         design["cases"] = default
     for key, low, high in (
-        ("cases", 1, MOST), ("seed", 0, 2**63 - 1), ("levels", 2, 1000),
+        ("cases", 1, MOST),
+        ("seed", 0, 2**63 - 1),
+        ("levels", 2, 1000),
         ("cases_per_level", 1, MOST),
-    ):  # fmt: skip
+    ):
         if key in section:
             design[key] = whole_number(f"[design] {key}", section[key], low, high)
     if "confidence" in section:
@@ -78,4 +80,3 @@ def _require_of_use(kind: str, section: Mapping[str, Any]) -> None:
         raise ParameterError(
             f"[design] cases: {kind!r} lists its cases by quantities and levels: leave them out"
         )
-

@@ -201,8 +201,9 @@ def _normal(entry: _Entry) -> Distribution:
             "it is left; give other ends, or another mean"
         )
     cut = truncated_normal((low - mean) / sd, (high - mean) / sd, mean, sd)
-    sides = [f"{word} {entry.amount(x)}" for word, x in (("from", low), ("to", high))
-             if math.isfinite(x)]  # fmt: skip
+    sides = [
+        f"{word} {entry.amount(x)}" for word, x in (("from", low), ("to", high)) if math.isfinite(x)
+    ]
     return _frozen(entry, cut, f"{text}, truncated {' '.join(sides)}", low, high)
 
 

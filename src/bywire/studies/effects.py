@@ -57,8 +57,9 @@ class Effect:
         return int(np.count_nonzero(~np.isfinite(self.figures)))
 
 
-def effects(varied: Sequence[Varied], levels: int, columns: Sequence[Sequence[float | str]],
-            figure: Array) -> list[Effect]:  # fmt: skip
+def effects(
+    varied: Sequence[Varied], levels: int, columns: Sequence[Sequence[float | str]], figure: Array
+) -> list[Effect]:
     """Return what each quantity does to a key figure, the largest swing first.
 
     Quantities with which the figure is not defined any more come before that.

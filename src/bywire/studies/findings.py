@@ -105,7 +105,7 @@ class Findings:
             )
             for name, unit in (self.units if len(self.cases) else {}).items()
             if np.isfinite(self.figure(name)).any()
-        )  # fmt: skip
+        )
 
     def influences(self, name: str) -> Sequence[Influence | ChoiceInfluence]:
         """Return how a key figure goes with what varies, the strongest first.
@@ -168,8 +168,9 @@ class Findings:
         correlation ratios.
         """
         if self.rare:
-            return [i.quantity for each in self.rare if each.demand.kpi == name
-                    for i in each.importance]  # fmt: skip
+            return [
+                i.quantity for each in self.rare if each.demand.kpi == name for i in each.importance
+            ]
         if self.plan.sensitivity is not None:
             return [each.quantity for each in self.sensitivity(name).drivers]
         if self.plan.design == ONE:
@@ -259,6 +260,10 @@ class Findings:
     def _judgment(self, demand: Demand) -> Judgment:
         kpi = demand.kpi
         return judgment_of(
-            demand, self.units[kpi], self.figure(kpi), self._failed, self._error(kpi),
+            demand,
+            self.units[kpi],
+            self.figure(kpi),
+            self._failed,
+            self._error(kpi),
             self.plan.confidence,
-        )  # fmt: skip
+        )

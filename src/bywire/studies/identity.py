@@ -8,10 +8,12 @@ from collections.abc import Mapping
 from typing import Any
 
 _SHOWN = 3  # entries that are named, of those that differ
-_WORDS = {"version": "the version of bywire",
-          "computed equations": "the equations of the model",
-          "computed figures": "how the runs or their key figures are computed",
-          "points": "how the library draws"}  # fmt: skip
+_WORDS = {
+    "version": "the version of bywire",
+    "computed equations": "the equations of the model",
+    "computed figures": "how the runs or their key figures are computed",
+    "points": "how the library draws",
+}
 """entries whose values say nothing to a reader"""
 _PARTS = {"varied": ("", "together", "quantiles"), "stimuli": ("", "parameters")}
 """entries whose values are lists, and what stands in each place of them"""

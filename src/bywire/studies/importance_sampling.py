@@ -66,9 +66,15 @@ class _Drawn:
 
 
 def importance_sampling(
-    margins: Margins, searched: Margins, quantities: int, budget: int, seed: int,
-    confidence: float, chunk: int = 64, report: Callable[[float], None] = lambda estimate: None,
-) -> FailureProbability:  # fmt: skip
+    margins: Margins,
+    searched: Margins,
+    quantities: int,
+    budget: int,
+    seed: int,
+    confidence: float,
+    chunk: int = 64,
+    report: Callable[[float], None] = lambda estimate: None,
+) -> FailureProbability:
     """Return the probability of failure by importance sampling around the design point.
 
     OpenTURNS' FORM with the algorithm of Abdo and Rackwitz finds the design point, the failing
@@ -119,10 +125,12 @@ def importance_sampling(
             raise BudgetSpentError
         for first in range(0, count, TOGETHER // chunk):
             numbers = range(first, min(first + TOGETHER // chunk, count))
-            scores = np.vstack([
-                center + np.random.default_rng((seed, k)).standard_normal((chunk, quantities))
-                for k in numbers
-            ])  # fmt: skip
+            scores = np.vstack(
+                [
+                    center + np.random.default_rng((seed, k)).standard_normal((chunk, quantities))
+                    for k in numbers
+                ]
+            )
             found = trail(scores)
             drawn.margins.append(found)
             # Density in truth over that around the center.
@@ -138,13 +146,18 @@ def importance_sampling(
     estimate = below(0.0) if state == "done" else UNKNOWN
     nearest = trail.nearest
     return FailureProbability(
-        state, estimate, below if state == "done" else _unknown,
-        (Level(0.0, estimate.value),), search.runs + trail.runs,
+        state,
+        estimate,
+        below if state == "done" else _unknown,
+        (Level(0.0, estimate.value),),
+        search.runs + trail.runs,
         drawn.span if state == "done" else None,
         place=nearest[0] + search.runs if nearest else None,
         scores=nearest[1] if nearest else None,
-        center=center if index > 0.0 else None, first_order=index, why=why,
-    )  # fmt: skip
+        center=center if index > 0.0 else None,
+        first_order=index,
+        why=why,
+    )
 
 
 def _with_result(margins: Margins, scores: Array) -> Array:

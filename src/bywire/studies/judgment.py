@@ -51,9 +51,13 @@ class Judgment:
 
 
 def judgment_of(
-    demand: Demand, unit: str, figure: Array, failed: NDArray[np.bool_], error: float,
+    demand: Demand,
+    unit: str,
+    figure: Array,
+    failed: NDArray[np.bool_],
+    error: float,
     confidence: float,
-) -> Judgment:  # fmt: skip
+) -> Judgment:
     """Return a requirement judged over cases.
 
     Parameters

@@ -57,10 +57,11 @@ class Measured:
             if name not in self.values:
                 raise unknown_name("estimate in [measured] of", name, self.values)
         return Measured(
-            {n: self.values[n] for n in names}, {n: self.deviations[n] for n in names},
+            {n: self.values[n] for n in names},
+            {n: self.deviations[n] for n in names},
             {n: self.units[n] for n in names},
             {pair: c for pair, c in self.correlations.items() if set(pair) <= set(names)},
-        )  # fmt: skip
+        )
 
 
 def varied_as_measured(
@@ -92,8 +93,7 @@ def varied_as_measured(
     if not isinstance(file, str) or not file.strip():
         said = f"file = {quoted(file)}" if "file" in section else "file is missing"
         raise ParameterError(
-            f"[measured] {said}: name the folder that 'bywire identify --out' has "
-            "written"
+            f"[measured] {said}: name the folder that 'bywire identify --out' has written"
         )
     if not isinstance(truncate, bool):
         raise ParameterError(f"[measured] truncate = {quoted(truncate)}: true or false is wanted")
@@ -111,8 +111,11 @@ def varied_as_measured(
         if name not in leaves:
             raise unknown_name("parameter of [measured]", name, leaves)
         leaf, unit = leaves[name], chosen.units[name]
-        entry = {"kind": "normal", "mean": _text(value, unit),
-                 "sd": _text(chosen.deviations[name], unit)}  # fmt: skip
+        entry = {
+            "kind": "normal",
+            "mean": _text(value, unit),
+            "sd": _text(chosen.deviations[name], unit),
+        }
         ends = {"low": leaf.low, "high": leaf.high} if truncate else {}
         symbol = leaf.unit.symbol
         entry |= {key: _text(x, symbol) for key, x in ends.items() if math.isfinite(x)}
@@ -174,8 +177,9 @@ def _estimates(said: Mapping[str, Any]) -> Iterator[Measured]:
             raise ValueError("the correlations are of other parameters")
         pairs = {
             (min(a, b), max(a, b)): _number(float(matrix[i, k]))
-            for (i, a), (k, b) in combinations(enumerate(names), 2) if abs(matrix[i, k]) > _WEAK
-        }  # fmt: skip
+            for (i, a), (k, b) in combinations(enumerate(names), 2)
+            if abs(matrix[i, k]) > _WEAK
+        }
         units = {str(name): str(row["unit"]) for name, row in rows.items()}
         yield Measured(values, deviations, units, pairs)
 

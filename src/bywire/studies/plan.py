@@ -145,9 +145,13 @@ class StudyPlan:
         if self.design not in SOUGHT:
             return None
         return SoughtDesign(
-            self.design, len(self.judged_demands), self.cases_per_level, self.cases, self.seed,
+            self.design,
+            len(self.judged_demands),
+            self.cases_per_level,
+            self.cases,
+            self.seed,
             len(self.varied),
-        )  # fmt: skip
+        )
 
     @property
     def judged_demands(self) -> tuple[Demand, ...]:
@@ -216,10 +220,12 @@ class StudyPlan:
             case, places between the ends, 0 to 1.
         """
         if self.design == WORST:
-            return self._named([
-                v.distribution.between(column)
-                for v, column in zip(self.varied, scores.T, strict=True)
-            ])  # fmt: skip
+            return self._named(
+                [
+                    v.distribution.between(column)
+                    for v, column in zip(self.varied, scores.T, strict=True)
+                ]
+            )
         return self._named(self.scored.values_at(scores))
 
     def _named(self, values: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
@@ -265,17 +271,24 @@ class StudyPlan:
                 name: [each.kind, each.parameters.model_dump(mode="json")]
                 for name, each in bench.chosen_stimuli.items()
             },
-            "step": bench.step, "record": bench.record, "noise": bench.seed,
+            "step": bench.step,
+            "record": bench.record,
+            "noise": bench.seed,
             "order": [v.name for v in self.varied],
             "varied": {
-                v.name: [v.distribution.text, v.together,
-                         v.distribution.quantile(np.linspace(0.01, 0.99, 9)).tolist()]
+                v.name: [
+                    v.distribution.text,
+                    v.together,
+                    v.distribution.quantile(np.linspace(0.01, 0.99, 9)).tolist(),
+                ]
                 for v in self.varied
             },
             "correlation": {" and ".join(pair): r for pair, r in self.correlations.items()},
-            "design": self.design, "seed": self.seed, "chunk": CHUNK,
+            "design": self.design,
+            "seed": self.seed,
+            "chunk": CHUNK,
             "levels": 0 if self.is_sampled else self.levels,
-        }  # fmt: skip
+        }
         if bench.faults:
             said["faults"] = bench.faults
         if self.sensitivity is not None:

@@ -146,8 +146,9 @@ def spanned(
     if kind == "one-at-a-time":
         rows = [
             [*nominal[:k], value, *nominal[k + 1 :]]
-            for k, values in enumerate(each) for value in values
-        ]  # fmt: skip
+            for k, values in enumerate(each)
+            for value in values
+        ]
     else:
         count = int(np.prod([float(len(values)) for values in each]))
         if count > MOST:

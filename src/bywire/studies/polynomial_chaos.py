@@ -68,14 +68,21 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
     best = _fitted(plan.varied, x, y, best.degree)
     nominal = _within(plan.varied, x)
     return Surrogate(
-        kpi, findings.units[kpi], nominal, {v.name: v.unit for v in plan.varied},
+        kpi,
+        findings.units[kpi],
+        nominal,
+        {v.name: v.unit for v in plan.varied},
         dict(zip(nominal, x.min(axis=0).tolist(), strict=True)),
         dict(zip(nominal, x.max(axis=0).tolist(), strict=True)),
         _singles(plan.varied, x),
-        y.size, best.degree, best.terms,
-        float(np.sqrt(np.mean(errors**2))), float(np.abs(errors).max()),
-        1.0 - float(np.mean(errors**2) / np.var(y)), best.polynomial,
-    )  # fmt: skip
+        y.size,
+        best.degree,
+        best.terms,
+        float(np.sqrt(np.mean(errors**2))),
+        float(np.abs(errors).max()),
+        1.0 - float(np.mean(errors**2) / np.var(y)),
+        best.polynomial,
+    )
 
 
 def require_fittable(plan: StudyPlan) -> None:
@@ -103,16 +110,18 @@ def _within(varied: Sequence[Varied], x: Array) -> dict[str, float]:
     singles = _singles(varied, x)
     return {
         v.name: min(singles[v.name], key=lambda single: abs(single - v.nominal))
-        if v.name in singles else float(np.clip(v.nominal, x[:, k].min(), x[:, k].max()))
+        if v.name in singles
+        else float(np.clip(v.nominal, x[:, k].min(), x[:, k].max()))
         for k, v in enumerate(varied)
-    }  # fmt: skip
+    }
 
 
 def _singles(varied: Sequence[Varied], x: Array) -> dict[str, tuple[float, ...]]:
     """Return the values in the cases of each quantity that has single ones."""
     return {
         v.name: tuple(np.unique(x[:, k]).tolist())
-        for k, v in enumerate(varied) if v.distribution.is_discrete
+        for k, v in enumerate(varied)
+        if v.distribution.is_discrete
     }
 
 
@@ -120,9 +129,10 @@ def _degrees(shape: tuple[int, ...]) -> list[int]:
     """Return degrees whose polynomial has fewer terms than half of the cases it is fitted to."""
     cases, quantities = shape
     fit = [
-        degree for degree in range(1, _LARGEST + 1)
+        degree
+        for degree in range(1, _LARGEST + 1)
         if math.comb(quantities + degree, degree) <= 0.5 * cases * (1.0 - 1.0 / _FOLDS)
-    ]  # fmt: skip
+    ]
     return fit or [1]
 
 
@@ -151,9 +161,12 @@ def _fitted(varied: Sequence[Varied], x: Array, y: Array, degree: int) -> _Fit:
     count = basis.getEnumerateFunction().getStrataCumulatedCardinal(degree)
     chosen = ot.LeastSquaresMetaModelSelectionFactory(ot.LARS(), ot.CorrectedLeaveOneOut())
     algorithm = ot.FunctionalChaosAlgorithm(
-        ot.Sample(x), ot.Sample(y[:, None]), law, ot.FixedStrategy(basis, count),
+        ot.Sample(x),
+        ot.Sample(y[:, None]),
+        law,
+        ot.FixedStrategy(basis, count),
         ot.LeastSquaresStrategy(chosen),
-    )  # fmt: skip
+    )
     algorithm.run()
     result = algorithm.getResult()
     model = result.getMetaModel()

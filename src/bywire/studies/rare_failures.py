@@ -79,9 +79,11 @@ class RareFailure:
 
 
 def rare_failures(
-    plan: StudyPlan, store: StudyStore, executor: Executor | None = None,
+    plan: StudyPlan,
+    store: StudyStore,
+    executor: Executor | None = None,
     progress: Progress = silent,
-) -> tuple[tuple[RareFailure, ...], pd.DataFrame]:  # fmt: skip
+) -> tuple[tuple[RareFailure, ...], pd.DataFrame]:
     """Return the rare failures of a study, and all of its cases.
 
     Parameters
@@ -119,9 +121,15 @@ def _failure(plan: StudyPlan, cases: RequirementCases) -> RareFailure:
         )
     else:
         failure = importance_sampling(
-            cases.drawn, cases.searched, count, plan.cases, plan.seed, plan.confidence, CHUNK,
+            cases.drawn,
+            cases.searched,
+            count,
+            plan.cases,
+            plan.seed,
+            plan.confidence,
+            CHUNK,
             cases.report,
-        )  # fmt: skip
+        )
     # Points that were asked for again, as by derivatives at the same place, are the same cases.
     failure = replace(failure, runs=len({*cases.numbers}), failed=len(cases.failed))
     case = None if failure.place is None else cases.numbers[failure.place]
@@ -130,8 +138,9 @@ def _failure(plan: StudyPlan, cases: RequirementCases) -> RareFailure:
     if importance and failure.center is not None:
         values = plan.values_at(np.asarray(failure.center)[None, :])
         point = {name: column[0].item() for name, column in values.items()}
-        point |= {i.quantity: max(i.shares, key=i.shares.__getitem__)
-                  for i in importance if i.shares}  # fmt: skip
+        point |= {
+            i.quantity: max(i.shares, key=i.shares.__getitem__) for i in importance if i.shares
+        }
     return RareFailure(cases.demand, failure, case, importance, point)
 
 
@@ -166,5 +175,6 @@ def _entropy(shares: Mapping[Any, float], distribution: Distribution) -> float:
     """Return the relative entropy of shares of single values to their probabilities."""
     return sum(
         p * math.log(p / weight)
-        for p, weight in zip(shares.values(), distribution.weights, strict=True) if p > 0.0
-    )  # fmt: skip
+        for p, weight in zip(shares.values(), distribution.weights, strict=True)
+        if p > 0.0
+    )

@@ -100,9 +100,12 @@ class Sensitivity:
 
 
 def sensitivity(
-    design: SensitivityDesign, names: Sequence[str], singles: Collection[str], figure: Array,
+    design: SensitivityDesign,
+    names: Sequence[str],
+    singles: Collection[str],
+    figure: Array,
     confidence: float,
-) -> Sensitivity:  # fmt: skip
+) -> Sensitivity:
     """Return what drives a key figure.
 
     Estimators and their intervals are SALib's: resampled groups, as normal ones. Indices of first
@@ -157,9 +160,13 @@ def _variance_shares(
     design: SensitivityDesign, names: Sequence[str], figure: Array, confidence: float
 ) -> Sensitivity:
     indices = library("SALib.analyze.sobol", *LIBRARY).analyze(
-        design.problem, figure, calc_second_order=False, num_resamples=_RESAMPLES,
-        conf_level=confidence, seed=np.random.default_rng(design.seed),
-    )  # fmt: skip
+        design.problem,
+        figure,
+        calc_second_order=False,
+        num_resamples=_RESAMPLES,
+        conf_level=confidence,
+        seed=np.random.default_rng(design.seed),
+    )
     drivers = [
         VarianceShares(
             name,
@@ -172,13 +179,21 @@ def _variance_shares(
 
 
 def _elementary_effects(
-    design: SensitivityDesign, names: Sequence[str], ways: Sequence[float], figure: Array,
+    design: SensitivityDesign,
+    names: Sequence[str],
+    ways: Sequence[float],
+    figure: Array,
     confidence: float,
-) -> Sensitivity:  # fmt: skip
+) -> Sensitivity:
     indices = library("SALib.analyze.morris", *LIBRARY).analyze(
-        design.problem, design.probabilities, figure, num_resamples=_RESAMPLES,
-        conf_level=confidence, num_levels=LEVELS, seed=np.random.default_rng(design.seed),
-    )  # fmt: skip
+        design.problem,
+        design.probabilities,
+        figure,
+        num_resamples=_RESAMPLES,
+        conf_level=confidence,
+        num_levels=LEVELS,
+        seed=np.random.default_rng(design.seed),
+    )
     drivers = [
         ElementaryEffects(
             name,
@@ -190,9 +205,7 @@ def _elementary_effects(
     return Sensitivity(sorted(drivers, key=lambda each: -each.mu_star.value))
 
 
-def _estimate(
-    value: float, reach: float, least: float = -np.inf, most: float = np.inf
-) -> Estimate:
+def _estimate(value: float, reach: float, least: float = -np.inf, most: float = np.inf) -> Estimate:
     """Return an estimate with its interval, which ends where values end that can be.
 
     An estimate may scatter beyond such an end: then the interval ends at the estimate.

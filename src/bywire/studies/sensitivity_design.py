@@ -129,12 +129,19 @@ class SensitivityDesign:
         """
         u = self.probabilities
         if self.kind == "sobol-indices":
-            return [d.quantile(np.clip(u[:, k], 2.0**-53, 1.0 - 2.0**-53))
-                    for k, d in enumerate(distributions)]  # fmt: skip
+            return [
+                d.quantile(np.clip(u[:, k], 2.0**-53, 1.0 - 2.0**-53))
+                for k, d in enumerate(distributions)
+            ]
         return [
-            d.between(u[:, k]) if d.is_discrete else d.quantile(np.clip(
-                u[:, k], 0.0 if math.isfinite(d.low) else TAIL,
-                1.0 if math.isfinite(d.high) else 1.0 - TAIL,
-            ))
+            d.between(u[:, k])
+            if d.is_discrete
+            else d.quantile(
+                np.clip(
+                    u[:, k],
+                    0.0 if math.isfinite(d.low) else TAIL,
+                    1.0 if math.isfinite(d.high) else 1.0 - TAIL,
+                )
+            )
             for k, d in enumerate(distributions)
-        ]  # fmt: skip
+        ]

@@ -120,9 +120,12 @@ def among(values: list[Any], weights: Array, text: str) -> Distribution:
     alike = np.allclose(weights, weights[0])
     shares = "" if alike else f", with {', '.join(f'{100.0 * w:.3g} %' for w in weights)}"
     return Distribution(
-        DISCRETE, f"one of {text}{shares}", partial(_picked, each, edges), singles=tuple(values),
+        DISCRETE,
+        f"one of {text}{shares}",
+        partial(_picked, each, edges),
+        singles=tuple(values),
         weights=tuple(weights.tolist()),
-    )  # fmt: skip
+    )
 
 
 def rising(made: Distribution) -> Distribution:

@@ -117,9 +117,10 @@ class SoughtCases:
         for name, column in values.items():
             known = found.get(name, np.array([]))
             is_same = known.shape == column.shape and (
-                bool(np.all(known == column)) if column.dtype.kind in "OU"
+                bool(np.all(known == column))
+                if column.dtype.kind in "OU"
                 else np.allclose(known.astype(float), column, rtol=1e-9, atol=0.0)
-            )  # fmt: skip
+            )
             if not is_same:
                 raise FileError(
                     f"{self.store.path(number)} holds other cases than the study asks for now: "

@@ -59,8 +59,13 @@ def spread_of(name: str, unit: str, nominal: float, figure: Array, confidence: f
     """
     known = figure[np.isfinite(figure)]
     return Spread(
-        name, unit, nominal, figure.size - known.size, float(known.mean()),
+        name,
+        unit,
+        nominal,
+        figure.size - known.size,
+        float(known.mean()),
         float(known.std(ddof=1)) if known.size > 1 else math.nan,
         tuple(quantile(known, p, confidence) for p in QUANTILES),
-        float(known.min()), float(known.max()),
-    )  # fmt: skip
+        float(known.min()),
+        float(known.max()),
+    )

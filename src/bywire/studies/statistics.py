@@ -121,10 +121,11 @@ def quantile(values: Array, probability: float, confidence: float) -> Quantile:
     below = low - 1
     ordered = np.sort(values)
     return Quantile(
-        probability, float(np.quantile(values, probability)),
+        probability,
+        float(np.quantile(values, probability)),
         float(ordered[below]) if below >= 0 else math.nan,
         float(ordered[above]) if above < values.size else math.nan,
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)
@@ -158,9 +159,12 @@ class Influence:
 
 
 def influences(
-    names: Sequence[str], columns: Sequence[Array], figure: Array, confidence: float,
+    names: Sequence[str],
+    columns: Sequence[Array],
+    figure: Array,
+    confidence: float,
     is_partial: bool = False,
-) -> list[Influence]:  # fmt: skip
+) -> list[Influence]:
     """Return how a key figure goes with each quantity, the strongest first.
 
     A rank correlation sees what rises or falls throughout; a quantity whose effect has an optimum

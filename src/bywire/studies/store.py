@@ -79,11 +79,15 @@ class StudyStore:
             (self.folder / CHUNKS).mkdir(parents=True, exist_ok=True)
             sweep(self.folder / CHUNKS)
             said = {
-                "digest": plan.digest, "source": str(origin.file.resolve()), "name": plan.name,
-                "cases": plan.total, "chunk": CHUNK,
-                "set": dict(origin.overrides), "systems": list(loaded_files()),
+                "digest": plan.digest,
+                "source": str(origin.file.resolve()),
+                "name": plan.name,
+                "cases": plan.total,
+                "chunk": CHUNK,
+                "set": dict(origin.overrides),
+                "systems": list(loaded_files()),
                 "study": plan.identity,
-            }  # fmt: skip
+            }
             with replacing(self.folder / RECORD) as fresh:
                 fresh.write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
         except OSError as error:
@@ -164,9 +168,10 @@ class StudyStore:
     def finished(self) -> set[int]:
         """Return the numbers of the chunks that are there."""
         return {
-            int(path.stem) for path in (self.folder / CHUNKS).glob("*.parquet")
+            int(path.stem)
+            for path in (self.folder / CHUNKS).glob("*.parquet")
             if path.stem.isdecimal()
-        }  # fmt: skip
+        }
 
     def drop_damaged(self) -> int:
         """Take away files of chunks that cannot be read, so that they are computed again.

@@ -25,9 +25,7 @@ from bywire.studies.vary_section import read_all_varied
 _KEYS = ("name", "bench", "vary", "measured", "correlation", "design", "set", "requirements")
 
 
-def read_study(
-    path: str | Path, overrides: Mapping[str, str] = MappingProxyType({})
-) -> StudyPlan:
+def read_study(path: str | Path, overrides: Mapping[str, str] = MappingProxyType({})) -> StudyPlan:
     """Read a study file.
 
     Parameters
@@ -54,9 +52,7 @@ def read_study(
         raise type(error)(f"{file}: {error}") from None
 
 
-def _plan(
-    content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]
-) -> StudyPlan:
+def _plan(content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]) -> StudyPlan:
     _require_known(content)
     for key in ("vary", "measured", "design", "set", "requirements"):
         if not isinstance(content.get(key, {}), Mapping):
@@ -74,9 +70,14 @@ def _plan(
     said = {**measured, **read_correlations(content.get("correlation", []), varied, measured)}
     changes = {**bench_file.flattened(content.get("set", {})), **overrides}
     plan = StudyPlan(
-        name, bench, in_order(varied, said), demands=demands, correlations=said,
-        tested=StudiedBench(content["bench"], changes), **read_design(content.get("design", {})),
-    )  # fmt: skip
+        name,
+        bench,
+        in_order(varied, said),
+        demands=demands,
+        correlations=said,
+        tested=StudiedBench(content["bench"], changes),
+        **read_design(content.get("design", {})),
+    )
     require_agreement(plan)
     return plan
 
@@ -87,28 +88,28 @@ def _require_known(content: Mapping[str, Any]) -> None:
         if key in bench_file.SECTIONS and key not in _KEYS:
             raise ParameterError(
                 f"[{key}] is of the bench, not of a study: write it into the bench file, or change "
-                f"single values in [set], as \"{key}.NAME\" = \"VALUE\"; a study file has "
+                f'single values in [set], as "{key}.NAME" = "VALUE"; a study file has '
                 f"{', '.join(_KEYS)}"
             )
         if key not in _KEYS:
             raise unknown_of_few("key of a study file", key, _KEYS)
 
 
-def read_bench(
-    content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
-) -> Bench:
+def read_bench(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]) -> Bench:
     """Return the bench that a file names, with the changes of its ``[set]`` and further ones."""
     source = content.get("bench")
     if not isinstance(source, str) or not source.strip():
         said = f"bench = {quoted(source)}" if "bench" in content else "bench is missing"
         raise ParameterError(
-            f"{said}: write bench = \"...\", a bench file (its path starts at this file's folder), "
+            f'{said}: write bench = "...", a bench file (its path starts at this file\'s folder), '
             "or an experiment of 'bywire list'"
         )
     changes = bench_file.flattened(content.get("set", {}))
     there = source if names_experiment(source) else folder / source
     for key, value in changes.items():
         if not isinstance(value, str):
-            raise ParameterError(f"[set] {key} = {quoted(value)}: write the value as a text, "
-                                 "with its unit, as --set takes it")  # fmt: skip
+            raise ParameterError(
+                f"[set] {key} = {quoted(value)}: write the value as a text, "
+                "with its unit, as --set takes it"
+            )
     return bench_file.read(there, {**changes, **overrides})

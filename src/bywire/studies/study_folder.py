@@ -30,9 +30,11 @@ def require_no_file(folder: Path) -> None:
     there = first_there(each / RECORD for each in near)
     is_study = kind_of_file(folder) == STUDY
     advice = (
-        f"did you mean {there.parent}?" if there is not None
-        else f"'bywire study run {folder}' makes one" if is_study
+        f"did you mean {there.parent}?"
+        if there is not None
+        else f"'bywire study run {folder}' makes one"
+        if is_study
         else "name the one that 'bywire study run' has written"
-    )  # fmt: skip
+    )
     kind = "study file" if is_study else "file"
     raise FileError(f"{folder} is a {kind}, and the folder of a study is wanted: {advice}")

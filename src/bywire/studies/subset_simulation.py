@@ -77,9 +77,14 @@ class _Subset:
 
 
 def subset_simulation(
-    margins: Margins, quantities: int, level: int, seed: int, confidence: float,
-    negligible: float = NEVER, report: Callable[[float], None] = lambda estimate: None,
-) -> FailureProbability:  # fmt: skip
+    margins: Margins,
+    quantities: int,
+    level: int,
+    seed: int,
+    confidence: float,
+    negligible: float = NEVER,
+    report: Callable[[float], None] = lambda estimate: None,
+) -> FailureProbability:
     """Return the probability of failure by subset simulation, with OpenTURNS.
 
     Each level ends where a tenth of its cases is: from these, Markov chains (modified Metropolis)
@@ -158,11 +163,13 @@ def _subsets(algorithm: Any) -> tuple[list[_Subset], list[float]]:
     entry, variation, bound = 1.0, 0.0, math.inf
     for k, end in enumerate(ends):
         each = _Subset(
-            entry, variation, bound,
+            entry,
+            variation,
+            bound,
             np.asarray(algorithm.getOutputSample(k))[:, 0],
             np.asarray(algorithm.getInputSample(k)),
             float(algorithm.getGammaPerStep()[k]),
-        )  # fmt: skip
+        )
         made.append(each)
         (entry, variation), bound = each.beyond(end), end
     return made, ends
@@ -172,9 +179,7 @@ def _found(
     trail: Trail, state: State, subsets: list[_Subset], ends: list[float], confidence: float
 ) -> FailureProbability:
     below = partial(_below, subsets, confidence)
-    levels = tuple(
-        Level(end, each.beyond(end)[0]) for each, end in zip(subsets, ends, strict=True)
-    )
+    levels = tuple(Level(end, each.beyond(end)[0]) for each, end in zip(subsets, ends, strict=True))
     estimate = below(0.0)
     if state != "done":  # failure lies within the last level: no more probable than its end
         high = below(ends[-1]).high if ends else 1.0
@@ -185,12 +190,17 @@ def _found(
     if state == "done":
         failing = subsets[-1].scores[subsets[-1].margins <= 0.0]
     return FailureProbability(
-        state, estimate, below, levels, trail.runs,
+        state,
+        estimate,
+        below,
+        levels,
+        trail.runs,
         _span(subsets, ends[-1]) if subsets else None,
-        place=nearest[0] if nearest else None, scores=nearest[1] if nearest else None,
+        place=nearest[0] if nearest else None,
+        scores=nearest[1] if nearest else None,
         center=failing.mean(axis=0) if failing is not None and len(failing) else None,
         failing=failing,
-    )  # fmt: skip
+    )
 
 
 def _below(subsets: list[_Subset], confidence: float, margin: float) -> Interval:

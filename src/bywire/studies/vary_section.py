@@ -96,9 +96,12 @@ def read_varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
         law = read_distribution(name, entry, leaf, nominal)
         for each in filter(values.get, together):
             require_following(
-                f"[vary] {name}.together {each}", law, varied_leaf(bench, each), leaf.unit,
+                f"[vary] {name}.together {each}",
+                law,
+                varied_leaf(bench, each),
+                leaf.unit,
                 values[each] / nominal,
-            )  # fmt: skip
+            )
         yield Varied(name, leaf.unit.symbol, nominal, law, together)
 
 
@@ -152,7 +155,7 @@ def entries_of(section: Mapping[str, Any], known: Collection[str]) -> dict[str, 
     for name, entry in _spread(section, known):
         if name in entries:
             raise ParameterError(
-                f"[vary] {name} varies twice, by {name} and by \"{name}\" in quotation marks: "
+                f'[vary] {name} varies twice, by {name} and by "{name}" in quotation marks: '
                 "leave one of both out"
             )
         entries[name] = entry
@@ -177,9 +180,7 @@ def _is_entry(name: str, value: Mapping[str, Any], known: Collection[str]) -> bo
     return "kind" in value or value.keys() <= ENTRY_KEYS  # of a name that nothing answers to
 
 
-def _together(
-    name: str, entry: Any, bench: Bench, values: Mapping[str, Any]
-) -> tuple[str, ...]:
+def _together(name: str, entry: Any, bench: Bench, values: Mapping[str, Any]) -> tuple[str, ...]:
     given = entry.get("together", []) if isinstance(entry, Mapping) else []
     if not isinstance(given, Sequence) or isinstance(given, str):
         raise ParameterError(f"[vary] {name}.together = {quoted(given)}: a list of names is wanted")

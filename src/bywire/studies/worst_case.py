@@ -81,10 +81,18 @@ def worst_case(margins: Margins, quantities: int, seed: int) -> WorstCase:
         # Its own rule ends where margins differ little beside their mean: far from any limit.
         search: Any = optimize.differential_evolution
         search(
-            batch, [(low, high)] * quantities, init=low + (high - low) * first, rng=rng, tol=0.0,
-            maxiter=_GENERATIONS, polish=False, updating="deferred", vectorized=True,
-            strategy="rand1bin", callback=is_over,  # the best of all would draw them to one end
-        )  # fmt: skip
+            batch,
+            [(low, high)] * quantities,
+            init=low + (high - low) * first,
+            rng=rng,
+            tol=0.0,
+            maxiter=_GENERATIONS,
+            polish=False,
+            updating="deferred",
+            vectorized=True,
+            strategy="rand1bin",
+            callback=is_over,  # the best of all would draw them to one end
+        )
     except BudgetSpentError:
         state = "budget spent"
     except UnfinishedError:

@@ -16,9 +16,11 @@ if TYPE_CHECKING:
 
 
 def worst_cases(
-    plan: StudyPlan, store: StudyStore, executor: Executor | None = None,
+    plan: StudyPlan,
+    store: StudyStore,
+    executor: Executor | None = None,
     progress: Progress = silent,
-) -> tuple[tuple[WorstCase, ...], pd.DataFrame]:  # fmt: skip
+) -> tuple[tuple[WorstCase, ...], pd.DataFrame]:
     """Return how the search for the worst case of each requirement ended, and all cases.
 
     Parameters

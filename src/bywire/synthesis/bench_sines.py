@@ -111,11 +111,17 @@ class Sines:
             return
         chosen = {name: [float(values[k]) for k in sets] for name, values in self._gains.items()}
         sweep = Sweep(
-            self._loop.inputs, self._loop.output, self._f[list(which)].tolist(), self._amplitudes,
-            chosen, flags=(), whole=self._whole, least=_LEAST,
+            self._loop.inputs,
+            self._loop.output,
+            self._f[list(which)].tolist(),
+            self._amplitudes,
+            chosen,
+            flags=(),
+            whole=self._whole,
+            least=_LEAST,
             tolerance=_ROUGH if self._rough else 1e-3,
             most=_ROUGH_WINDOWS if self._rough else _WINDOWS,
-        )  # fmt: skip
+        )
         responses = frequency_response(self._run, sweep)
         at = np.ix_(sets, range(len(self._amplitudes)), which)
         self._f[list(which)] = responses["frequency"].values
@@ -128,14 +134,19 @@ class Sines:
         f, unknown = self._f[self.near], (math.nan,) * 3
         return tuple(
             Small(
-                size, math.nan, float(np.interp(self._target, f, gain)), *unknown,
+                size,
+                math.nan,
+                float(np.interp(self._target, f, gain)),
+                *unknown,
                 bool(settled.all()),
             )
             for size, gain, settled in zip(
-                self._amplitudes, self._size[k][:, self.near], self._settled[k][:, self.near],
+                self._amplitudes,
+                self._size[k][:, self.near],
+                self._settled[k][:, self.near],
                 strict=True,
             )
-        )  # fmt: skip
+        )
 
     def figures(self, k: int) -> tuple[Small, ...]:
         """Return the figures of a set by amplitude, measured at all frequencies."""

@@ -82,10 +82,13 @@ class Tuning:
             Pairs of distances from the limits, none better in both than another, by the first.
         """
         pairs = sorted(
-            ((c.room(first), c.room(second)) for c in self.tried
-             if all(s >= 0.0 for text, s in c.slacks.items() if text not in (first, second))),
+            (
+                (c.room(first), c.room(second))
+                for c in self.tried
+                if all(s >= 0.0 for text, s in c.slacks.items() if text not in (first, second))
+            ),
             reverse=True,
-        )  # fmt: skip
+        )
         edge: list[tuple[float, float]] = []
         for room_1, room_2 in pairs:
             if not edge or room_2 > edge[-1][1]:
@@ -148,10 +151,17 @@ def tune(
     try:
         evolution: Any = differential_evolution  # its stubs know no cost of many points at once
         evolution(
-            cost, list(zip(low, high, strict=True)), init=first, maxiter=generations,
-            vectorized=True, updating="deferred", polish=False, tol=1e-6,
-            rng=np.random.default_rng(seed), callback=passed,
-        )  # fmt: skip
+            cost,
+            list(zip(low, high, strict=True)),
+            init=first,
+            maxiter=generations,
+            vectorized=True,
+            updating="deferred",
+            polish=False,
+            tol=1e-6,
+            rng=np.random.default_rng(seed),
+            callback=passed,
+        )
     except KeyboardInterrupt:
         interrupt_heard()
         interrupted = True

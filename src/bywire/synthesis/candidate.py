@@ -138,8 +138,11 @@ def judged(
     rows = [bench_slacks(requirements, figures, linear) for figures in each]
     slacks = {wanted.text: min(row[wanted.text] for row in rows) for wanted in requirements}
     corners = {label: figures for label, figures in trials.items() if label != NOMINAL}
-    rooms = {wanted.text: _room(wanted, each, slacks[wanted.text]) for wanted in requirements
-             if wanted.figure == "bandwidth" and wanted.sense > 0}  # fmt: skip
+    rooms = {
+        wanted.text: _room(wanted, each, slacks[wanted.text])
+        for wanted in requirements
+        if wanted.figure == "bandwidth" and wanted.sense > 0
+    }
     shown = {wanted.text: shown_on_bench(wanted, each) for wanted in requirements}
     return Candidate(dict(gains), nominal, slacks, corners, rooms, shown)
 

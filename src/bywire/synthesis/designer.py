@@ -88,8 +88,10 @@ def design(
 def largest_error(cases: Sequence[LinearCase], gains: Mapping[str, float]) -> float:
     """Return the largest steady-state error over some models [%]; NaN where one is unstable."""
     every = [case.figures(gains) for case in cases]
-    return max((figures.steady_state_error if figures.is_stable else np.nan for figures in every),
-               key=lambda error: np.inf if np.isnan(error) else error)  # fmt: skip
+    return max(
+        (figures.steady_state_error if figures.is_stable else np.nan for figures in every),
+        key=lambda error: np.inf if np.isnan(error) else error,
+    )
 
 
 def _require_sampled(problem: Problem, start: Mapping[str, float]) -> None:
@@ -143,17 +145,16 @@ def _confirmed(search: Search) -> Array:
         every = [case.figures(problem.gains(z), _FINE) for case in problem.cases]
         return min(
             min(slack(figures, wanted) for wanted in problem.requirements)
-            if figures.is_stable else UNSTABLE
+            if figures.is_stable
+            else UNSTABLE
             for figures in every
-        )  # fmt: skip
+        )
 
     best = _looked_anew(search, fine_slack, -np.inf, 1e-4, (_CONFIRMED, _ALIKE))
     return np.asarray(search.best if best is None else best)
 
 
-def _confirmed_by_figures(
-    search: Search, wanted: Requirement, kept: Requirement
-) -> Array | None:
+def _confirmed_by_figures(search: Search, wanted: Requirement, kept: Requirement) -> Array | None:
     """Return the point whose figure is best on a finer grid while another requirement holds.
 
     None where no point seen holds it.
@@ -240,8 +241,9 @@ def _judged(
     states = {label: state_of(figures) for label, figures in every.items()}
     bindings = [
         Binding(wanted, label, rows[label][wanted.figure], room(every[label], wanted))
-        for label in rows for wanted in problem.requirements
-    ]  # fmt: skip
+        for label in rows
+        for wanted in problem.requirements
+    ]
     bindings.sort(key=lambda binding: binding.slack)
     is_sound = set(states.values()) == {""}
     slack = bindings[0].slack if is_sound else -np.inf

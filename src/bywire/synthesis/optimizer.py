@@ -93,8 +93,10 @@ class Problem:
         if key not in self._known:
             figures = self.cases[k].figures(self.gains(z))
             if figures.is_stable:
-                both = [[slack(figures, wanted) for wanted in self.requirements],
-                        [room(figures, wanted) for wanted in self.requirements]]  # fmt: skip
+                both = [
+                    [slack(figures, wanted) for wanted in self.requirements],
+                    [room(figures, wanted) for wanted in self.requirements],
+                ]
                 slacks, rooms = np.clip(both, _LEAST, _LARGEST)
             else:
                 worse = UNSTABLE - 10.0 * (figures.growth - 1.0)
@@ -159,16 +161,20 @@ class Search:
             return
         # A figure such as an overshoot has kinks of its own: SQP stops there, a simplex goes on.
         n = self.best.size
-        corners = np.vstack([self.best, self.best + 0.04 * np.where(self.best < 0.5, 1, -1)
-                             * np.eye(n)])  # fmt: skip
+        corners = np.vstack(
+            [self.best, self.best + 0.04 * np.where(self.best < 0.5, 1, -1) * np.eye(n)]
+        )
         options: Any = {"maxfev": _SIMPLEX * n, "initial_simplex": corners, "fatol": 1e-5}
         climb: Any = minimize  # its stubs tell the methods' starting points apart
         known, simplex = len(self.seen), piece(report, len(starts), parts)
         climb(
-            lambda z: -self._judged(z), self.best, method="Nelder-Mead", bounds=[(0.0, 1.0)] * n,
+            lambda z: -self._judged(z),
+            self.best,
+            method="Nelder-Mead",
+            bounds=[(0.0, 1.0)] * n,
             options=options,
             callback=lambda z: simplex((len(self.seen) - known) / (_SIMPLEX * n)),
-        )  # fmt: skip
+        )
         self._climb(self.best, piece(report, len(starts) + 1, parts))
         report(1.0)
 
@@ -223,11 +229,15 @@ class Search:
         options: Any = {"maxiter": _ITERATIONS, "ftol": 1e-5}
         climb: Any = minimize
         climb(
-            lambda v: -float(v[n]), np.append(start, max(first, UNSTABLE)), method="SLSQP",
+            lambda v: -float(v[n]),
+            np.append(start, max(first, UNSTABLE)),
+            method="SLSQP",
             jac=lambda v: np.append(np.zeros(n), -1.0),
             bounds=[*[(0.0, 1.0)] * n, (None, None)],
-            constraints=constraints, options=options, callback=passed,
-        )  # fmt: skip
+            constraints=constraints,
+            options=options,
+            callback=passed,
+        )
         report(1.0)
 
 

@@ -70,6 +70,9 @@ def judged_over(
     lowest = np.where(np.isneginf(rooms), np.inf, rooms).argmin(axis=0)
     worst = tuple(float(values[row, r]) for r, row in enumerate(lowest))
     return Judged(
-        len(cases), int(np.isneginf(rooms).all(axis=1).sum()),
-        tuple(met.sum(axis=0).tolist()), int(met.all(axis=1).sum()), worst,
-    )  # fmt: skip
+        len(cases),
+        int(np.isneginf(rooms).all(axis=1).sum()),
+        tuple(met.sum(axis=0).tolist()),
+        int(met.all(axis=1).sum()),
+        worst,
+    )

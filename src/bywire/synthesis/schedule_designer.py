@@ -25,6 +25,7 @@ _FINE = 4000  # points of the grid for what is reported
 _ACROSS = 15
 """operating points of the scheduled loop that are looked at between the designed ones"""
 
+
 def scheduled(loop: Loop) -> LoopSchedule:
     """Return the schedule of a loop.
 
@@ -121,14 +122,21 @@ def design_schedule(
         cases = cases_of(loop, tuned, points[region][0], _ranges(loop, points[region], over or {}))
         start = _start(tuned, schedule, region, tunables[region])
         designs[region] = design(
-            tunables[region], requirements, cases, start, seed=seed,
+            tunables[region],
+            requirements,
+            cases,
+            start,
+            seed=seed,
             progress=suffixed(progress, region),
-        )  # fmt: skip
+        )
         gains |= designs[region].gains
         if designs[region].status == "interrupted":
             rest = [name for name in order if name not in designs]
-            gains |= {k: v for r in rest for k, v in _start(par.replace(gains), schedule, r,
-                                                            tunables[r]).items()}  # fmt: skip
+            gains |= {
+                k: v
+                for r in rest
+                for k, v in _start(par.replace(gains), schedule, r, tunables[r]).items()
+            }
             break
     return _seen_whole(loop, par, requirements, (points, designs, gains), over or {})
 

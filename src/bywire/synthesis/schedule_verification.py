@@ -53,9 +53,16 @@ def verify_schedule(
         gains: Mapping[str, float], kept: Sequence[Requirement] | None = None
     ) -> Verification:
         return verify(
-            gains, requirements, spans, design.cases, trial, corners=corners, kept=kept,
-            generations=0, progress=progress,
-        )  # fmt: skip
+            gains,
+            requirements,
+            spans,
+            design.cases,
+            trial,
+            corners=corners,
+            kept=kept,
+            generations=0,
+            progress=progress,
+        )
 
     first = whole(design.gains)
     if first.met or generations == 0:
@@ -68,10 +75,17 @@ def verify_schedule(
         regional, models = _in_region(design, region, gains, trial)
         start = {name: gains[name] for name in tunables[region]}
         retuned = verify(
-            start, requirements, tunables[region], models, regional,
-            corners=[c for c in models[1:] if c.at != regional.value or c.changes], kept=first.kept,
-            seed=seed, generations=generations, progress=suffixed(progress, region),
-        )  # fmt: skip
+            start,
+            requirements,
+            tunables[region],
+            models,
+            regional,
+            corners=[c for c in models[1:] if c.at != regional.value or c.changes],
+            kept=first.kept,
+            seed=seed,
+            generations=generations,
+            progress=suffixed(progress, region),
+        )
         gains |= retuned.final.gains
         if retuned.tuning is not None:
             count, stopped = count + retuned.tuning.count, retuned.tuning.interrupted

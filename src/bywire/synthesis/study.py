@@ -154,9 +154,7 @@ class Study:
         for name in names:
             for ruled, instead in self.ruled.items():
                 if name == ruled or name.startswith(f"{ruled}."):
-                    raise ParameterError(
-                        f"{name} has no effect on study {self.name!r}: {instead}"
-                    )
+                    raise ParameterError(f"{name} has no effect on study {self.name!r}: {instead}")
 
 
 @checked
@@ -209,8 +207,9 @@ def edge_warnings(
     """
     return tuple(
         f"the optimum lies at the edge of the designs, {name} = {shown(end, unit)}: widen the range"
-        for end in ends if math.isclose(value, end, rel_tol=within)
-    )  # fmt: skip
+        for end in ends
+        if math.isclose(value, end, rel_tol=within)
+    )
 
 
 STUDIES = Kind("study", ("studies",), instances(Study), declared="a Study")

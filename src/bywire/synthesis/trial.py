@@ -64,9 +64,16 @@ class Trial:
         """Return the figures of the sets of gains that are worth it, see `wanted_figures`."""
         bench = self.bench if self.bench is not None and has_step(self.bench) else None
         return wanted_figures(
-            self.loop, self.par, self.value, self.amplitudes, gains, bench, target, worth,
+            self.loop,
+            self.par,
+            self.value,
+            self.amplitudes,
+            gains,
+            bench,
+            target,
+            worth,
             rough=rough,
-        )  # fmt: skip
+        )
 
 
 def measured(
@@ -146,12 +153,15 @@ def corners_of(problem: Problem, gains: Mapping[str, float]) -> list[LinearCase]
     slacks = problem.slacks(problem.point(gains), range(1, len(problem.cases))).min(axis=1)
     order = [others[k] for k in slacks.argsort(kind="stable")]
     values = [_coordinates(case) for case in others]
-    ends = {name: (min(row[name] for row in values), max(row[name] for row in values))
-            for name in values[0]}  # fmt: skip
+    ends = {
+        name: (min(row[name] for row in values), max(row[name] for row in values))
+        for name in values[0]
+    }
     corners = [
-        case for case in order
+        case
+        for case in order
         if case is order[0] or all(v in ends[name] for name, v in _coordinates(case).items())
-    ]  # fmt: skip
+    ]
     return corners[:MOST]
 
 

@@ -130,9 +130,11 @@ def verify(
         )
         trials.extend(corner for corner in worst if corner.label not in known)
         (row,) = measured(
-            trials, {name: [value] for name, value in chosen.items()}, target,
+            trials,
+            {name: [value] for name, value in chosen.items()},
+            target,
             report=lambda part: report(share + (1.0 - share) * part),
-        )  # fmt: skip
+        )
         return row
 
     figures = on_bench(gains, "trial on the bench")
@@ -144,14 +146,20 @@ def verify(
     tuning = None
     if first.slack < 0.0 and generations > 0:
         tuning = tune(
-            problem, gains, lambda sets, worth: wanted(trials, sets, target, worth, rough=True),
-            seed=seed, generations=generations, progress=progress,
-        )  # fmt: skip
+            problem,
+            gains,
+            lambda sets, worth: wanted(trials, sets, target, worth, rough=True),
+            seed=seed,
+            generations=generations,
+            progress=progress,
+        )
         best = tuning.best.gains
         again = judged(
-            problem.requirements, best, on_bench(best, "the retuned gains on the bench"),
+            problem.requirements,
+            best,
+            on_bench(best, "the retuned gains on the bench"),
             linear_slacks(problem, best),
-        )  # fmt: skip
+        )
         tuning = replace(tuning, best=max(first, again, key=standing))
     final = gains if tuning is None else tuning.best.gains
     kpis: tuple[Kpi, ...] = ()

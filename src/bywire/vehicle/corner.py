@@ -57,9 +57,7 @@ class Corner(Assembly[ParT, MemoryT]):
     slip = Shown("1", "braking slip", 0.1)
     sliding = Shown("1", "tyre slides")
     a = Shown("m/s**2", "deceleration", 10.0)
-    E_body = Shown(
-        "J", "energy of the body", role=Role("sink", "body", book=BOOK, returns="any")
-    )
+    E_body = Shown("J", "energy of the body", role=Role("sink", "body", book=BOOK, returns="any"))
 
     def wheel(self, w: Self) -> WheelSpeed:
         """Return how fast the wheel turns."""
@@ -74,9 +72,7 @@ class Corner(Assembly[ParT, MemoryT]):
         seen = tyre.Contact(w.corner.xe.v, omega.xe * par.r, *ground)
         limits = tyre.limits(seen, par.tyre)
         w.N_x = corner_body.load(slope.cosine, par.body)
-        w.tyre.u = tyre.Input(
-            w.corner.x.v, omega.x * par.r, w.N_x, *ground, limits.mu, limits.u
-        )
+        w.tyre.u = tyre.Input(w.corner.x.v, omega.x * par.r, w.N_x, *ground, limits.mu, limits.u)
         w.F_x = tyre.output(w.tyre.x, w.tyre.u, par.tyre).F
         w.corner.u = corner_body.Input(w.F_x, slope.sine)
         return par.r * w.F_x

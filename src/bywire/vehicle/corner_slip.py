@@ -111,9 +111,16 @@ def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
         m = m._replace(slip_integral=state.integral)
     else:
         view = abs_rules.Input(
-            m.v_hat, m.a_hat, m.tread_hat, before.tread_hat, m.slip_hat,
-            par.slip.J_hat / (par.slip.r_hat * k), p_most, p_before, before.M_left / k,
-        )  # fmt: skip
+            m.v_hat,
+            m.a_hat,
+            m.tread_hat,
+            before.tread_hat,
+            m.slip_hat,
+            par.slip.J_hat / (par.slip.r_hat * k),
+            p_most,
+            p_before,
+            before.M_left / k,
+        )
         rules = abs_rules.State(*(getattr(m, f"{name}_x") for name in abs_rules.State._fields))
         rules, out = abs_rules.output(rules, view, par.T_s, par.rules)  # type: ignore[assignment]
         m = m._replace(**{f"{name}_x": value for name, value in rules._asdict().items()})
@@ -130,9 +137,11 @@ def _measured(r: Readings, m: Any, par: Parameters) -> Any:
     """Return the memory with speeds, slip and deceleration as the ECU sees them."""
     T = par.T_s
     wheel = wheel_speed.output(
-        wheel_speed.State(m.edge, m.age, m.omega_hat), wheel_speed.Input(r.angle, r.age), T,
+        wheel_speed.State(m.edge, m.age, m.omega_hat),
+        wheel_speed.Input(r.angle, r.age),
+        T,
         par.wheel_speed,
-    )  # fmt: skip
+    )
     shown = (m.v_last - r.v) / T - r.weight
     v, tread = r.v, r.v_wheel
     if par.sees == "estimated":

@@ -72,9 +72,7 @@ class HotBrakes(TwoWheeler[ParT, MemoryT]):
         each = [disc_heat.stored(heat.x, heat.par) for heat, _ in every]
         return {
             **super().record(w),
-            "E_friction": sum(
-                (taken for heat, taken in every if heat.par.law != "off"), start=0.0
-            ),
+            "E_friction": sum((taken for heat, taken in every if heat.par.law != "off"), start=0.0),
             "E_discs": each[0].discs + each[1].discs,
             "E_pads": each[0].pads + each[1].pads,
             "E_fluid": each[0].fluid + each[1].fluid,

@@ -43,9 +43,10 @@ class HotCorner(Corner[ParT, MemoryT]):
     E_pads = Shown("J", "heat in the pads", role=_sink("pads"))
     E_fluid = Shown("J", "heat in the caliper", role=_sink("caliper"))
     E_brake = Shown(
-        "J", "energy that the brake takes from the wheel",
+        "J",
+        "energy that the brake takes from the wheel",
         role=Role("sink", "brake", book=BOOK, returns="any"),
-    )  # fmt: skip
+    )
 
     def braked(self, w: Self) -> float:
         """Return what the brake has taken from the wheel [J]."""

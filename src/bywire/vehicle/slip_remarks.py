@@ -13,9 +13,13 @@ FAR = 2.0
 
 
 def far_from_peak(
-    place: Array, acts: Array, slip_set: float, parameter: str, curve: adhesion.Parameters,
+    place: Array,
+    acts: Array,
+    slip_set: float,
+    parameter: str,
+    curve: adhesion.Parameters,
     ways: road.Parameters,
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     """Return on which surfaces slip control holds far less slip than they hold most at.
 
     Parameters

@@ -20,10 +20,15 @@ from bywire.vehicle.surfaces import surface_name
 SCALE = 100.0
 """units of a drawing in a meter"""
 TINTS = {
-    "dry-asphalt": style.GRAY, "wet-asphalt": style.BLUE, "dry-concrete": style.YELLOW,
-    "dry-cobble": style.ORANGE, "wet-cobble": style.GREEN, "snow": style.SKY, "ice": style.PURPLE,
+    "dry-asphalt": style.GRAY,
+    "wet-asphalt": style.BLUE,
+    "dry-concrete": style.YELLOW,
+    "dry-cobble": style.ORANGE,
+    "wet-cobble": style.GREEN,
+    "snow": style.SKY,
+    "ice": style.PURPLE,
     "own": style.PALE,
-}  # fmt: skip
+}
 """color of each surface"""
 _WIDTH, _HEIGHT, _CONTACT = 720.0, 300.0, (500.0, 225.0)
 _LOADED = 1.0  # N: a wheel off the ground leaves no mark
@@ -100,12 +105,16 @@ def stop_scene(
         moves[f"force-{k}"] = Move(stretch=over_frames(run, wheel.force, frames) / weight)
         moves[f"marks-{k}"] = moves["road"]
     return Scene(
-        frames, _WIDTH, _HEIGHT, _drawing(run, ways, wheels, body, place), moves,
+        frames,
+        _WIDTH,
+        _HEIGHT,
+        _drawing(run, ways, wheels, body, place),
+        moves,
         tuple(
             Dial(label, unit, factor * over_frames(run, name, frames), full, color)
             for name, label, unit, factor, full, color in dials
         ),
-    )  # fmt: skip
+    )
 
 
 def _drawing(

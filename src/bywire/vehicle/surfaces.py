@@ -6,9 +6,7 @@ from bywire.plant import adhesion, road
 from bywire.plant.road import SURFACES, SurfaceName
 
 
-def laid(
-    prefix: str, first: SurfaceName, further: SurfaceName | None = None
-) -> dict[str, float]:
+def laid(prefix: str, first: SurfaceName, further: SurfaceName | None = None) -> dict[str, float]:
     """Return the parameters of the road below a prefix, of some surface and of a further one.
 
     The further one is the first, unless given; own ones stay as they are.

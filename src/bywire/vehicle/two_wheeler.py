@@ -50,9 +50,13 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
 
     body = Part(two_wheeler_body, par="vehicle.body", outside=True, loss="E_drag")
     ground = Part(
-        ground_support, par="vehicle.ground", outside=True, output=("support",),
-        work="W_ground", loss="E_ground",
-    )  # fmt: skip
+        ground_support,
+        par="vehicle.ground",
+        outside=True,
+        output=("support",),
+        work="W_ground",
+        loss="E_ground",
+    )
     front = Part(road_wheel, par="vehicle.front_wheel", outside=True, suffix="_f")
     rear = Part(road_wheel, par="vehicle.rear_wheel", outside=True, suffix="_r")
     front_tyre = Part(tyre, par="vehicle.front_tyre", suffix="_f")

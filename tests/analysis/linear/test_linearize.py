@@ -66,9 +66,14 @@ def test_sliding_friction_has_the_slope_of_the_stribeck_curve() -> None:
     omega, seal = 0.3, par.seal
     state = state_at(P, par)._replace(omega=omega)
     model = linearize(
-        MotorcycleBrake(), par, state, memory_at(P, par),
-        inputs=("i_source",), outputs=("p_mc",), friction="sliding",
-    )  # fmt: skip
+        MotorcycleBrake(),
+        par,
+        state,
+        memory_at(P, par),
+        inputs=("i_source",),
+        outputs=("p_mc",),
+        friction="sliding",
+    )
     free = linearize(
         MotorcycleBrake(), par, state, memory_at(P, par), inputs=("i_source",), outputs=("p_mc",)
     )
@@ -85,9 +90,13 @@ def test_linear_step_approaches_the_nonlinear_one_as_the_step_shrinks(name: str)
     shares = []
     for height in (1.0, 0.1, 0.01):
         case = case_from_rest(
-            "step", par, "current-source", P,
-            lambda t, h=height: {"i_set": hold + h * (t >= -1e-9)}, 1.0,
-        )  # fmt: skip
+            "step",
+            par,
+            "current-source",
+            P,
+            lambda t, h=height: {"i_set": hold + h * (t >= -1e-9)},
+            1.0,
+        )
         run = simulate(as_run(case, 20e-6), signals=("p_mc",))
         linear = theoretical(par, P, x)
         error = run["p_mc"] - P - height * linear.step(run.time)
@@ -136,9 +145,14 @@ def test_closed_contact_acts_with_its_stiffness_and_damping() -> None:
 def test_stuck_velocity_stays_zero() -> None:
     par = brake("dardanelli2010", **{"seal.T_pr": 2e-3})
     model = linearize(
-        MotorcycleBrake(), par, state_at(P, par), memory_at(P, par),
-        inputs=("i_source",), outputs=("p_mc",), friction="stuck",
-    )  # fmt: skip
+        MotorcycleBrake(),
+        par,
+        state_at(P, par),
+        memory_at(P, par),
+        inputs=("i_source",),
+        outputs=("p_mc",),
+        friction="stuck",
+    )
     row = model.states.index("omega")
     assert not model.A[row].any()
     assert not model.B[row].any()

@@ -23,11 +23,19 @@ from bywire.core.model import Task
 from systems.sampled_lag import LAG, Memory, SampledLag, State
 
 FRICTIONLESS = {
-    "bearing.C_0": 0.0, "bearing.C_2": 0.0, "bearing.T_nu": 0.0, "screw.eta_f": 1.0,
-    "screw.eta_b": 1.0, "wedge_friction.mu_int": 0.0, "wedge_friction.mu_R": 0.0,
-    "flywheel.runout": 0.0, "flywheel.law": "driven", "encoder.law": "ideal",
-    "motor_1.T_cog": 0.0, "motor_2.T_cog": 0.0,
-}  # fmt: skip
+    "bearing.C_0": 0.0,
+    "bearing.C_2": 0.0,
+    "bearing.T_nu": 0.0,
+    "screw.eta_f": 1.0,
+    "screw.eta_b": 1.0,
+    "wedge_friction.mu_int": 0.0,
+    "wedge_friction.mu_R": 0.0,
+    "flywheel.runout": 0.0,
+    "flywheel.law": "driven",
+    "encoder.law": "ideal",
+    "motor_1.T_cog": 0.0,
+    "motor_2.T_cog": 0.0,
+}
 MOMENT = 200.0
 
 
@@ -90,9 +98,14 @@ def test_pressure_loop_agrees_with_its_chain() -> None:
     from bywire.brakes.motorcycle.model import MotorcycleBrake
 
     smooth = {
-        "seal.T_pr": 0.0, "seal.f_cfr_p": 0.0, "seal.f_cfr_n": 0.0, "seal.mu_T": 0.0,
-        "ecu.dither.waveform": "off", "adc.law": "ideal", "drive.mode": "pressure",
-    }  # fmt: skip
+        "seal.T_pr": 0.0,
+        "seal.f_cfr_p": 0.0,
+        "seal.f_cfr_n": 0.0,
+        "seal.mu_T": 0.0,
+        "ecu.dither.waveform": "off",
+        "adc.law": "ideal",
+        "drive.mode": "pressure",
+    }
     par: Any = parameters("dardanelli2010").replace(smooth)
     p = 20e5
     gain = open_loop(

@@ -139,15 +139,19 @@ def test_friction_of_plants() -> None:
 
 def test_a_small_step_of_one_current_moves_the_nonlinear_wedge_as_the_linear_one() -> None:
     frictionless = {
-        "bearing.C_0": 0.0, "bearing.C_2": 0.0, "bearing.T_nu": 0.0, "screw.eta_f": 1.0,
-        "screw.eta_b": 1.0, "wedge_friction.mu_int": 0.0, "wedge_friction.mu_R": 0.0,
-        "encoder.law": "ideal", "wedge.mu_B": 0.2,
-    }  # fmt: skip
+        "bearing.C_0": 0.0,
+        "bearing.C_2": 0.0,
+        "bearing.T_nu": 0.0,
+        "screw.eta_f": 1.0,
+        "screw.eta_b": 1.0,
+        "wedge_friction.mu_int": 0.0,
+        "wedge_friction.mu_R": 0.0,
+        "encoder.law": "ideal",
+        "wedge.mu_B": 0.2,
+    }
     par = parameters("roberts2003").replace(frictionless)
     at, height = point(par, 3e3), 0.05
-    stimulus = at.stimulus._replace(
-        i_1_set=at.memory.i_1_ref, i_2_set=at.memory.i_2_ref + height
-    )  # fmt: skip
+    stimulus = at.stimulus._replace(i_1_set=at.memory.i_1_ref, i_2_set=at.memory.i_2_ref + height)
     run = simulate(replace(replace(at, stimulus=stimulus).run(), duration=0.3), signals=("F_N",))
     linear = full(par, 3e3).channels(inputs=("i_2_ref",), outputs=("F_N",))
     step, x, expected = linear.sampled(1e-3), np.zeros(len(linear.states)), []

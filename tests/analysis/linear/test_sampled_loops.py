@@ -28,9 +28,13 @@ from bywire.simulation.run import simulate
 
 MEDIUM = first_orders("medium", 10.2e5, (0.096,), (1.25, 7.15, 0.104))
 FRICTIONLESS = {
-    "seal.T_pr": 0.0, "seal.f_cfr_p": 0.0, "seal.f_cfr_n": 0.0, "seal.mu_T": 0.0,
-    "ecu.dither.waveform": "off", "adc.law": "ideal",
-}  # fmt: skip
+    "seal.T_pr": 0.0,
+    "seal.f_cfr_p": 0.0,
+    "seal.f_cfr_n": 0.0,
+    "seal.mu_T": 0.0,
+    "ecu.dither.waveform": "off",
+    "adc.law": "ideal",
+}
 
 
 def brake(**changes: Any) -> MotorcycleParameters:
@@ -64,9 +68,13 @@ def test_closed_pressure_loop_is_that_of_sine_tests() -> None:
     own = brake(**FRICTIONLESS, **{"drive.mode": "pressure"})
     p = 20e5
     linear = closed_loop(
-        MotorcycleBrake(), own, state_at(p, own), memory_at(p, own),
-        inputs=("p_set",), outputs=("p_mc",),
-    )  # fmt: skip
+        MotorcycleBrake(),
+        own,
+        state_at(p, own),
+        memory_at(p, own),
+        inputs=("p_set",),
+        outputs=("p_mc",),
+    )
     sweep = Sweep(("p_set",), "p_mc", (0.5, 2.0, 10.0), (1e4,), flags=())
     found = frequency_response(LOOPS.find("pressure").point(own, p).run(), sweep)
     expected = linear.response(found["frequency"].values)[:, 0, 0]
@@ -138,6 +146,10 @@ def test_refusals() -> None:
     par = brake(**{"drive.mode": "pressure"})
     with pytest.raises(UnknownNameError, match="p_sett"):
         closed_loop(
-            MotorcycleBrake(), par, state_at(20e5, par), memory_at(20e5, par),
-            inputs=("p_sett",), outputs=("p_mc",),
-        )  # fmt: skip
+            MotorcycleBrake(),
+            par,
+            state_at(20e5, par),
+            memory_at(20e5, par),
+            inputs=("p_sett",),
+            outputs=("p_mc",),
+        )

@@ -25,13 +25,19 @@ def test_a_smooth_loop_answers_as_to_sines(kind, name) -> None:
     run = loop.point(par, loop.at.default).run()
     low, high = max(loop.band[0], 4.0), loop.band[1]
     sweep = Sweep(
-        loop.inputs, loop.output, tuple(np.geomspace(low, high, 6)), loop.amplitudes[:1], flags=(),
+        loop.inputs,
+        loop.output,
+        tuple(np.geomspace(low, high, 6)),
+        loop.amplitudes[:1],
+        flags=(),
         tolerance=1e-5,
-    )  # fmt: skip
+    )
     found = broadband_response(run, sweep, Broadband(kind, realizations=2))
     assert found["settled"].values.all()
-    same = {"frequencies": tuple(found["frequency"].values),
-            "shortest": found.attrs["window"] * (1.0 - 1e-9)}  # fmt: skip
+    same = {
+        "frequencies": tuple(found["frequency"].values),
+        "shortest": found.attrs["window"] * (1.0 - 1e-9),
+    }
     again = frequency_response(run, replace(sweep, **same))
     np.testing.assert_allclose(again["frequency"], found["frequency"], rtol=1e-12)
     gain = 20.0 * np.log10(found["gain"] / again["gain"])

@@ -84,9 +84,9 @@ def test_what_never_repeats_comes_with_its_scatter() -> None:
     length = round(max(2.0, math.ceil(0.05 * f))) / f
     t = np.arange(0.0, length - 1e-9, par.T_s)
     wave = np.exp(-2j * math.pi * f * t)
-    seen = np.array([
-        2j * np.mean(swinging(t + n * length, 1.0, par, f) * wave) for n in range(3, 11)
-    ])  # fmt: skip
+    seen = np.array(
+        [2j * np.mean(swinging(t + n * length, 1.0, par, f) * wave) for n in range(3, 11)]
+    )
     assert found["settled"] == 0
     assert found["windows"] == 11
     assert found["gain"].item() == pytest.approx(abs(seen.mean()), rel=1e-3)

@@ -22,10 +22,17 @@ from bywire.simulation.run import Run
 Array = NDArray[np.float64]
 
 FRICTIONLESS = {
-    "bearing.C_0": 0.0, "bearing.C_2": 0.0, "bearing.T_nu": 0.0, "screw.eta_f": 1.0,
-    "screw.eta_b": 1.0, "wedge_friction.mu_int": 0.0, "wedge_friction.mu_R": 0.0,
-    "flywheel.runout": 0.0, "motor_1.T_cog": 0.0, "motor_2.T_cog": 0.0,
-}  # fmt: skip
+    "bearing.C_0": 0.0,
+    "bearing.C_2": 0.0,
+    "bearing.T_nu": 0.0,
+    "screw.eta_f": 1.0,
+    "screw.eta_b": 1.0,
+    "wedge_friction.mu_int": 0.0,
+    "wedge_friction.mu_R": 0.0,
+    "flywheel.runout": 0.0,
+    "motor_1.T_cog": 0.0,
+    "motor_2.T_cog": 0.0,
+}
 # With and without friction: one structure, and so one kernel.
 STRUCTURE = {"command.mode": "position", "flywheel.law": "driven", "encoder.law": "ideal"}
 SWEEP = Sweep(("theta_2_set",), "theta_2", (1.0, 10.0, 60.0, 150.0), (1e-3,), tolerance=1e-4)
@@ -37,8 +44,9 @@ def positioned(**changes: float | str) -> Run:
     assert isinstance(found, WedgeParameters)
     memory = memory_at(0.0, found)
     mean = WedgeBrake.Stimulus._field_defaults | {
-        "theta_1_set": memory.theta_1_ref, "theta_2_set": memory.theta_2_ref,
-    }  # fmt: skip
+        "theta_1_set": memory.theta_1_ref,
+        "theta_2_set": memory.theta_2_ref,
+    }
 
     def stimulus(t: Array) -> Array:
         row = [mean.get(name, 0.0) for name in WedgeBrake.Stimulus._fields]
@@ -54,9 +62,14 @@ def deviation(run: Run, sweep: Sweep = SWEEP) -> tuple[Array, Array]:
     assert not found["unsettled_substeps"].values.any()
     stimulus = WedgeBrake.Stimulus(*run.stimulus(np.zeros(1))[0])
     loop = closed_loop(
-        run.model, run.par, run.state, run.memory, inputs=sweep.inputs, outputs=(sweep.output,),  # type: ignore[arg-type]
+        run.model,
+        run.par,
+        run.state,
+        run.memory,
+        inputs=sweep.inputs,
+        outputs=(sweep.output,),  # type: ignore[arg-type]
         stimulus=stimulus,
-    )  # fmt: skip
+    )
     exact = loop.response(found["frequency"].values)[:, 0, 0]
     measured = response_data(found).frdata[0, 0]
     ratio = measured / exact
@@ -97,9 +110,13 @@ def test_variants_and_amplitudes_are_those_of_single_sweeps() -> None:
     run = positioned()
     both = frequency_response(
         run,
-        replace(SWEEP, frequencies=(10.0,), amplitudes=(0.2, 0.5),
-                variations={"control.position.f_n": [12.0, 60.0]}),
-    )  # fmt: skip
+        replace(
+            SWEEP,
+            frequencies=(10.0,),
+            amplitudes=(0.2, 0.5),
+            variations={"control.position.f_n": [12.0, 60.0]},
+        ),
+    )
     assert both["control.position.f_n"].values.tolist() == [12.0, 60.0]
     for k, f_n in enumerate((12.0, 60.0)):
         own = replace(run, par=run.par.replace({"control.position.f_n": f_n}))

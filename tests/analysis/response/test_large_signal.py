@@ -28,9 +28,14 @@ def response(variants, frequencies, amplitudes, **more):
     loop = variants[0].loop
     points = [one.point for one in variants]
     sweep = Sweep(
-        loop.inputs, loop.output, frequencies, amplitudes, whole=loop.whole(points[0].par),
-        saturations=loop.saturations, **more,
-    )  # fmt: skip
+        loop.inputs,
+        loop.output,
+        frequencies,
+        amplitudes,
+        whole=loop.whole(points[0].par),
+        saturations=loop.saturations,
+        **more,
+    )
     return frequency_response(points[0].run(), sweep, points=[one.run() for one in points])
 
 

@@ -36,8 +36,10 @@ def response(settled: list[float], scatter: list[float]) -> xr.Dataset:
     dims, shape = ("variant", "amplitude", "frequency"), (1, 1, len(settled))
     ones = {"gain": 1.0, "coherence": 0.25, "unsettled_substeps": 0.0}
     data = {name: (dims, np.full(shape, value)) for name, value in ones.items()}
-    data |= {"settled": (dims, np.reshape(settled, shape)),
-             "scatter": (dims, np.reshape(scatter, shape))}  # fmt: skip
+    data |= {
+        "settled": (dims, np.reshape(settled, shape)),
+        "scatter": (dims, np.reshape(scatter, shape)),
+    }
     return xr.Dataset(data, {"amplitude": [1e4]}, {"excitation": "sine"})
 
 

@@ -19,7 +19,9 @@ def test_true_errors_lie_within_three_times_the_estimate(monkeypatch: pytest.Mon
     coarse = bywire.frequency_response("current", **ASKED)
     measured = use_case._measured
     monkeypatch.setattr(
-        use_case, "_measured", lambda *args: measured(*args[:4], 0.1)  # of the same sweep
+        use_case,
+        "_measured",
+        lambda *args: measured(*args[:4], 0.1),  # of the same sweep
     )
     fine = bywire.frequency_response("current", **ASKED, estimate_error=False)
     assert "gain_step_error" not in fine.data

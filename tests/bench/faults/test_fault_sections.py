@@ -73,13 +73,17 @@ def test_a_bench_file_with_faults_is_read_and_written_and_read_again(tmp_path):
     assert second.injections == first.injections != ()
     in_numbers = bench(
         {"fault": "pressure.stuck", "value": 20e5, "onset": 0.02, "lasts": 0.01},
-        {"fault": "motor.hot", "value": 1.5}, {"set": {"motor.K_e": 0.7 * 30.4e-3}, "onset": 0.03},
-    )  # fmt: skip
+        {"fault": "motor.hot", "value": 1.5},
+        {"set": {"motor.K_e": 0.7 * 30.4e-3}, "onset": 0.03},
+    )
     (tmp_path / "third.toml").write_text(bench_text(in_numbers))
     third = load(tmp_path / "third.toml")
     for own, other in zip(third.injections, first.injections, strict=True):
         assert (own.mode.name, own.value, own.course) == (
-            other.mode.name, pytest.approx(other.value), other.course)  # fmt: skip
+            other.mode.name,
+            pytest.approx(other.value),
+            other.course,
+        )
     values = [run(each).recording["p_pd"].values for each in (first, second)]
     np.testing.assert_array_equal(*values)
     answer = bywire.run(in_numbers, faults=["ecu.frozen@50 ms"], estimate_error=False)

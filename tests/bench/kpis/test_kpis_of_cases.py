@@ -58,8 +58,13 @@ def rows() -> Rows:
     mode = (random.uniform(size=y.shape) < 0.3).astype(float)
     mode[::23, 5] = 0.5
     power = y * random.standard_normal(y.shape)
-    signals = {"y": y, "power": power, "mode": mode, "energy": np.cumsum(power, axis=1),
-               "t_stuck": np.cumsum(mode, axis=1)}  # fmt: skip
+    signals = {
+        "y": y,
+        "power": power,
+        "mode": mode,
+        "energy": np.cumsum(power, axis=1),
+        "t_stuck": np.cumsum(mode, axis=1),
+    }
     return Rows(t, signals, {name: {"units": "m"} for name in signals})
 
 
@@ -116,15 +121,20 @@ def _drawn(random: np.random.Generator, family: str) -> tuple[Rows, object]:
     mode[4, 0] += random.choice([0.0, 0.5])
     rows = Rows(t, {"y": y, "mode": mode}, {"y": {"units": "m"}, "mode": {"units": "1"}})
     if family not in ("step_response", "static_gain"):
-        names = {"effort": ("y", "mode", "nothing"), "extremes": ("y",),
-                 "occupation": ("mode", random.choice(["mode", "none"]), "y", "none")}  # fmt: skip
+        names = {
+            "effort": ("y", "mode", "nothing"),
+            "extremes": ("y",),
+            "occupation": ("mode", random.choice(["mode", "none"]), "y", "none"),
+        }
         names["effort"] = tuple(name if random.random() < 0.7 else "nothing" for name in "yyy")
         return rows, FAMILIES.find(family).setting_class(*map(str, names[family]))
     levels = random.choice([None, 0.0, 1.0], 2, p=[0.2, 0.4, 0.4])
     window = sorted(random.uniform(t[0], t[-1], 2)) if random.random() < 0.3 else None
     at = float(random.choice([*t[:-1], random.uniform(t[0], t[-1])]))
-    seen = {"window": window and tuple(map(float, window)),
-            "smoothing": float(random.choice([0.0, 0.03, 0.5]))}  # fmt: skip
+    seen = {
+        "window": window and tuple(map(float, window)),
+        "smoothing": float(random.choice([0.0, 0.03, 0.5])),
+    }
     if family == "static_gain":
         return rows, static_gain.Setting("y", at, float(random.choice([0.0, 0.35])), "A", **seen)
     return rows, step_response.Setting("y", at, *levels, **seen)
@@ -139,8 +149,9 @@ def _drawn_stop(random: np.random.Generator, t: np.ndarray, y: np.ndarray) -> tu
     names = vehicle_stop.Setting()
     other = {
         name: np.round(random.standard_normal(y.shape), 1)
-        for field, name in vars(names).items() if field not in {"ideal", "peak_slip", "v"}
-    }  # fmt: skip
+        for field, name in vars(names).items()
+        if field not in {"ideal", "peak_slip", "v"}
+    }
     for wheel in ("f", "r"):
         other[f"omega_{wheel}"] *= random.uniform(size=y.shape) < 0.3
         other[f"E_brake_{wheel}"] = np.cumsum(np.abs(other[f"E_brake_{wheel}"]), axis=1)
@@ -192,7 +203,8 @@ def test_a_judge_by_families_is_one_of_a_recording_too(rows):
     )
     assert judge.signals([1.0, 1.1]) >= {"y", "P_el", "E_source"}
     together = judge.of_cases(rows, [1.0] * CASES)
-    recording = xr.Dataset({"y": ("time", rows["y"].values[3], {"units": "m"})},
-                           {"time": rows["time"].values})  # fmt: skip
+    recording = xr.Dataset(
+        {"y": ("time", rows["y"].values[3], {"units": "m"})}, {"time": rows["time"].values}
+    )
     assert [kpi.name for kpi in together] == [kpi.name for kpi in judge({"run": recording}, 1.0)]
     assert [each.case(3) for each in together] == list(judge({"run": recording}, 1.0))

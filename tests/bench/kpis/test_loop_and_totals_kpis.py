@@ -73,8 +73,13 @@ def test_effort_of_a_sine():
     power = 1 + 2 * t
     recording = xr.Dataset({"i": ("time", i), "P_el": ("time", power)}, {"time": ("time", t)})
     found = registry.evaluate("effort", recording, effort.Setting())
-    expected = {"peak_current": 3, "mean_current": 6 / math.pi, "peak_power": 3,
-                "mean_power": 2, "energy": 2}  # fmt: skip
+    expected = {
+        "peak_current": 3,
+        "mean_current": 6 / math.pi,
+        "peak_power": 3,
+        "mean_power": 2,
+        "energy": 2,
+    }
     assert {k: v.value for k, v in found.items()} == pytest.approx(expected, rel=1e-6)
     recording["E_source"] = ("time", 5 + 7 * t)  # integrated within the samples: it counts
     found = registry.evaluate("effort", recording, effort.Setting())
@@ -112,9 +117,18 @@ def test_moving_average_of_a_period_is_exact_on_ramps_and_blind_to_ripple():
 def test_every_figure_is_declared_for_listings():
     found = registry.definitions()
     assert set(registry.FAMILIES.all()) == {
-        "effort", "extremes", "hysteresis", "occupation", "release", "sine_sweep",
-        "static_gain", "step_response", "tracking", "vehicle_stop", "warming",
-    }  # fmt: skip
+        "effort",
+        "extremes",
+        "hysteresis",
+        "occupation",
+        "release",
+        "sine_sweep",
+        "static_gain",
+        "step_response",
+        "tracking",
+        "vehicle_stop",
+        "warming",
+    }
     assert {"rise_time", "energy", "share_stuck", "loop_area"} <= set(found)
     for figure in found.values():
         assert figure.definition.endswith(".")

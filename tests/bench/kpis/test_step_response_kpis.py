@@ -146,8 +146,10 @@ def test_a_brake_that_does_not_move_has_no_figures_of_a_step(level):
 
 def test_a_response_that_still_moves_leaves_open_how_far_it_goes():
     rising = judged(0.5 * ROWS)  # drifts by 5 % from half to half of the last fifth
-    assert outcomes(rising, overshoot="<= 15 %", steady_state_error="<= 1 m",
-                    ripple="<= 1 m") == ["undecided"] * 3  # fmt: skip
+    assert (
+        outcomes(rising, overshoot="<= 15 %", steady_state_error="<= 1 m", ripple="<= 1 m")
+        == ["undecided"] * 3
+    )
     assert "by 5 % of the step height" in rising["overshoot"].note
     assert rising["dead_time"].value == pytest.approx(0.1)
     assert outcomes(rising, settling_time="<= 0.5 s") == ["missed"]
@@ -163,8 +165,9 @@ def test_a_response_at_rest_has_its_figures():
     assert rippled["overshoot"].value == pytest.approx(3.0, rel=1e-2)
     stuck = judged(0.6 * (1.0 - np.exp(-20.0 * ROWS)))  # at rest, and short of the set point
     assert stuck["steady_state_error"].value == pytest.approx(0.4, rel=1e-3)
-    assert outcomes(stuck, overshoot="<= 15 %", steady_state_error="<= 0.1 m",
-                    settling_time="<= 1 s") == ["undecided", "missed", "missed"]  # fmt: skip
+    assert outcomes(
+        stuck, overshoot="<= 15 %", steady_state_error="<= 0.1 m", settling_time="<= 1 s"
+    ) == ["undecided", "missed", "missed"]
     lag = judged(1.0 - np.exp(-20.0 * ROWS))
     assert outcomes(lag, overshoot="<= 15 %") == ["met"]
 
@@ -186,7 +189,16 @@ def test_other_families_have_no_figures_of_what_does_not_move():
     found = {}
     for family, setting in settings.items():
         found |= evaluate(family, recording, setting)
-    for name in ("static_gain", "time_to_empty", "sweep_gain", "sweep_peak", "sweep_bandwidth",
-                 "sweep_lag", "loop_width_mid", "loop_area", "tracking_lag"):  # fmt: skip
+    for name in (
+        "static_gain",
+        "time_to_empty",
+        "sweep_gain",
+        "sweep_peak",
+        "sweep_bandwidth",
+        "sweep_lag",
+        "loop_width_mid",
+        "loop_area",
+        "tracking_lag",
+    ):
         assert math.isnan(found[name].value), name
         assert found[name].is_open, name

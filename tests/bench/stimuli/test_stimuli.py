@@ -8,10 +8,22 @@ import pytest
 from bywire.bench.stimuli import registry
 from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError
 
-CHIRP = {"mean": "1 A", "amplitude": "0.5 A", "f_start": "1 Hz", "f_end": "15 Hz",
-         "t_sweep": "10 s", "t_start": "0.5 s"}  # fmt: skip
-RAMP = {"start": "0 A", "end": "5 A", "slope": "0.2 A/s", "t_start": 0, "t_hold": 0,
-        "after": "return"}  # fmt: skip
+CHIRP = {
+    "mean": "1 A",
+    "amplitude": "0.5 A",
+    "f_start": "1 Hz",
+    "f_end": "15 Hz",
+    "t_sweep": "10 s",
+    "t_start": "0.5 s",
+}
+RAMP = {
+    "start": "0 A",
+    "end": "5 A",
+    "slope": "0.2 A/s",
+    "t_start": 0,
+    "t_hold": 0,
+    "after": "return",
+}
 
 
 def sampled(kind, values, t, unit="A"):

@@ -45,10 +45,13 @@ CHOICES: dict[str, dict[str, Any]] = {
     "ecu.filter.place": {"before-dither": {}},
     "ecu.dither.waveform": {"off": {}, "square": {}, "triangle": {}},
     "drive.mode": {
-        "pedal": {}, "current": {}, "current-direct": {}, "voltage-source": {},
+        "pedal": {},
+        "current": {},
+        "current-direct": {},
+        "voltage-source": {},
         "current-source": {},
     },
-}  # fmt: skip
+}
 CASES = [("", "")] + [(name, value) for name, values in CHOICES.items() for value in values]
 
 
@@ -97,8 +100,9 @@ def test_run_settles_and_its_energy_balance_closes(name: str, value: str) -> Non
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize(("name", "value"), CASES)
 def test_engines_agree(name: str, value: str) -> None:
-    compiled, slow = (recorded(name, value, engine, COARSE)
-                      for engine in ("compiled", "virtual-machine"))  # fmt: skip
+    compiled, slow = (
+        recorded(name, value, engine, COARSE) for engine in ("compiled", "virtual-machine")
+    )
     assert compiled.attrs["engine"] != slow.attrs["engine"]
     known = signals_of(MotorcycleBrake.Output)
     for signal in map(str, compiled.data_vars):

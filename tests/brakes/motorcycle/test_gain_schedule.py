@@ -24,9 +24,13 @@ from bywire.simulation.run import simulate
 
 REGIONS = {
     "ecu.schedule.law": "regions",
-    "ecu.schedule.low.k_p": 2.2e-5, "ecu.schedule.low.k_i": 9e-5, "ecu.schedule.low.k_d": 5e-7,
-    "ecu.schedule.high.k_p": 4e-6, "ecu.schedule.high.k_i": 3e-5, "ecu.schedule.high.k_d": 8e-8,
-}  # fmt: skip
+    "ecu.schedule.low.k_p": 2.2e-5,
+    "ecu.schedule.low.k_i": 9e-5,
+    "ecu.schedule.low.k_d": 5e-7,
+    "ecu.schedule.high.k_p": 4e-6,
+    "ecu.schedule.high.k_i": 3e-5,
+    "ecu.schedule.high.k_d": 8e-8,
+}
 PRESSURES = (5e5, 9.4e5, 10e5, 20e5, 35.7e5)
 
 
@@ -86,9 +90,11 @@ def one_tick(par: MotorcycleParameters, p_before: float) -> float:
     stimulus: Any = point.stimulus
     own = par.replace({"adc.law": "ideal", "drive.mode": "pressure"})
     made = motorcycle_ecu.tick(
-        readings, memory._replace(p_meas=p_before, pid_last=par.ecu.pressure.c * 14e5 - 10e5),
-        stimulus._replace(p_set=14e5), own,
-    )  # fmt: skip
+        readings,
+        memory._replace(p_meas=p_before, pid_last=par.ecu.pressure.c * 14e5 - 10e5),
+        stimulus._replace(p_set=14e5),
+        own,
+    )
     return made.i_star
 
 
@@ -133,9 +139,14 @@ def test_without_the_transfer_small_motion_would_know_the_slope(monkeypatch: Any
 
     point = replace(loop.point(loop.smooth(par), p), model=Naive())
     made = closed_loop(
-        point.model, point.par, point.state, point.memory, inputs=("p_set",), outputs=("p_mc",),
+        point.model,
+        point.par,
+        point.state,
+        point.memory,
+        inputs=("p_set",),
+        outputs=("p_mc",),
         stimulus=point.stimulus,
-    )  # fmt: skip
+    )
     theirs = loop.closed(frozen(par, p), p)
     assert np.abs(made.response(f) / theirs.response(f) - 1.0).max() > 0.05
 

@@ -117,15 +117,19 @@ def test_what_stays_without_power_lies_between_the_two_closed_forms():
 def test_swollen_seals_hold_the_brake_without_power_beyond_a_cliff(factor, holds):
     """The piston starts to go back if its pressure's torque exceeds the breakaway: up to 1.98."""
     p = bar(
-        held({"fault": "seal.swollen", "value": factor, "onset": -9.0},
-             {"fault": "battery.lost", "onset": ONSET})
-    )[-1]  # fmt: skip
+        held(
+            {"fault": "seal.swollen", "value": factor, "onset": -9.0},
+            {"fault": "battery.lost", "onset": ONSET},
+        )
+    )[-1]
     assert p > 36.5 if holds else p < 3.5
 
 
 def test_a_frozen_controller_ends_by_the_phase_of_its_dither():
-    ends = [bar(failed("ecu.frozen", onset=ONSET + k * 1e-3, duration="2.7 s"))[-1]
-            for k in range(0, 20, 2)]  # fmt: skip
+    ends = [
+        bar(failed("ecu.frozen", onset=ONSET + k * 1e-3, duration="2.7 s"))[-1]
+        for k in range(0, 20, 2)
+    ]
     assert min(ends) < 5.0
     assert max(ends) > 51.0
     assert sum(35.0 < p < 39.0 for p in ends) >= 2
@@ -141,9 +145,13 @@ def test_a_leak_is_hidden_by_the_loop_and_seen_in_the_stroke():
 
 @pytest.mark.parametrize(
     ("name", "volume", "reached"),
-    [("fluid.air-in-line", "1.28 ml", 0.6), ("fluid.air-in-line", "0.11 ml", 37.0),
-     ("fluid.air-in-line", "0.135 ml", 36.4), ("fluid.air", "0.0088 ml", 37.0)],
-)  # fmt: skip
+    [
+        ("fluid.air-in-line", "1.28 ml", 0.6),
+        ("fluid.air-in-line", "0.11 ml", 37.0),
+        ("fluid.air-in-line", "0.135 ml", 36.4),
+        ("fluid.air", "0.0088 ml", 37.0),
+    ],
+)
 def test_air_takes_the_stroke_beyond_an_eighth_of_a_milliliter(name, volume, reached):
     recording = failed(name, volume, onset=-9.0, p_from="0.01 bar", p_to="37 bar")
     assert bar(recording)[-100:].mean() == pytest.approx(reached, abs=0.2)
@@ -153,15 +161,23 @@ def test_air_takes_the_stroke_beyond_an_eighth_of_a_milliliter(name, volume, rea
 
 @pytest.mark.parametrize(
     ("water", "T", "reached"),
-    [(0.037, "155 degC", 37.0), (0.037, "156.1 degC", 37.0), (0.037, "156.35 degC", 36.4),
-     (0.037, "168 degC", 0.6), (0.0, "168 degC", 37.0), (0.0, "231.35 degC", 36.4)],
-)  # fmt: skip
+    [
+        (0.037, "155 degC", 37.0),
+        (0.037, "156.1 degC", 37.0),
+        (0.037, "156.35 degC", 36.4),
+        (0.037, "168 degC", 0.6),
+        (0.0, "168 degC", 37.0),
+        (0.0, "231.35 degC", 36.4),
+    ],
+)
 def test_boiling_fluid_takes_the_stroke_as_its_vapor_as_air_does(water, T, reached):
     """0.1 ml per kelvin beyond 155 degC wet, 230 degC dry: 0.123 ml are the cliff, 1.28 ml all."""
     recording = held(
-        {"fault": "fluid.vapor", "value": T, "onset": -9.0}, changes={"vapor.water": water},
-        p_from="0.01 bar", p_to="37 bar",
-    )  # fmt: skip
+        {"fault": "fluid.vapor", "value": T, "onset": -9.0},
+        changes={"vapor.water": water},
+        p_from="0.01 bar",
+        p_to="37 bar",
+    )
     assert bar(recording)[-100:].mean() == pytest.approx(reached, abs=0.2)
     assert bool(recording["at_stop"][-1] > 0) == (reached < 36.9)
 
@@ -189,9 +205,10 @@ def test_a_stuck_piston_keeps_its_friction_over_its_area_on_the_pads(rollback):
     """The line is empty but for what the seals hold, 1.37 bar; a rolled-back seal leaves less."""
     seized = {"set": {"piston.rollback": f"{rollback}"}, "onset": -9.0}
     recording = held(
-        seized, {"fault": "piston.stuck", "value": "60 N", "onset": -9.0},
+        seized,
+        {"fault": "piston.stuck", "value": "60 N", "onset": -9.0},
         {"fault": "battery.lost", "onset": ONSET},
-    )  # fmt: skip
+    )
     p, p_mc, q = (recording[name].values for name in ("p_pd", "p_mc", "q"))
     assert p_mc[-1] == pytest.approx(1.37e5, abs=0.01e5)
     assert p[-1] - p_mc[-1] == pytest.approx((1.0 - rollback) * 2e5, abs=100.0)
@@ -205,8 +222,11 @@ def test_the_friction_of_a_stuck_piston_takes_its_force_times_its_way():
     """The way is what the pads' pressure says of their spring."""
     recording = held(
         {"set": {"ecu.dither.waveform": "off"}, "onset": -9.0},
-        {"fault": "piston.stuck", "onset": -9.0}, p_from="1 bar", p_to="20 bar", duration="1 s",
-    )  # fmt: skip
+        {"fault": "piston.stuck", "onset": -9.0},
+        p_from="1 bar",
+        p_to="20 bar",
+        duration="1 s",
+    )
     pads = Bench("hard-braking", "dardanelli2010").par.caliper
     p = recording["p_pd"].values
     way = np.abs(np.diff(p)).sum() * pads.A_pd / pads.K_pd
@@ -216,9 +236,12 @@ def test_the_friction_of_a_stuck_piston_takes_its_force_times_its_way():
 
 @pytest.mark.parametrize(
     ("name", "value", "beside"),
-    [("caliper.leak", "leaking", {}), ("caliper.fluid_heat", "warming", {}),
-     ("fluid.air", "caliper", {"fluid.V_air": 1e-8})],
-)  # fmt: skip
+    [
+        ("caliper.leak", "leaking", {}),
+        ("caliper.fluid_heat", "warming", {}),
+        ("fluid.air", "caliper", {"fluid.V_air": 1e-8}),
+    ],
+)
 def test_a_stuck_piston_is_refused_beside_what_feels_the_fluid_in_the_caliper(name, value, beside):
     par = Bench("hard-braking", "dardanelli2010").par
     with pytest.raises(ParameterError, match=rf"piston\.law = 'sticking' does not go with {name}"):
@@ -253,9 +276,14 @@ def warmed(**changes):
     """Return the recording of a brake at rest whose caliper warms by 5 K/s, and its parameters."""
     par = Bench("hard-braking", "dardanelli2010").par
     case = case_from_rest(
-        "run", par, "current-source", 0.0, lambda t: {"i_set": 0.0 * t}, 6.0,
+        "run",
+        par,
+        "current-source",
+        0.0,
+        lambda t: {"i_set": 0.0 * t},
+        6.0,
         {"caliper.fluid_heat": "warming", "caliper.T_rate": 5.0, **changes},
-    )  # fmt: skip
+    )
     recording = record(as_run(case, 2e-5), simulate(as_run(case, 2e-5)), 0.0, 0.0, {})
     books = actuator_ledger(recording)
     assert abs(books.closing_error) < 1e-9 * books.turnover
@@ -283,13 +311,18 @@ def test_fluid_that_warms_behind_a_blocked_port_presses_the_pads_on():
 def test_a_port_that_gets_blocked_keeps_what_a_caliper_expands():
     heated = {"fault": "caliper.heated", "value": "2 K/s", "onset": 0.6, "lasts": 1.0}
     bench = Bench(
-        "pressure-release", "dardanelli2010", {"port.law": "dead-stroke"},
+        "pressure-release",
+        "dardanelli2010",
+        {"port.law": "dead-stroke"},
         options={"p_from": "5 bar", "duration": "2 s"},
         faults=[heated, {"fault": "port.blocked", "onset": -9.0}],
-    )  # fmt: skip
+    )
     left = bar(run(bench).recording)[-1]
     opened = Bench(
-        "pressure-release", "dardanelli2010", {"port.law": "dead-stroke"},
-        options={"p_from": "5 bar", "duration": "2 s"}, faults=[heated],
-    )  # fmt: skip
+        "pressure-release",
+        "dardanelli2010",
+        {"port.law": "dead-stroke"},
+        options={"p_from": "5 bar", "duration": "2 s"},
+        faults=[heated],
+    )
     assert left > bar(run(opened).recording)[-1] + 0.5

@@ -101,9 +101,9 @@ def test_bench_that_starts_beyond_the_end_stop_is_refused() -> None:
 def test_memory_of_a_source_holds_no_ecu(mode: str) -> None:
     par, p = brake({"drive.mode": mode}), 20e5
     i, memory = holding_current(p, par), memory_at(p, par)
-    own = {"i_source": i, "i_ref": i} if mode == "current-source" else {
-        "v_source": par.motor.R_m * i
-    }  # fmt: skip
+    own = (
+        {"i_source": i, "i_ref": i} if mode == "current-source" else {"v_source": par.motor.R_m * i}
+    )
     given = {name: value for name, value in memory._asdict().items() if value != 0.0}
     assert given == {"p_meas": p, "i_meas": i} | own
 
@@ -111,10 +111,12 @@ def test_memory_of_a_source_holds_no_ecu(mode: str) -> None:
 @pytest.mark.parametrize("source", ["current", "voltage"])
 def test_converters_live_in_open_loop(source: str) -> None:
     bench = bywire.Bench(
-        "motor-open-loop", "dardanelli2010", {"adc.noise": 1e-4},
+        "motor-open-loop",
+        "dardanelli2010",
+        {"adc.noise": 1e-4},
         {"source": source, "p_start": "10 bar", "duration": "0.3 s"},
         {"kind": "step", "start": 0, "end": "6 A" if source == "current" else "3 V", "t_step": 0},
-    )  # fmt: skip
+    )
     run = run_once(bench).recording
     assert float(run["p_mc"].max()) > 12e5
     late = run.isel(time=slice(10, None))

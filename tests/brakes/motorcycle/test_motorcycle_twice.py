@@ -63,22 +63,29 @@ def test_equations_frictions_limits_contacts_and_ticks_are_those_of_one(mode):
         pressed = contact[of_contact[sub.name]]
         reacting = (reaction[k], reaction[2 + k])
         wanted = {
-            "State": [alone.mass(own_e, its),
-                      alone.balance(own["State"], own_e, own["Memory"], its, pressed)],
-            "Flow": [alone.powers(own["State"], own_e, own_rate, own["Memory"], its, pressed,
-                                  reacting)],
-            "Output": [alone.output(own["State"], own["Memory"], its, pressed, reacting,
-                                    own["Flow"])],
-        }  # fmt: skip
+            "State": [
+                alone.mass(own_e, its),
+                alone.balance(own["State"], own_e, own["Memory"], its, pressed),
+            ],
+            "Flow": [
+                alone.powers(own["State"], own_e, own_rate, own["Memory"], its, pressed, reacting)
+            ],
+            "Output": [
+                alone.output(own["State"], own["Memory"], its, pressed, reacting, own["Flow"])
+            ],
+        }
         for kind, each in rows.items():
             assert [sub.inside(kind, row) for row in each] == wanted[kind]
         assert bounds[k] == alone.bounds(own["State"], own_e, own["Memory"], its, pressed)[0]
         assert gaps[groups[sub.name]] == alone.gap(own["State"], own_e, its)
         (task,) = alone.tasks(its)
         names = MotorcycleBrake.Stimulus._fields
-        given = MotorcycleBrake.Stimulus(*(
-            m.front_p_meas if name in sub.feeds else getattr(u, sub.named(name)) for name in names
-        ))  # fmt: skip
+        given = MotorcycleBrake.Stimulus(
+            *(
+                m.front_p_meas if name in sub.feeds else getattr(u, sub.named(name))
+                for name in names
+            )
+        )
         after = tasks[k].tick(x, m, u, par)
         assert sub.inside("Memory", after) == task.tick(own["State"], own["Memory"], given, its)
         other = Both.rear if sub is Both.front else Both.front

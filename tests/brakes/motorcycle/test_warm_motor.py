@@ -30,9 +30,14 @@ KNOWN = {"ecu.derating.law": "current", "ecu.derating.C_w_hat": 2.0, "ecu.derati
 def held(i: float, duration: float, **changes: Any) -> xr.Dataset:
     """Return a run in which an ideal source drives a current [A] from the start on."""
     case = case_from_rest(
-        "run", BRAKE, "current-source", 0.0, lambda t: {"i_set": np.full(t.shape, i)}, duration,
+        "run",
+        BRAKE,
+        "current-source",
+        0.0,
+        lambda t: {"i_set": np.full(t.shape, i)},
+        duration,
         {**WARM, **changes},
-    )  # fmt: skip
+    )
     run = as_run(case, 2e-5)
     return record(run, simulate(run), 0.0, 0.0, {})
 
@@ -87,8 +92,9 @@ def test_resistance_and_torque_constant_follow_the_temperatures() -> None:
 
 
 def test_books_close_beside_each_other() -> None:
-    result = duty({"input": "p_set", "end": 30e5, "period": 0.5, "share": 0.5, "duration": 2.0},
-                  **WARM)  # fmt: skip
+    result = duty(
+        {"input": "p_set", "end": 30e5, "period": 0.5, "share": 0.5, "duration": 2.0}, **WARM
+    )
     own, heat = actuator_ledger(result.recording), further_ledgers(result.recording)["motor heat"]
     assert {p.label for p in heat.sinks} == {"winding", "housing", "air"}
     assert abs(own.closing_error) < 1e-7 * own.turnover
@@ -103,8 +109,14 @@ def test_books_close_beside_each_other() -> None:
 def test_a_derated_motor_settles_where_heat_out_is_heat_in() -> None:
     # Constant resistance: R i(T)^2 = G (T - T_a) with the limit i(T) is a quadratic equation.
     no_growth = {"motor_heat.a_R": 0.0, "motor_heat.a_K": 0.0, "ecu.derating.a_R_hat": 0.0}
-    slim = {"motor_heat.C_w": 0.4, "motor_heat.C_h": 0.4, "motor_heat.G_ha": 0.52,
-            "ecu.derating.C_w_hat": 0.4, "ecu.derating.C_h_hat": 0.4, "ecu.derating.G_ha_hat": 0.52}
+    slim = {
+        "motor_heat.C_w": 0.4,
+        "motor_heat.C_h": 0.4,
+        "motor_heat.G_ha": 0.52,
+        "ecu.derating.C_w_hat": 0.4,
+        "ecu.derating.C_h_hat": 0.4,
+        "ecu.derating.G_ha_hat": 0.52,
+    }
     changes = {**WARM, **KNOWN, **no_growth, **slim, "drive.mode": "current-direct"}
     options = {"input": "i_set", "output": "i", "end": 18.0, "duration": 12.0}
     result = duty(options, **changes)
@@ -126,8 +138,14 @@ def test_a_derated_motor_settles_where_heat_out_is_heat_in() -> None:
 
 
 def test_derating_keeps_a_motor_below_its_limit_that_would_pass_it() -> None:
-    options = {"input": "p_set", "output": "p_mc", "end": "45 bar", "period": "0.25 s",
-               "share": 0.5, "duration": "15 s"}  # fmt: skip
+    options = {
+        "input": "p_set",
+        "output": "p_mc",
+        "end": "45 bar",
+        "period": "0.25 s",
+        "share": 0.5,
+        "duration": "15 s",
+    }
     hot = {**WARM, "motor_heat.T_a": "100 degC"}
     known = {**KNOWN, "ecu.derating.T_a_hat": "100 degC"}
     free, derated = duty(options, **hot), duty(options, **hot, **known)
@@ -153,8 +171,9 @@ def test_the_ecus_model_is_that_of_the_motor() -> None:
     assert off == (x, (20.0, par.T_a_hat, 0.0))
 
 
-@pytest.mark.parametrize(("T", "left"), [(20.0, 20.0), (120.0, 20.0), (132.5, 11.0), (145.0, 2.0),
-                                         (200.0, 2.0)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("T", "left"), [(20.0, 20.0), (120.0, 20.0), (132.5, 11.0), (145.0, 2.0), (200.0, 2.0)]
+)
 def test_the_limit_falls_between_two_temperatures(T: float, left: float) -> None:
     par = BRAKE.replace({"ecu.derating.law": "current", "ecu.derating.T_a_hat": 293.15}).ecu
     x = derating.State(T - 20.0, T - 20.0)
@@ -169,11 +188,14 @@ def test_the_limit_falls_between_two_temperatures(T: float, left: float) -> None
 
 @pytest.mark.parametrize(
     ("change", "text"),
-    [("ecu.derating.T_derate=150 degC", "T_derate = 150 degC must be below T_limit = 145 degC"),
-     ("motor_heat.a_K=0.02 1/K", "leaves nothing of the torque constant at T_most = 155 degC"),
-     ("motor_heat.C_w=0", "must be > 0"), ("motor_heat.T_a=20", "cannot be K"),
-     ("motor_heat.law=hot", "lumped")],
-)  # fmt: skip
+    [
+        ("ecu.derating.T_derate=150 degC", "T_derate = 150 degC must be below T_limit = 145 degC"),
+        ("motor_heat.a_K=0.02 1/K", "leaves nothing of the torque constant at T_most = 155 degC"),
+        ("motor_heat.C_w=0", "must be > 0"),
+        ("motor_heat.T_a=20", "cannot be K"),
+        ("motor_heat.law=hot", "lumped"),
+    ],
+)
 def test_impossible_heat_of_a_motor_is_refused(change: str, text: str) -> None:
     name, _, value = change.partition("=")
     with pytest.raises(bywire.BywireError, match=text):

@@ -79,8 +79,16 @@ def test_books_of_the_heat_close(changes):
     assert books.turnover == pytest.approx(discs, rel=1e-9)
     # and those of the vehicle, to which the brakes' heat is one sink, close as ever
     given = growth(run, "W_slope") + growth(run, "W_pitch")
-    taken = ("E_vehicle", "E_brake_f", "E_brake_r", "E_tyre_f", "E_tyre_r", "E_drag", "E_roll",
-             "E_ground")  # fmt: skip
+    taken = (
+        "E_vehicle",
+        "E_brake_f",
+        "E_brake_r",
+        "E_tyre_f",
+        "E_tyre_r",
+        "E_drag",
+        "E_roll",
+        "E_ground",
+    )
     left = sum(growth(run, each) for each in taken) - given
     assert abs(left) < 1e-11 * float(run["E_vehicle"][0])
 
@@ -89,9 +97,12 @@ def test_what_changes_put_in_stands_in_the_book_of_its_store():
     # A mass that comes on top is the vehicle's, discs that hold more heat are the heat's.
     changes = {"vehicle.body.m": "+20%", "front.heat.C_d": "+50%"}
     bench = bywire.Bench(
-        "straight-stop", "sport600", options={"duration": 1.5},
-        overrides={"front.heat.law": "lumped"}, faults=[{"set": changes, "onset": 1.0}],
-    )  # fmt: skip
+        "straight-stop",
+        "sport600",
+        options={"duration": 1.5},
+        overrides={"front.heat.law": "lumped"},
+        faults=[{"set": changes, "onset": 1.0}],
+    )
     run = bywire.run(bench, estimate_error=False).recording
     body, heat = actuator_ledger(run), further_ledgers(run)["heat"]
     T = run["T_disc_f"].sel(time=1.0).item() - SPORT600.front.heat.T_a
@@ -114,8 +125,10 @@ def test_cold_brakes_are_those_without_heat(cold_and_warm):
 
 def test_a_parked_brake_cools_by_the_same_equations_in_substeps_and_by_a_fine_integrator():
     par = SPORT600.replace({**WARM, **OFF_SI})
-    heat = {"front_heat": disc_heat.State(700.0, 500.0, 350.0),
-            "rear_heat": disc_heat.State(600.0, 320.0, 300.0)}  # fmt: skip
+    heat = {
+        "front_heat": disc_heat.State(700.0, 500.0, 350.0),
+        "rear_heat": disc_heat.State(600.0, 320.0, 300.0),
+    }
     run = simulate(as_run(rolling_case(par, 0.0, {}, 20.0, heat=heat), 2e-5))
     fine = cooled(heat, par, 0.0, np.array([0.0, 20.0]))
     for name in ("T_disc_f", "T_pads_f", "T_fluid_f", "T_disc_r", "T_fluid_r"):
@@ -124,8 +137,10 @@ def test_a_parked_brake_cools_by_the_same_equations_in_substeps_and_by_a_fine_in
 
 def test_hot_pads_hold_what_their_friction_leaves():
     par = SPORT600.replace({**WARM, **OFF_SI})
-    hot = {"front_heat": disc_heat.State(475.0 + 273.15, 400.0, 300.0),
-           "rear_heat": disc_heat.State(293.15, 293.15, 293.15)}  # fmt: skip
+    hot = {
+        "front_heat": disc_heat.State(475.0 + 273.15, 400.0, 300.0),
+        "rear_heat": disc_heat.State(293.15, 293.15, 293.15),
+    }
     case = rolling_case(par, 20.0, {"p_f_set": 10e5, "p_r_set": 10e5}, 0.3, heat=hot)
     run = simulate(as_run(case, 2e-5))
     discs = par.front.disc
@@ -160,8 +175,12 @@ def test_the_last_stop_begins_where_the_one_before_and_the_way_left_it(series):
 
 
 def test_a_rider_who_presses_more_keeps_the_deceleration():
-    options = {"options.stops": "5", "options.pause": "1 s", "options.v_pause": "0 m/s",
-               "front.heat.C_d": "500 J/K"}  # fmt: skip
+    options = {
+        "options.stops": "5",
+        "options.pause": "1 s",
+        "options.v_pause": "0 m/s",
+        "front.heat.C_d": "500 J/K",
+    }
     held, more = (
         bywire.run("repeated-stops", {**options, "options.hold": hold}, estimate_error=False)
         for hold in ("pressure", "deceleration")
@@ -178,20 +197,24 @@ def test_fluid_that_gets_too_hot_is_reported():
 
 def test_the_time_of_the_peak_is_that_of_the_fluid_and_not_of_a_row():
     short, long, brief = (
-        bywire.run("repeated-stops", {"options.stops": "1", "options.parked": parked},
-                   estimate_error=False).kpi("fluid_peak_time")
+        bywire.run(
+            "repeated-stops", {"options.stops": "1", "options.parked": parked}, estimate_error=False
+        ).kpi("fluid_peak_time")
         for parked in ("900 s", "2000 s", "30 s")
-    )  # fmt: skip
+    )
     assert short.value == pytest.approx(long.value, abs=0.02)
     assert "longer options.parked" in brief.note
 
 
 @pytest.mark.parametrize(
     ("changes", "text"),
-    [({"vehicle.road.gradient": "-0.9", "options.v_0": "10 m/s"}, "standstill"),
-     ({"options.stops": "2.5"}, "stops"), ({"options.share": "1.2"}, "share"),
-     ({"options.pause": "0 s"}, "pause")],
-)  # fmt: skip
+    [
+        ({"vehicle.road.gradient": "-0.9", "options.v_0": "10 m/s"}, "standstill"),
+        ({"options.stops": "2.5"}, "stops"),
+        ({"options.share": "1.2"}, "share"),
+        ({"options.pause": "0 s"}, "pause"),
+    ],
+)
 def test_series_that_make_no_sense_are_refused(changes, text):
     with pytest.raises(bywire.BywireError, match=text):
         bywire.run("repeated-stops", {"options.stops": "2", **changes}, estimate_error=False)

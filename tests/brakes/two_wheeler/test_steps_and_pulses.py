@@ -21,9 +21,10 @@ def stop(changes, step):
     """Return a stop on wet asphalt from 30 m/s, computed in steps [us]."""
     given = {"options.surface": "wet-asphalt", "options.v_0": "30 m/s"}
     return bywire.run(
-        "straight-stop", {**changes, **given, "simulation.step": f"{step} us"},
+        "straight-stop",
+        {**changes, **given, "simulation.step": f"{step} us"},
         estimate_error=False,
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("changes", [{}, OFF], ids=["pi", "uncontrolled"])
@@ -57,12 +58,14 @@ def distances(step: float, turned: np.ndarray) -> np.ndarray:
             run,
             state=run.state._replace(theta_f=front, theta_r=rear),
             memory=run.memory._replace(
-                edge_f=-pulse, edge_r=-pulse,
-                age_f=(pulse + front) / omega_f - T, age_r=(pulse + rear) / omega_r - T,
+                edge_f=-pulse,
+                edge_r=-pulse,
+                age_f=(pulse + front) / omega_f - T,
+                age_r=(pulse + rear) / omega_r - T,
             ),
         )
         for front, rear in turned
-    ]  # fmt: skip
+    ]
     group = simulate_group(runs, ("x", "v"))
     x, v = group.values
     ends = [standstill(group.time, each) for each in v]

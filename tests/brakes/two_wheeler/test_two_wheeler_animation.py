@@ -12,9 +12,11 @@ from bywire.brakes.two_wheeler.animations import STOP
 from bywire.core.errors import ParameterError
 
 LOCKED = {
-    "options.v_0": "5 m/s", "options.surface": "snow", "options.duration": "0.6 s",
+    "options.v_0": "5 m/s",
+    "options.surface": "snow",
+    "options.duration": "0.6 s",
     "ecu.abs": "off",
-}  # fmt: skip
+}
 
 
 def test_wheel_turns_until_it_stands_and_then_marks_the_road(tmp_path: Path) -> None:

@@ -46,9 +46,13 @@ def slow():
 
 @pytest.mark.parametrize(
     ("v_0", "rear", "changes", "distance", "time"),
-    [(KMH_100, "40 bar", {}, 52.55, 3.81), (KMH_100, "0 bar", {}, 66.36, 4.85),
-     ("30 m/s", "40 bar", WET, 90.50, 6.18), ("30 m/s", "0 bar", WET, 124.46, 8.61)],
-)  # fmt: skip
+    [
+        (KMH_100, "40 bar", {}, 52.55, 3.81),
+        (KMH_100, "0 bar", {}, 66.36, 4.85),
+        ("30 m/s", "40 bar", WET, 90.50, 6.18),
+        ("30 m/s", "0 bar", WET, 124.46, 8.61),
+    ],
+)
 def test_uncontrolled_stops_are_those_of_the_trial(v_0, rear, changes, distance, time):
     result = stopped({**OFF, **changes}, v_0=v_0, p_rear=rear, duration="10 s")
     assert result.kpi("stopping_distance").value == pytest.approx(distance, abs=0.01)
@@ -202,10 +206,12 @@ def test_a_stop_on_tyres_that_follow_the_magic_formula():
 @pytest.mark.parametrize(
     ("gradient", "held"),
     [
-        ("-0.1", 10), ("0", 10), ("0.1", 10),
+        ("-0.1", 10),
+        ("0", 10),
+        ("0.1", 10),
         *(pytest.param(each, 60, marks=pytest.mark.trust) for each in ("-0.1", "0", "0.1")),
     ],
-)  # fmt: skip
+)
 def test_it_stands_still_on_any_slope(gradient, held):
     release = f"{held + 3} s"
     result = stop("slope-hold", gradient=gradient, t_release=release, duration=f"{held + 3.1} s")

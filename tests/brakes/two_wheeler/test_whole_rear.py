@@ -63,9 +63,14 @@ def test_the_brake_is_the_one_that_stands_alone(wet):
     state, memory = MotorcycleBrake().rest(par)
     demand = run["p_r_ref"].values
     case = Case(
-        "alone", MotorcycleBrake(), par, state, memory,
-        lambda t: {"p_set": demand[np.round(t / 1e-3).astype(int)]}, 2.0,
-    )  # fmt: skip
+        "alone",
+        MotorcycleBrake(),
+        par,
+        state,
+        memory,
+        lambda t: {"p_set": demand[np.round(t / 1e-3).astype(int)]},
+        2.0,
+    )
     alone = simulate(as_run(case, 20e-6))
     rows = alone.time.size
     for name in ("p_mc", "p_pd", "i", "omega", "duty", "i_dit", "T_fr"):
@@ -134,9 +139,11 @@ def test_two_ecus_are_not_exported_as_one(tmp_path):
 
 def test_brake_without_battery_leaves_the_front_to_stop():
     bench = bywire.Bench(
-        "whole-rear-stop", SET, options={"duration": 1.5},
+        "whole-rear-stop",
+        SET,
+        options={"duration": 1.5},
         faults=[{"fault": "rear.actuator.battery.lost", "onset": 0.8}],
-    )  # fmt: skip
+    )
     run = bywire.run(bench, estimate_error=False).recording
     before, after = (float(run["rear_p_mc"].sel(time=t, method="nearest")) for t in (0.79, 1.5))
     assert before == pytest.approx(40e5, abs=1e5)
@@ -148,9 +155,12 @@ def test_brake_without_battery_leaves_the_front_to_stop():
 @pytest.mark.parametrize("force", [60.0, 150.0])
 def test_caliper_that_sticks_drags_by_its_friction(force):
     bench = bywire.Bench(
-        "rear-drag", SET, VENTED, options={"duration": 1.5},
+        "rear-drag",
+        SET,
+        VENTED,
+        options={"duration": 1.5},
         faults=[{"fault": "rear.actuator.piston.stuck", "value": f"{force} N"}],
-    )  # fmt: skip
+    )
     result = bywire.run(bench, estimate_error=False)
     par = bywire.parameters(SET)
     pressure = force / par.value("rear.actuator.caliper.A_pd")
@@ -167,9 +177,11 @@ def test_caliper_that_does_not_stick_lets_go():
 
 def test_drag_of_a_loop_acts_below_its_pressure_alone():
     bench = bywire.Bench(
-        "straight-stop", "sport600", options={"duration": 0.3, "p_rear": 0.0},
+        "straight-stop",
+        "sport600",
+        options={"duration": 0.3, "p_rear": 0.0},
         faults=[{"fault": f"{end}.disc.dragging", "value": "12 N*m"} for end in ("front", "rear")],
-    )  # fmt: skip
+    )
     run = bywire.run(bench, estimate_error=False).recording
     assert (run["T_r"] == 12.0).all()
     assert float(run["E_brake_r"][-1]) == pytest.approx(

@@ -115,9 +115,13 @@ def test_every_slope_counts_where_the_step_is_judged(last, doubted):
     par = tabled(stiffening | {"caliper.tau_cal": 0.0, "heart.tau_heart": 1e-3})
     still = np.zeros(len(WedgeBrake.Stimulus._fields))
     run = Run(
-        WedgeBrake(), par, state_at(0.0, par), memory_at(0.0, par),
-        lambda t: np.tile(still, (t.size, 1)), 1e-3,
-    )  # fmt: skip
+        WedgeBrake(),
+        par,
+        state_at(0.0, par),
+        memory_at(0.0, par),
+        lambda t: np.tile(still, (t.size, 1)),
+        1e-3,
+    )
     assert bool(simulate(run).doubt) == doubted
 
 

@@ -51,9 +51,15 @@ def test_every_book_closes(cold, faded):
 
 
 def test_a_disc_that_loses_nothing_keeps_its_share_of_the_heat():
-    none = {f"corner.heat.{name}": f"0 {unit}" for unit, names in {
-        "W/m^2/K": ("h_0", "h_1"), "W/K": ("G_dp", "G_open", "G_pf", "G_f"), "": ("epsilon",),
-    }.items() for name in names}  # fmt: skip
+    none = {
+        f"corner.heat.{name}": f"0 {unit}"
+        for unit, names in {
+            "W/m^2/K": ("h_0", "h_1"),
+            "W/K": ("G_dp", "G_open", "G_pf", "G_f"),
+            "": ("epsilon",),
+        }.items()
+        for name in names
+    }
     run = stop(**none).recording
     taken = growth(run, "E_brake")
     assert growth(run, "T_disc") == pytest.approx(HEAT.psi * taken / HEAT.C_d, rel=1e-7)

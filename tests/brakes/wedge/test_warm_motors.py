@@ -13,10 +13,15 @@ from bywire.core.catalog import PARAMETER_SETS
 
 SET: Any = PARAMETER_SETS.find("roberts2003").parameters()
 WARM = {
-    "motor_heat.law": "lumped", "motor_heat.C_w": 1.0, "motor_heat.T_a": "110 degC",
-    "control.derating.law": "current", "control.derating.C_w_hat": 1.0,
-    "control.derating.T_a_hat": "110 degC", "flywheel.law": "driven", "wedge.mu_B": 0.2,
-}  # fmt: skip
+    "motor_heat.law": "lumped",
+    "motor_heat.C_w": 1.0,
+    "motor_heat.T_a": "110 degC",
+    "control.derating.law": "current",
+    "control.derating.C_w_hat": 1.0,
+    "control.derating.T_a_hat": "110 degC",
+    "flywheel.law": "driven",
+    "wedge.mu_B": 0.2,
+}
 
 
 @pytest.fixture(scope="module")

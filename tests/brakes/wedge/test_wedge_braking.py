@@ -62,9 +62,11 @@ def test_brake_without_power_does_not_creep(results):
 @pytest.mark.parametrize(("mu_B", "moment", "holds"), [(0.45, 500.0, True), (0.6, 950.0, False)])
 def test_power_off_above_the_neutral_point(mu_B, moment, holds):
     run = drive(
-        brake(mu_B=mu_B), 2.0,
-        M_set=lambda t: moment + 0.0 * t, power_off=lambda t: np.where(t > 0.8 - 1e-9, 1.0, 0.0),
-    )  # fmt: skip
+        brake(mu_B=mu_B),
+        2.0,
+        M_set=lambda t: moment + 0.0 * t,
+        power_off=lambda t: np.where(t > 0.8 - 1e-9, 1.0, 0.0),
+    )
     assert (run["F_end"].max() == 0.0) == holds
 
 

@@ -114,9 +114,10 @@ def test_rules_and_a_step_of_half_the_length_on_the_corner():
     assert set(np.unique(rules["phase_x"])) == {0.0, 1.0, 2.0, 3.0}
     at = [
         bywire.run("corner-panic", {"simulation.step": step}, estimate_error=False)
-        .kpi("stopping_distance").value
+        .kpi("stopping_distance")
+        .value
         for step in ("40 us", "20 us")
-    ]  # fmt: skip
+    ]
     assert abs(at[0] - at[1]) < 0.01
 
 
@@ -143,12 +144,16 @@ def test_slip_control_hurries_below_its_slip_on_dry_road():
     plain, eager = (
         bywire.run(
             "corner-panic",
-            {"options.surface": "dry-asphalt", "ecu.slip.eager": str(each),
-             "options.v_0": "60 km/h", "options.duration": "3 s"},
+            {
+                "options.surface": "dry-asphalt",
+                "ecu.slip.eager": str(each),
+                "options.v_0": "60 km/h",
+                "options.duration": "3 s",
+            },
             estimate_error=False,
         )
         for each in (0, 10)
-    )  # fmt: skip
+    )
     assert plain.kpi("braking_efficiency").value < 65.0
     assert eager.kpi("braking_efficiency").value > 76.0
     assert eager.kpi("peak_slip").value < 0.105

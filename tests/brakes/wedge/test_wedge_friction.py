@@ -65,9 +65,11 @@ def test_sweep_sees_a_loop_that_is_too_fast():
 
 def test_key_figures_follow_the_table():
     bench = bywire.Bench(
-        "friction-sweep", "roberts2003", options={"mu_B": (0.355,), "t_hold": 0.3},
+        "friction-sweep",
+        "roberts2003",
+        options={"mu_B": (0.355,), "t_hold": 0.3},
         requirements={"overshoot_mu35p5": "<= 5 %"},
-    )  # fmt: skip
+    )
     assert run_once(bench).status == "passed"
     with pytest.raises(UnknownNameError, match=r"unknown KPI .*'overshoot_mu35'"):
         replace(bench, requirements={"overshoot_mu35": "<= 5 %"})

@@ -97,9 +97,12 @@ def test_moment_out_of_reach_is_said_with_numbers():
     """
     slow = {"control__moment__rate_max": 5.0, "flywheel__runout": 0.0}
     (text,) = warnings(
-        "moment-pulse-950", {"t_pulse": 1.0, "omega_gap": 10.0},
-        wedge__mu_B=0.2, control__position__i_max=2.5, **slow,
-    )  # fmt: skip
+        "moment-pulse-950",
+        {"t_pulse": 1.0, "omega_gap": 10.0},
+        wedge__mu_B=0.2,
+        control__position__i_max=2.5,
+        **slow,
+    )
     found = re.fullmatch(
         r"the motors cannot reach the demanded 950 N\*m: on the current limit of 2\.5 A from "
         r"t = ([\d.]+) s to ([\d.]+) s, the moment stays at ([\d.]+) N\*m at most",
@@ -142,12 +145,18 @@ def test_screw_that_holds_is_allowed_and_said(eta_b):
     """At mu_B 0.2 the wedge pushes out: only a screw that cannot be driven back stays."""
     texts = warnings("power-off-hold", wedge__mu_B=0.2, screw__eta_b=eta_b)
     assert texts == (
-        ["screw.eta_b = 0: no load drives these screws back, so that the brake keeps its moment "
-         "when the power goes off"] if eta_b == 0.0 else []
-    )  # fmt: skip
+        [
+            "screw.eta_b = 0: no load drives these screws back, so that the brake keeps its moment "
+            "when the power goes off"
+        ]
+        if eta_b == 0.0
+        else []
+    )
     run = drive(
-        brake({"screw.eta_b": eta_b, "flywheel.runout": 0.0}, mu_B=0.2), 1.6,
-        M_set=lambda t: 700.0 + 0.0 * t, power_off=lambda t: np.where(t > 0.8 - 1e-9, 1.0, 0.0),
-    )  # fmt: skip
+        brake({"screw.eta_b": eta_b, "flywheel.runout": 0.0}, mu_B=0.2),
+        1.6,
+        M_set=lambda t: 700.0 + 0.0 * t,
+        power_off=lambda t: np.where(t > 0.8 - 1e-9, 1.0, 0.0),
+    )
     kept = run["M_B"][-1] / run["M_B"][run.time < 0.8][-1]
     assert (kept > 0.98) == (eta_b == 0.0)

@@ -50,9 +50,10 @@ def test_the_wedge_stands_on_its_end_stop_where_the_travel_ends(life):
     made = life.projection
     plan, z = made.plan, {name: float(path[-1]) for name, path in made.states.items()}
     bench = bywire.Bench(
-        "corner-stop", "roberts2003-corner",
+        "corner-stop",
+        "roberts2003-corner",
         options={"M_brake": 950.0, "v_0": 100 / 3.6, "t_hold": 1.0, "t_end": 0.01},
-    )  # fmt: skip
+    )
     pushed = []
     for more in (-30e-6, 30e-6):
         worn = {**z, "clearance": z["clearance"] + more}
@@ -72,9 +73,14 @@ def test_the_way_to_contact_is_the_clearance(life):
 
 @pytest.mark.parametrize(
     ("lining", "wanted"),
-    [("2.1 mm", 2), *(pytest.param(f"{mm} mm", clicks, marks=pytest.mark.trust)
-                      for mm, clicks in ((2.5, 12), (3.25, 31), (4.5, 62)))],
-)  # fmt: skip
+    [
+        ("2.1 mm", 2),
+        *(
+            pytest.param(f"{mm} mm", clicks, marks=pytest.mark.trust)
+            for mm, clicks in ((2.5, 12), (3.25, 31), (4.5, 62))
+        ),
+    ],
+)
 def test_the_adjuster_clicks_for_every_tooth_of_wear(lining, wanted):
     made = bywire.project_life("wedge-pads", {"wear.h_new": lining, "stop.pause": "1 h"})
     clicks = made.projection.states["clicks"]
@@ -102,8 +108,12 @@ def test_two_hundred_stops_one_by_one_confirm_the_projection(tmp_path, mechanism
 
 def test_some_stops_one_by_one_confirm_the_projection(tmp_path):
     file = tmp_path / "mix.toml"
-    file.write_text(MIX.replace('t_hold = "8 s"', 't_hold = "3 s"').replace("150 km/h", "60 km/h")
-                    .replace("100 km/h", "40 km/h") + 'share = "50 %"\n')  # fmt: skip
+    file.write_text(
+        MIX.replace('t_hold = "8 s"', 't_hold = "3 s"')
+        .replace("150 km/h", "60 km/h")
+        .replace("100 km/h", "40 km/h")
+        + 'share = "50 %"\n'
+    )
     made = bywire.project_life(file, {"wear.mechanism": "none"}, check=8)
     assert abs(made.deviation("h_pad")) < 0.01
     assert abs(made.deviation("work")) < 0.01

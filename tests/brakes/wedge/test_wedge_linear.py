@@ -22,11 +22,21 @@ from bywire.plant import roller_screw
 from bywire.simulation.run import simulate
 
 FRICTIONLESS = {
-    "bearing.C_0": 0.0, "bearing.C_2": 0.0, "bearing.T_nu": 0.0, "screw.eta_f": 1.0,
-    "screw.eta_b": 1.0, "wedge_friction.mu_int": 0.0, "wedge_friction.mu_R": 0.0,
-    "flywheel.runout": 0.0, "flywheel.law": "driven", "encoder.law": "ideal",
-    "motor_1.T_cog": 0.0, "motor_2.T_cog": 0.0, "motor_1.D_M": 0.0, "motor_2.D_M": 0.0,
-}  # fmt: skip
+    "bearing.C_0": 0.0,
+    "bearing.C_2": 0.0,
+    "bearing.T_nu": 0.0,
+    "screw.eta_f": 1.0,
+    "screw.eta_b": 1.0,
+    "wedge_friction.mu_int": 0.0,
+    "wedge_friction.mu_R": 0.0,
+    "flywheel.runout": 0.0,
+    "flywheel.law": "driven",
+    "encoder.law": "ideal",
+    "motor_1.T_cog": 0.0,
+    "motor_2.T_cog": 0.0,
+    "motor_1.D_M": 0.0,
+    "motor_2.D_M": 0.0,
+}
 MECHANICAL = ("theta_1", "omega_1", "theta_2", "omega_2", "x", "v")
 
 
@@ -40,9 +50,13 @@ def mechanical(par: WedgeParameters, F_N: float = 3e3) -> LinearModel:
     """Return rotors and wedge, currents held."""
     x = travel_for(F_N, par)
     model = linearize(
-        WedgeBrake(), par, state_at(x, par), memory_at(x, par),
-        inputs=("i_1_ref", "i_2_ref"), outputs=("F_N",),
-    )  # fmt: skip
+        WedgeBrake(),
+        par,
+        state_at(x, par),
+        memory_at(x, par),
+        inputs=("i_1_ref", "i_2_ref"),
+        outputs=("F_N",),
+    )
     return model.reduced(MECHANICAL, held=True)
 
 
@@ -80,9 +94,14 @@ def test_moment_loop_of_two_sample_times_is_that_of_the_simulation() -> None:
         mode=moment_control.MOMENT, M_set=M, M_meas=M, theta_c=memory_at(x, par).theta_c
     )
     case = Case(
-        "step", WedgeBrake(), par, state_at(x, par)._replace(y_M=M), memory,
-        lambda t: {"M_set": np.full(t.shape, M)}, 0.6,
-    )  # fmt: skip
+        "step",
+        WedgeBrake(),
+        par,
+        state_at(x, par)._replace(y_M=M),
+        memory,
+        lambda t: {"M_set": np.full(t.shape, M)},
+        0.6,
+    )
     # The brake settles by itself: what is left afterwards is the operating point.
     settled = simulate(as_run(case, 20e-6))
     height = 0.5
@@ -92,9 +111,13 @@ def test_moment_loop_of_two_sample_times_is_that_of_the_simulation() -> None:
 
     run = simulate(as_run(replace(case, stimulus=stepped), 20e-6), signals=("y_M",))
     loop = closed_loop(
-        WedgeBrake(), par, state_at(x, par)._replace(y_M=M), memory,
-        inputs=("M_set",), outputs=("y_M",),
-    )  # fmt: skip
+        WedgeBrake(),
+        par,
+        state_at(x, par)._replace(y_M=M),
+        memory,
+        inputs=("M_set",),
+        outputs=("y_M",),
+    )
     assert loop.period == pytest.approx(1e-3)
     assert np.abs(loop.poles()).max() < 1.0 + 1e-9
     z, expected = np.zeros(len(loop.states)), []

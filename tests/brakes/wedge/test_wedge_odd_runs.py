@@ -47,7 +47,7 @@ SHORT = [
         )
         for k, record in enumerate(records)
     ),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("name", "options", "timing"), SHORT)

@@ -16,9 +16,12 @@ from bywire.plant import roller_screw
 
 # A current loop of the usual gains acts on the shaft like 2.5 % more inertia.
 OPEN_LOOP = FRICTIONLESS | {
-    "drive.k_p": 0.3, "drive.k_i": 7000.0, "command.mode": "current",
-    "motor_1.D_M": 0.0, "motor_2.D_M": 0.0,
-}  # fmt: skip
+    "drive.k_p": 0.3,
+    "drive.k_i": 7000.0,
+    "command.mode": "current",
+    "motor_1.D_M": 0.0,
+    "motor_2.D_M": 0.0,
+}
 UNDAMPED = OPEN_LOOP | {"heart.tau_heart": 0.0, "caliper.tau_cal": 0.0}
 MECHANICAL = ("theta_1", "omega_1", "theta_2", "omega_2", "x", "v")
 
@@ -72,15 +75,27 @@ def test_open_loop_rates(mu_B, published):
     x = travel_for(0.0, par) + depth
     state = state_at(x, par)
     state = state._replace(
-        i_1=i_1, demand_1=i_1, sensed_1=i_1, integral_1=duty * i_1,
-        i_2=i_2, demand_2=i_2, sensed_2=i_2, integral_2=duty * i_2,
-        theta_1=state.theta_1 + (ahead + apart) / k, theta_2=state.theta_2 + (ahead + apart) / k,
+        i_1=i_1,
+        demand_1=i_1,
+        sensed_1=i_1,
+        integral_1=duty * i_1,
+        i_2=i_2,
+        demand_2=i_2,
+        sensed_2=i_2,
+        integral_2=duty * i_2,
+        theta_1=state.theta_1 + (ahead + apart) / k,
+        theta_2=state.theta_2 + (ahead + apart) / k,
         x=x + apart,
-    )  # fmt: skip
+    )
     run = drive(
-        par, 0.1, 5e-6, 2e-4, state,
-        i_1_set=lambda t: i_1 + 0.0 * t, i_2_set=lambda t: i_2 + 0.0 * t,
-    )  # fmt: skip
+        par,
+        0.1,
+        5e-6,
+        2e-4,
+        state,
+        i_1_set=lambda t: i_1 + 0.0 * t,
+        i_2_set=lambda t: i_2 + 0.0 * t,
+    )
     found = rate_of(run.time, run["x"] - x, mu_B < TAN_ALPHA)
     assert found == pytest.approx(abs(slow_pole(par)), rel=2e-3)
     assert found == pytest.approx(published, rel=4e-3)

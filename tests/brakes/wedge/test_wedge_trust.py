@@ -44,9 +44,15 @@ def random_states(random, k):
     X_1, X_2 = x + random.normal(0.0, 60e-6, (2, STATES))
     V_1, V_2, v = random.normal(0.0, 0.5, (3, STATES))
     state = zeros(WedgeBrake.State)._replace(
-        theta_1=X_1 / k, theta_2=X_2 / k, omega_1=V_1 / k, omega_2=V_2 / k, x=x, v=v,
-        Omega=random.choice([-60.0, 60.0], STATES), phi=random.uniform(0.0, 6.0, STATES),
-    )  # fmt: skip
+        theta_1=X_1 / k,
+        theta_2=X_2 / k,
+        omega_1=V_1 / k,
+        omega_2=V_2 / k,
+        x=x,
+        v=v,
+        Omega=random.choice([-60.0, 60.0], STATES),
+        phi=random.uniform(0.0, 6.0, STATES),
+    )
     return WedgeBrake.State(*(one + np.zeros(STATES) for one in state))
 
 
@@ -57,8 +63,10 @@ def problem(s, p, k):
     w = s.x + t_h * s.v
     runout = p["flywheel.runout"] * (np.sin(s.phi) + t_c * s.Omega * np.cos(s.phi))
     pressed = np.sign(s.x) * (s.x + t_c * s.v) * TAN_ALPHA - p["caliper.clearance"] + runout
-    d = np.stack([w - X_1 - p["heart.g_1"], X_2 - w - p["heart.g_2"],
-                  X_1 - X_2 - p["heart.g_12"], pressed], axis=1)  # fmt: skip
+    d = np.stack(
+        [w - X_1 - p["heart.g_1"], X_2 - w - p["heart.g_2"], X_1 - X_2 - p["heart.g_12"], pressed],
+        axis=1,
+    )
     screw, wedge = 1.0 / p["heart.K_S"], 1.0 / p["heart.K_W"]
     C = np.zeros((STATES, 4, 4))
     C[:, 0, 0] = C[:, 1, 1] = screw + wedge

@@ -19,8 +19,15 @@ TRUE = {"friction.C": 0.0304, "friction.G": 1.17e-5, "rotor.D": 3.95e-4}
 def test_list_shows_what_it_brings(command: Any) -> None:
     code, out, _ = command("list", "emb-caliper")
     assert code == 0
-    for name in ("emb42v-modified", "slow-strokes", "clamp-force", "emb-plant", "friction-strokes",
-                 "screw-lead", "F_cl"):  # fmt: skip
+    for name in (
+        "emb42v-modified",
+        "slow-strokes",
+        "clamp-force",
+        "emb-plant",
+        "friction-strokes",
+        "screw-lead",
+        "F_cl",
+    ):
         assert name in out, name
 
 
@@ -74,9 +81,11 @@ def test_linearize_and_margins(command: Any) -> None:
 @pytest.mark.parametrize(
     "loop",
     # The others lie within it.
-    ["clamp-force", *(pytest.param(one, marks=pytest.mark.trust)
-                      for one in ("motor-speed", "motor-current"))],
-)  # fmt: skip
+    [
+        "clamp-force",
+        *(pytest.param(one, marks=pytest.mark.trust) for one in ("motor-speed", "motor-current")),
+    ],
+)
 def test_loops_agree_with_their_linear_models(loop: str, caliper: Path) -> None:
     found = toolkit.agreement(loop, parameters="emb42v")
     assert found.holds
@@ -86,9 +95,16 @@ def test_loops_agree_with_their_linear_models(loop: str, caliper: Path) -> None:
 def test_design_meets_what_is_required_from_low_to_high_force(command: Any) -> None:
     with few_starts():
         code, out, err = command(
-            "design", "clamp-force", "--linear-only", "--require", "bandwidth >= 5 Hz",
-            "--require", "phase margin >= 60 deg", "--over", "at=2 kN:30 kN:2",
-        )  # fmt: skip
+            "design",
+            "clamp-force",
+            "--linear-only",
+            "--require",
+            "bandwidth >= 5 Hz",
+            "--require",
+            "phase margin >= 60 deg",
+            "--over",
+            "at=2 kN:30 kN:2",
+        )
     assert code == 0, err
     assert "linear design met" in out
 
@@ -100,8 +116,9 @@ def test_identification_recovers_the_friction_within_its_intervals(
     data = method.synthetic(par, method.defaults, 3)
     from bywire.identification.method import Effort
 
-    start = par.replace({"friction.C": 0.02, "friction.G": 2e-5, "rotor.D": 1e-3,
-                         "friction.T_s": 0.05})  # fmt: skip
+    start = par.replace(
+        {"friction.C": 0.02, "friction.G": 2e-5, "rotor.D": 1e-3, "friction.T_s": 0.05}
+    )
     found = method.identify(data, start, method.defaults, Effort())
     (best,) = found.estimates.values()
     for name, value, (low, high) in zip(best.names, best.values, best.intervals(0.99), strict=True):
@@ -157,8 +174,15 @@ def test_check_finds_nothing_broken(caliper: Path) -> None:
 def test_energies_of_a_brake_of_ones_own_have_colors_of_their_own() -> None:
     from bywire.report.energy_balance import COLORS, _colors
 
-    sinks = ("E_supply", "E_copper_moving", "E_copper_holding", "E_viscous", "E_friction",
-             "E_caliper", "E_stored")  # fmt: skip
+    sinks = (
+        "E_supply",
+        "E_copper_moving",
+        "E_copper_holding",
+        "E_viscous",
+        "E_friction",
+        "E_caliper",
+        "E_stored",
+    )
     colors = _colors(sinks)
     assert len(set(colors.values())) == len(sinks)
     assert colors["E_copper_moving"] == COLORS["E_copper_moving"]

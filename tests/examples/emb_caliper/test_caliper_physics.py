@@ -80,8 +80,7 @@ def test_steps_converge_with_the_second_order(emb: Any, par: Any) -> None:
     case = emb("case").case_from_rest(
         smooth, "voltage", F, lambda t: {"v_set": np.full(t.shape, 1.3 * hold)}, 0.2
     )
-    ends = [toolkit.simulate(as_run(case, h))["F_cl"][-1]
-            for h in (200e-6, 100e-6, 50e-6)]  # fmt: skip
+    ends = [toolkit.simulate(as_run(case, h))["F_cl"][-1] for h in (200e-6, 100e-6, 50e-6)]
     assert ends[-1] > F + 1e3
     order = np.log2((ends[0] - ends[1]) / (ends[1] - ends[2]))
     assert order == pytest.approx(2.0, abs=0.15)
@@ -96,8 +95,9 @@ def test_caliper_is_the_cubic_that_is_passed_on(emb: Any, par: Any) -> None:
         assert 1e-3 * caliper.elastic(n, par.caliper) == pytest.approx(told, abs=1e-9)
     assert caliper.stiffness(1e-3, par.caliper) == pytest.approx(
         (caliper.elastic(1e-3 + 1e-9, par.caliper) - caliper.elastic(1e-3 - 1e-9, par.caliper))
-        / 2e-9, rel=1e-6,
-    )  # fmt: skip
+        / 2e-9,
+        rel=1e-6,
+    )
 
 
 def test_travel_per_angle_is_what_is_passed_on(emb: Any, par: Any) -> None:

@@ -19,21 +19,27 @@ from bywire.export.controller.vectors import Vectors
 STRUCTURES: dict[str, tuple[str, str, dict[str, Any]]] = {
     "pressure, sine dither": ("hard-braking", "dardanelli2010", {}),
     "filter before the dither": (
-        "hard-braking", "dardanelli2010",
+        "hard-braking",
+        "dardanelli2010",
         {"ecu.filter.place": "before-dither", "ecu.dither.waveform": "triangle"},
     ),
     "gains that differ by region": (
-        "hard-braking", "dardanelli2010-scheduled", {"ecu.dither.waveform": "square"},
+        "hard-braking",
+        "dardanelli2010-scheduled",
+        {"ecu.dither.waveform": "square"},
     ),
     "ideal converter": (
-        "hard-braking", "dardanelli2010", {"adc.law": "ideal", "ecu.dither.waveform": "off"},
+        "hard-braking",
+        "dardanelli2010",
+        {"adc.law": "ideal", "ecu.dither.waveform": "off"},
     ),
     "pedal": ("pedal-tracking", "dardanelli2010", {}),
     "current": ("friction-ramp", "dardanelli2010", {}),
     "current loop alone": ("current-step", "dardanelli2010", {}),
     "moment and position": ("moment-pulses", "roberts2003", {}),
     "offset by the actuation force": (
-        "moment-pulses", "roberts2003",
+        "moment-pulses",
+        "roberts2003",
         {"control.offset.law": "scheduled", "encoder.law": "ideal"},
     ),
     "position of two screws": ("position-step", "roberts2003", {}),
@@ -41,16 +47,23 @@ STRUCTURES: dict[str, tuple[str, str, dict[str, Any]]] = {
     "slip by rules": ("straight-stop", "sport600", {"ecu.abs": "rules"}),
     "slip by PI": ("straight-stop", "sport600", {"ecu.abs": "pi"}),
     "mixed slip, fixed gain": (
-        "straight-stop", "sport600",
-        {"ecu.abs": "pi", "ecu.mix.alpha": 0.5, "ecu.front_slip.schedule": "fixed",
-         "ecu.vehicle_speed.law": "accelerometer", "ecu.wheel_speed.law": "difference"},
+        "straight-stop",
+        "sport600",
+        {
+            "ecu.abs": "pi",
+            "ecu.mix.alpha": 0.5,
+            "ecu.front_slip.schedule": "fixed",
+            "ecu.vehicle_speed.law": "accelerometer",
+            "ecu.wheel_speed.law": "difference",
+        },
     ),
     "known speeds, no lift control": (
-        "straight-stop", "sport600",
+        "straight-stop",
+        "sport600",
         {"ecu.sees": "known", "ecu.lift": "off", "ecu.front_slip.eager": 10.0},
     ),
     "slip over a moment, in a hurry": ("corner-panic", "roberts2003-corner", {}),
-}  # fmt: skip
+}
 """structural choices of all brakes: experiment, parameter set, overrides"""
 
 BRAKES = ("pressure, sine dither", "moment and position", "slip by rules")
@@ -92,7 +105,9 @@ def build(folder: Path, *flags: str, name: str = "harness") -> Built:
     target = folder / name
     done = subprocess.run(
         ["gcc", *(flags or FLAGS), *sorted(map(str, folder.glob("*.c"))), "-o", str(target), "-lm"],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     return Built(folder, target, done.stderr)

@@ -30,9 +30,20 @@ def test_another_reader_decodes_what_the_ecu_sends(precision: str, tmp_path: Pat
     signals = signals_of(program.model.Memory)
     library = str(tmp_path / "can.so")
     said = subprocess.run(
-        ["gcc", *FLAGS, *WARNINGS, "-shared", "-fPIC", str(tmp_path / f"{name}_can.c"), "-o",
-         library], capture_output=True, text=True, check=True,
-    ).stderr  # fmt: skip
+        [
+            "gcc",
+            *FLAGS,
+            *WARNINGS,
+            "-shared",
+            "-fPIC",
+            str(tmp_path / f"{name}_can.c"),
+            "-o",
+            library,
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stderr
     assert said == ""
     fill = getattr(ctypes.CDLL(library), f"{name}_can_fill")
     real = ctypes.c_float if precision == "single" else ctypes.c_double
@@ -44,8 +55,10 @@ def test_another_reader_decodes_what_the_ecu_sends(precision: str, tmp_path: Pat
     values[1:4] = list(missing.values())
 
     class Memory(ctypes.Structure):
-        _fields_ = [("numbers", real * len(fields)),
-                    ("statuses", ctypes.c_uint32 * len(program.steps))]  # fmt: skip
+        _fields_ = [
+            ("numbers", real * len(fields)),
+            ("statuses", ctypes.c_uint32 * len(program.steps)),
+        ]
 
     memory = Memory((real * len(fields))(*values), (1, 2))
     data = (ctypes.c_uint8 * 8)()

@@ -25,9 +25,7 @@ needs_targets = pytest.mark.skipif(bool(missing_tools()), reason=missing_tools()
 
 
 @needs_targets
-@pytest.mark.parametrize(
-    "structure", [BRAKES[0], pytest.param(BRAKES[1], marks=pytest.mark.trust)]
-)
+@pytest.mark.parametrize("structure", [BRAKES[0], pytest.param(BRAKES[1], marks=pytest.mark.trust)])
 def test_processors_agree_in_every_bit_and_goals_are_met(structure: str, tmp_path: Path) -> None:
     made = export_controller(bench_of(structure), tmp_path, vectors=60, check=True)
     check = made.check
@@ -68,9 +66,12 @@ def test_other_bits_do_not_hold() -> None:
     assert check.holds
     row = check.table().table.rows[1]
     assert [(cell.text, cell.verdict) for cell in row[4:]] == [
-        ("the same", "good"), ("2000 (<= 2048)", "good"), ("64 (<= 128)", "good"),
-        ("64 (<= 128)", "good"), ("401 (> 400)", "bad"),
-    ]  # fmt: skip
+        ("the same", "good"),
+        ("2000 (<= 2048)", "good"),
+        ("64 (<= 128)", "good"),
+        ("64 (<= 128)", "good"),
+        ("401 (> 400)", "bad"),
+    ]
     assert not replace(check, trials=(first, replace(same, bits=18))).holds
     assert replace(check, trials=(first, replace(same, bits=18)), inexact=("single",)).holds
     assert not replace(check, trials=(first, replace(same, differing=1))).holds

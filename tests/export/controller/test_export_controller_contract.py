@@ -215,5 +215,6 @@ def test_ranges_and_limits_are_read_beside_signals() -> None:
 
     assert ranges_of(Stimulus) == {"power_off": (0.0, 1.0)}
     assert {n: each.by for n, each in limits_of(Memory).items()} == {
-        "i_1_ref": "control.position.i_max", "i_2_ref": "control.position.i_max",
-    }  # fmt: skip
+        "i_1_ref": "control.position.i_max",
+        "i_2_ref": "control.position.i_max",
+    }

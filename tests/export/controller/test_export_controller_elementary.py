@@ -44,9 +44,11 @@ class Parameters(ParameterSet):
 def bounded(m: Memory) -> Memory:
     """Return the memory with functions that both precisions have."""
     return m._replace(
-        exp=ops.exp(20.0 * m.a), sine=ops.sin(3.0 * m.a), cosine=ops.cos(4000.0 * m.a),
+        exp=ops.exp(20.0 * m.a),
+        sine=ops.sin(3.0 * m.a),
+        cosine=ops.cos(4000.0 * m.a),
         floor=ops.floor(7.0 * m.a),
-    )  # fmt: skip
+    )
 
 
 def tick(x: Nothing, m: Memory, u: Nothing, par: Parameters) -> Memory:
@@ -60,9 +62,12 @@ def tick(x: Nothing, m: Memory, u: Nothing, par: Parameters) -> Memory:
 def test_all_functions_equal_python(precision: str, tmp_path: Path) -> None:
     law = tick if precision == "double" else (lambda x, m, u, par: bounded(m))
     model: Any = SimpleNamespace(
-        name="functions", State=Nothing, Stimulus=Nothing, Memory=Memory,
+        name="functions",
+        State=Nothing,
+        Stimulus=Nothing,
+        Memory=Memory,
         tasks=lambda par: [Task("only", 0.001, law)],
-    )  # fmt: skip
+    )
     made, start = program(model, Parameters(), precision), Memory(*[0.5] * 7)
     assert {each.rstrip("f") for each in made.libraries} == {"fabs"}
     for name, text in files(made, start, {}, vectors(made, start, 1000)).items():

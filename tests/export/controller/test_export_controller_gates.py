@@ -44,9 +44,12 @@ def test_vectors_run_every_line(structure: str, tmp_path: Path) -> None:
     name = made.program.name
     for part in ("ecu", "io"):
         said = subprocess.run(
-            ["gcov", f"harness-{name}_{part}.gcda"], cwd=tmp_path, capture_output=True, text=True,
+            ["gcov", f"harness-{name}_{part}.gcda"],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
             check=True,
-        ).stdout  # fmt: skip
+        ).stdout
         (share,) = re.findall(rf"File '.*{name}_{part}\.c'\nLines executed:([0-9.]+)%", said)
         assert float(share) == 100.0
 
@@ -54,12 +57,19 @@ def test_vectors_run_every_line(structure: str, tmp_path: Path) -> None:
 @needs_compiler
 @pytest.mark.parametrize(
     ("structure", "count"),
-    [("moment and position", SOME), *(
-        pytest.param(each, MUTANTS, marks=pytest.mark.trust)
-        for each in ("moment and position", "gains that differ by region", "slip by PI",
-                     "slip by rules")
-    )],
-)  # fmt: skip
+    [
+        ("moment and position", SOME),
+        *(
+            pytest.param(each, MUTANTS, marks=pytest.mark.trust)
+            for each in (
+                "moment and position",
+                "gains that differ by region",
+                "slip by PI",
+                "slip by rules",
+            )
+        ),
+    ],
+)
 def test_vectors_kill_mutants(structure: str, count: int, tmp_path: Path) -> None:
     vectors = 2000 if count == MUTANTS else 600
     name = export_controller(bench_of(structure), tmp_path, vectors=vectors).program.name
@@ -91,9 +101,15 @@ def mutants(source: str, count: int) -> list[str]:
     """
     bodies = source.index("\nstatic ", source.rindex("typedef"))
     changes = {
-        " + ": " - ", " - ": " + ", " * ": " / ", " / ": " * ", " < ": " <= ", " > ": " >= ",
-        " <= ": " < ", " >= ": " > ",
-    }  # fmt: skip
+        " + ": " - ",
+        " - ": " + ",
+        " * ": " / ",
+        " / ": " * ",
+        " < ": " <= ",
+        " > ": " >= ",
+        " <= ": " < ",
+        " >= ": " > ",
+    }
     text = re.sub(r"/\*.*?\*/", lambda m: " " * len(m.group()), source, flags=re.DOTALL)
     sign = "|".join(map(re.escape, changes))
     places = [m for m in re.finditer(rf"{sign}|\b\d+\.\d+", text) if m.start() > bodies]
@@ -135,9 +151,17 @@ def test_single_fits_a_small_target(tmp_path: Path) -> None:
     for part in ("ecu", "io", "parameters"):
         compiled = str(tmp_path / f"{part}.o")
         subprocess.run(
-            ["arm-none-eabi-gcc", *SMALL_FLAGS, *target, "-c",
-             str(tmp_path / f"{name}_{part}.c"), "-o", compiled], check=True,
-        )  # fmt: skip
+            [
+                "arm-none-eabi-gcc",
+                *SMALL_FLAGS,
+                *target,
+                "-c",
+                str(tmp_path / f"{name}_{part}.c"),
+                "-o",
+                compiled,
+            ],
+            check=True,
+        )
         said = subprocess.run(
             ["arm-none-eabi-size", compiled], capture_output=True, text=True, check=True
         ).stdout
@@ -173,8 +197,10 @@ def test_misra_finds_nothing_that_is_required(
         subprocess.run(["cppcheck", "--dump", "--std=c99", "-q", str(source)], check=True)
         said = subprocess.run(
             [sys.executable, str(ADDON), "--no-summary", f"{source}.dump"],
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         for line in (said.stdout + said.stderr).splitlines():
             rule = re.search(r"misra-c2012-([0-9.]+)", line)
             if rule is not None:

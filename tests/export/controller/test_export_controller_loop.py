@@ -34,9 +34,11 @@ def in_python(run: Run) -> Array:
     model, engine, request = run.model, prepare(run.model, run.par).engine(), request_for(run)
     schedule, layout = request.schedule, engine.layout
     aside = replace(
-        schedule, frames=NEVER, record_frames=NEVER,
+        schedule,
+        frames=NEVER,
+        record_frames=NEVER,
         task_frames=tuple(NEVER for _ in schedule.task_frames),
-    )  # fmt: skip
+    )
     plant = replace(request, schedule=aside)
     vector = initial_vector(layout, run.state, run.memory)
     x = slice(layout.start["x"], layout.start["x"] + layout.length["x"])
@@ -105,11 +107,14 @@ def test_faults_pass_through_the_ecu() -> None:
     changes = {"options.duration": "0.4 s"}
     looped, plain = (
         bywire.run(
-            "hard-braking", changes, faults=["pressure.stuck=20 bar@0.2 s"], engine=engine,
+            "hard-braking",
+            changes,
+            faults=["pressure.stuck=20 bar@0.2 s"],
+            engine=engine,
             estimate_error=False,
         ).recording
         for engine in ("sil", "auto")
-    )  # fmt: skip
+    )
     assert float(plain["p_meas"][-1]) == pytest.approx(20e5, rel=1e-3)
     assert_array_equal(looped["p_meas"], plain["p_meas"])
 

@@ -82,5 +82,3 @@ def test_memory_is_never_handed_on_by_value(structure: str, tmp_path: Path) -> N
     text = (tmp_path / f"{name}_ecu.c").read_text()
     assert f"{name}_Memory *m" in text
     assert text.count(f"{name}_Memory") == text.count(f"{name}_Memory *")
-
-

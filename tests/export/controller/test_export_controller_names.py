@@ -45,25 +45,36 @@ def main(names: list[str], exports: dict[str, Any]) -> str:
     lines.append("int main(void)\n{")
     for name in names:
         steps = exports[name].program.steps
-        lines += [f"    {name}_instance_init();", f"    {name}_Plant {name}_x;",
-                  f"    {name}_Stimulus {name}_u;",
-                  f"    memset(&{name}_x, 0, sizeof {name}_x);",
-                  f"    memset(&{name}_u, 0, sizeof {name}_u);",
-                  f"    for (int k = 0; k < {TICKS}; ++k) {{"]  # fmt: skip
+        lines += [
+            f"    {name}_instance_init();",
+            f"    {name}_Plant {name}_x;",
+            f"    {name}_Stimulus {name}_u;",
+            f"    memset(&{name}_x, 0, sizeof {name}_x);",
+            f"    memset(&{name}_u, 0, sizeof {name}_u);",
+            f"    for (int k = 0; k < {TICKS}; ++k) {{",
+        ]
         for step in steps:
-            given = {"memory": f"&{name}_memory", "par": f"&{name}_active", "x": f"&{name}_x",
-                     "u": f"&{name}_u"}  # fmt: skip
+            given = {
+                "memory": f"&{name}_memory",
+                "par": f"&{name}_active",
+                "x": f"&{name}_x",
+                "u": f"&{name}_u",
+            }
             call = ", ".join(given[short] for _, short in step.arguments)
             lines.append(f"        {step.name}({call});")
-        lines += ["    }", "    {", "        uint32_t bits = 2166136261u;",
-                  "        unsigned char data[8];",
-                  f"        const unsigned char *bytes = (const unsigned char *)&{name}_memory;",
-                  f"        for (unsigned k = 0; k < sizeof {name}_memory; ++k)",
-                  "            bits = (bits ^ bytes[k]) * 16777619u;",
-                  f"        {name}_can_fill(0u, &{name}_memory, data);",
-                  f'        printf("{name} %08lx %02x%02x\\n", (unsigned long)bits, data[0],',
-                  f"            data[1] + ({name}_instance_apply() == 0u ? 0 : 256));",
-                  "    }"]  # fmt: skip
+        lines += [
+            "    }",
+            "    {",
+            "        uint32_t bits = 2166136261u;",
+            "        unsigned char data[8];",
+            f"        const unsigned char *bytes = (const unsigned char *)&{name}_memory;",
+            f"        for (unsigned k = 0; k < sizeof {name}_memory; ++k)",
+            "            bits = (bits ^ bytes[k]) * 16777619u;",
+            f"        {name}_can_fill(0u, &{name}_memory, data);",
+            f'        printf("{name} %08lx %02x%02x\\n", (unsigned long)bits, data[0],',
+            f"            data[1] + ({name}_instance_apply() == 0u ? 0 : 256));",
+            "    }",
+        ]
     return "\n".join([*lines, "    return 0;", "}", ""])
 
 
@@ -75,8 +86,10 @@ def said(names: list[str], exports: dict[str, Any], scratch: Path, compiler: str
         for part in PARTS:
             objects.append(str(scratch / f"{name}_{part}.o"))
             source = str(exports[name].folder / f"{name}_{part}.c")
-            subprocess.run(["gcc", *FLAGS, *WARNINGS, "-Werror", "-g", "-c", source, "-o",
-                            objects[-1]], check=True)  # fmt: skip
+            subprocess.run(
+                ["gcc", *FLAGS, *WARNINGS, "-Werror", "-g", "-c", source, "-o", objects[-1]],
+                check=True,
+            )
     source = scratch / ("main.c" if compiler == "gcc" else "main.cpp")
     source.write_text(main(names, exports))
     standard = ["-std=c99"] if compiler == "gcc" else ["-std=c++11", "-Wall", "-Wextra", "-Werror"]
@@ -91,9 +104,14 @@ def said(names: list[str], exports: dict[str, Any], scratch: Path, compiler: str
 @needs_compiler
 @pytest.mark.parametrize(
     "compiler",
-    ["gcc", pytest.param("g++", marks=pytest.mark.skipif(
-        shutil.which("g++") is None, reason="g++ is not installed"))],
-)  # fmt: skip
+    [
+        "gcc",
+        pytest.param(
+            "g++",
+            marks=pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed"),
+        ),
+    ],
+)
 def test_ecus_and_precisions_link_into_one_program(
     compiler: str, exports: dict[str, Any], tmp_path: Path
 ) -> None:
@@ -136,7 +154,8 @@ def test_out_of_range_calibration_is_not_taken_over(
 ) -> None:
     folder = exports["front"].folder
     source = tmp_path / "main.c"
-    source.write_text("""#include <math.h>
+    source.write_text(
+        """#include <math.h>
 #include <stdio.h>
 #include "front_instance.h"
 int main(void)
@@ -154,11 +173,13 @@ int main(void)
            front_active.ecu.filter.angle);
     return 0;
 }
-""".replace("\\\\n", "\\n"))
+""".replace("\\\\n", "\\n")
+    )
     made = str(tmp_path / "program")
     sources = [str(folder / f"front_{part}.c") for part in ("ecu", "io", "parameters", "instance")]
-    subprocess.run(["gcc", *FLAGS, f"-I{folder}", str(source), *sources, "-o", made, "-lm"],
-                   check=True)  # fmt: skip
+    subprocess.run(
+        ["gcc", *FLAGS, f"-I{folder}", str(source), *sources, "-o", made, "-lm"], check=True
+    )
     done = subprocess.run([made], capture_output=True, text=True, check=True).stdout
     assert done == f"2 1 0 0.25 {3.141592653589793 * 50.0 * 1e-3:g}\n"
 
@@ -166,11 +187,16 @@ int main(void)
 @pytest.mark.parametrize(
     ("name", "fault"),
     [
-        ("int", "is a word that C"), ("class", "is a word that C"), ("2nd", "is not an identifier"),
-        ("a b", "is not an identifier"), ("_a", "is not an identifier"), ("é", "is not an ident"),
-        ("a" * 61, "has 61 characters, and 60 are the most"), ("../x", "is not an identifier"),
+        ("int", "is a word that C"),
+        ("class", "is a word that C"),
+        ("2nd", "is not an identifier"),
+        ("a b", "is not an identifier"),
+        ("_a", "is not an identifier"),
+        ("é", "is not an ident"),
+        ("a" * 61, "has 61 characters, and 60 are the most"),
+        ("../x", "is not an identifier"),
     ],
-)  # fmt: skip
+)
 def test_a_name_that_c_cannot_use_is_refused(name: str, fault: str, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=fault):
         export_controller("hard-braking", tmp_path / "out", name=name)

@@ -22,9 +22,11 @@ class Client:
             extract(str(path), unzipdir=str(folder))
         self.folder = folder
         self.fmu = FMU2Slave(
-            guid=self.description.guid, unzipDirectory=str(folder), instanceName="test",
+            guid=self.description.guid,
+            unzipDirectory=str(folder),
+            instanceName="test",
             modelIdentifier=self.description.coSimulation.modelIdentifier,
-        )  # fmt: skip
+        )
         self.fmu.instantiate(loggingOn=True)
         self.fmu.setupExperiment(startTime=start, stopTime=stop)
         self.fmu.enterInitializationMode()

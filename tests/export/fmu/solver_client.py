@@ -24,9 +24,11 @@ class SolverClient:
         if not (folder / "modelDescription.xml").exists():
             extract(str(path), unzipdir=str(folder))
         self.fmu = FMU2Model(
-            guid=self.description.guid, unzipDirectory=str(folder), instanceName="test",
+            guid=self.description.guid,
+            unzipDirectory=str(folder),
+            instanceName="test",
             modelIdentifier=self.description.modelExchange.modelIdentifier,
-        )  # fmt: skip
+        )
         self.fmu.instantiate(loggingOn=True)
         self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
@@ -84,8 +86,9 @@ class SolverClient:
         nominals = self._filled(self.fmu.getNominalsOfContinuousStates, self.count)
         while end - self.time > close:
             states = self._filled(self.fmu.getContinuousStates, self.count)
-            solver = Radau(self._derivatives, self.time, states, end, rtol=tolerance,
-                           atol=tolerance * nominals)  # fmt: skip
+            solver = Radau(
+                self._derivatives, self.time, states, end, rtol=tolerance, atol=tolerance * nominals
+            )
             is_due = False
             while solver.status == "running" and not is_due:
                 solver.step()

@@ -17,17 +17,29 @@ from bywire.export.fmu import binaries
 from export.fmu.clients import Client
 
 MOTORCYCLE = bywire.Bench(
-    "hard-braking", "dardanelli2010", options={"settle": 0.04, "duration": 0.1},
+    "hard-braking",
+    "dardanelli2010",
+    options={"settle": 0.04, "duration": 0.1},
     name="short stop",
-)  # fmt: skip
-WEDGE = bywire.Bench("moment-pulses", "roberts2003", options={
-    "t_hold": "60 ms", "pulses": 1, "t_low": "20 ms", "t_high": "20 ms", "settle": "20 ms",
-})  # fmt: skip
+)
+WEDGE = bywire.Bench(
+    "moment-pulses",
+    "roberts2003",
+    options={
+        "t_hold": "60 ms",
+        "pulses": 1,
+        "t_low": "20 ms",
+        "t_high": "20 ms",
+        "settle": "20 ms",
+    },
+)
 
 SLIP = bywire.Bench(
-    "straight-stop", "sport600", {"ecu.front_slip.eager": 10.0},
+    "straight-stop",
+    "sport600",
+    {"ecu.front_slip.eager": 10.0},
     options={"v_0": "6 m/s", "duration": "1 s"},
-)  # fmt: skip
+)
 
 
 @pytest.fixture(scope="module")
@@ -212,9 +224,7 @@ def test_a_coupled_run_from_any_start_time_is_the_run_from_zero(
     parts: list[ExportedFmu], start: float
 ) -> None:
     def coupled(begin: float) -> list[list[float]]:
-        plant, ecu = (
-            Client(each.path, each.path.with_suffix(""), begin).begin() for each in parts
-        )
+        plant, ecu = (Client(each.path, each.path.with_suffix(""), begin).begin() for each in parts)
         demand, rows = ecu.reference()["p_set"], list[list[float]]()
         readings = [name for name in ecu.of("input") if name in plant.of("output")]
         held = plant.of("input")

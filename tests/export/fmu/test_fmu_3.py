@@ -28,9 +28,13 @@ class Client:
     """One instance of an FMU of version 3.0."""
 
     def __init__(
-        self, path: Path, *, has_events: bool = False, may_return_early: bool = False,
+        self,
+        path: Path,
+        *,
+        has_events: bool = False,
+        may_return_early: bool = False,
         start: float = 0.0,
-    ):  # fmt: skip
+    ):
         folder = path.with_suffix("")
         if not folder.exists():
             extract(str(path), unzipdir=str(folder))
@@ -41,9 +45,11 @@ class Client:
             int(c.get("valueReference")): float(c.get("intervalDecimal")) for c in clocks
         }
         self.fmu = FMU3Slave(
-            guid=self.description.guid, unzipDirectory=str(folder), instanceName="test",
+            guid=self.description.guid,
+            unzipDirectory=str(folder),
+            instanceName="test",
             modelIdentifier=self.description.coSimulation.modelIdentifier,
-        )  # fmt: skip
+        )
         self.fmu.instantiate(
             loggingOn=True, eventModeUsed=has_events, earlyReturnAllowed=may_return_early
         )
@@ -57,8 +63,9 @@ class Client:
 
     def drive(self, row: int) -> None:
         names = self.of("input")
-        self.fmu.setFloat64([self.references[n] for n in names],
-                            [self.reference[n][row] for n in names])  # fmt: skip
+        self.fmu.setFloat64(
+            [self.references[n] for n in names], [self.reference[n][row] for n in names]
+        )
 
     def values(self, names: list[str]) -> list[float]:
         return list(self.fmu.getFloat64([self.references[n] for n in names]))
@@ -155,8 +162,12 @@ def test_a_tick_is_never_left_out(path: Path, capfd: pytest.CaptureFixture[str])
 
 def test_tables_are_arrays(tmp_path: Path) -> None:
     curve = {"caliper.p_table": (0.0, 1e5, 5e5, 60e5), "caliper.V_table": (0.0, 1e-8, 3e-8, 2e-7)}
-    bench = bywire.Bench("hard-braking", "dardanelli2010", {"caliper.law": "table", **curve},
-                         {"settle": 0.04, "duration": 0.1})  # fmt: skip
+    bench = bywire.Bench(
+        "hard-braking",
+        "dardanelli2010",
+        {"caliper.law": "table", **curve},
+        {"settle": 0.04, "duration": 0.1},
+    )
     path = export_fmu(bench, tmp_path, fmi=3).path
     assert validate_fmu(str(path)) == []
     client = Client(path)

@@ -19,11 +19,19 @@ from systems.loading import loaded
 CALIPER = Path(__file__).parents[3] / "examples" / "emb_caliper"
 BENCHES = {
     "motorcycle": SHORT_STOP,
-    "wedge": bywire.Bench("moment-pulses", "roberts2003", options={
-        "t_hold": "60 ms", "pulses": 1, "t_low": "20 ms", "t_high": "20 ms", "settle": "20 ms",
-    }),
+    "wedge": bywire.Bench(
+        "moment-pulses",
+        "roberts2003",
+        options={
+            "t_hold": "60 ms",
+            "pulses": 1,
+            "t_low": "20 ms",
+            "t_high": "20 ms",
+            "settle": "20 ms",
+        },
+    ),
     "caliper": None,  # loaded when it is its turn
-}  # fmt: skip
+}
 
 
 def _has_fmusim() -> bool:
@@ -70,11 +78,25 @@ class Unit:
             rows.writerows([row["time"], *(row[n] for n in self.inputs)] for row in self.reference)
         asked = [each for name in of for each in ("--output-variable", name)]
         subprocess.run(
-            ["fmusim", *options, "--stop-time", repr(float(self.reference["time"][-1])),
-             "--output-interval", repr(TICK), "--input-file", "in.csv", "--output-file", "out.csv",
-             *asked, str(self.path)],
-            cwd=self.folder, check=True, capture_output=True, timeout=120,
-        )  # fmt: skip
+            [
+                "fmusim",
+                *options,
+                "--stop-time",
+                repr(float(self.reference["time"][-1])),
+                "--output-interval",
+                repr(TICK),
+                "--input-file",
+                "in.csv",
+                "--output-file",
+                "out.csv",
+                *asked,
+                str(self.path),
+            ],
+            cwd=self.folder,
+            check=True,
+            capture_output=True,
+            timeout=120,
+        )
         return np.genfromtxt(
             self.folder / "out.csv", delimiter=",", names=True, deletechars="", replace_space=" "
         )

@@ -21,17 +21,30 @@ TICK = 1e-3
 MODES = ["mode.omega", "mode.p_mc", "mode.contact_1", "mode.changes"]
 # Pressure builds up, the piston sticks, is thrown back to its end stop, and touches it again.
 THROWN = bywire.Bench(
-    "motor-open-loop", "dardanelli2010",
+    "motor-open-loop",
+    "dardanelli2010",
     options={"settle": 0.02, "duration": 0.12, "source": "voltage"},
-    stimulus={"kind": "table", "times": [0.0, 0.025, 0.04, 0.08],
-              "values": [6.0, 0.6, -7.2, -2.4], "between": "hold"},
-)  # fmt: skip
+    stimulus={
+        "kind": "table",
+        "times": [0.0, 0.025, 0.04, 0.08],
+        "values": [6.0, 0.6, -7.2, -2.4],
+        "between": "hold",
+    },
+)
 SHORT_STOP = bywire.Bench(
     "hard-braking", "dardanelli2010", options={"settle": 0.04, "duration": 0.2}, name="short stop"
 )
-PULSE = bywire.Bench("moment-pulses", "roberts2003", options={
-    "t_hold": "60 ms", "pulses": 1, "t_low": "20 ms", "t_high": "20 ms", "settle": "20 ms",
-})  # fmt: skip
+PULSE = bywire.Bench(
+    "moment-pulses",
+    "roberts2003",
+    options={
+        "t_hold": "60 ms",
+        "pulses": 1,
+        "t_low": "20 ms",
+        "t_high": "20 ms",
+        "settle": "20 ms",
+    },
+)
 
 
 def reference(made: ExportedFmu) -> np.ndarray:
@@ -50,9 +63,14 @@ def solved(
     for name, values in inputs.items():
         table[name] = values
     rows = simulate_fmu(
-        str(path), stop_time=count * TICK, input=table, output=names, output_interval=TICK,
-        relative_tolerance=tolerance, record_events=False,
-    )  # fmt: skip
+        str(path),
+        stop_time=count * TICK,
+        input=table,
+        output=names,
+        output_interval=TICK,
+        relative_tolerance=tolerance,
+        record_events=False,
+    )
     return np.column_stack([rows[name] for name in names])
 
 
@@ -64,10 +82,15 @@ def thrown(tmp_path_factory: pytest.TempPathFactory) -> ExportedFmu:
 def test_a_solver_may_start_at_any_time(thrown: ExportedFmu) -> None:
     def pressure(start: float) -> np.ndarray:
         rows = simulate_fmu(
-            str(thrown.path), start_time=start, stop_time=start + 0.03, output=["time", "p_mc"],
-            output_interval=TICK, relative_tolerance=1e-7, record_events=False,
+            str(thrown.path),
+            start_time=start,
+            stop_time=start + 0.03,
+            output=["time", "p_mc"],
+            output_interval=TICK,
+            relative_tolerance=1e-7,
+            record_events=False,
             start_values={"v_source": 6.0},
-        )  # fmt: skip
+        )
         np.testing.assert_allclose(rows["time"], start + TICK * np.arange(31), rtol=1e-12)
         return rows["p_mc"]
 

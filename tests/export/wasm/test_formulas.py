@@ -35,16 +35,30 @@ const left = made.map((each, k) => (k === loop ? each(turns) : each()) ?? null);
 console.log(JSON.stringify({ area: [...working], left }));
 """
 AS_PYTHON: dict[str, Any] = {
-    "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b,
-    "neg": lambda a: -a, "inv": lambda a: 1.0 / a, "fabs": abs, "sqrt": math.sqrt,
-    "floor": np.floor, "ceil": np.ceil, "copysign": math.copysign,
-    "fmax": lambda a, b: a if a > b else b, "fmin": lambda a, b: a if a < b else b,
-    "lt": lambda a, b: a < b, "le": lambda a, b: a <= b, "eq": lambda a, b: a == b,
-    "ne": lambda a, b: a != b, "not": lambda a: not a, "and": lambda a, b: bool(a and b),
-    "or": lambda a, b: bool(a or b), "if_else_zero": lambda c, a: a if c else 0.0,
-    "select": lambda c, a, b: a if c else b, "pow": math.pow,
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "neg": lambda a: -a,
+    "inv": lambda a: 1.0 / a,
+    "fabs": abs,
+    "sqrt": math.sqrt,
+    "floor": np.floor,
+    "ceil": np.ceil,
+    "copysign": math.copysign,
+    "fmax": lambda a, b: a if a > b else b,
+    "fmin": lambda a, b: a if a < b else b,
+    "lt": lambda a, b: a < b,
+    "le": lambda a, b: a <= b,
+    "eq": lambda a, b: a == b,
+    "ne": lambda a, b: a != b,
+    "not": lambda a: not a,
+    "and": lambda a, b: bool(a and b),
+    "or": lambda a, b: bool(a or b),
+    "if_else_zero": lambda c, a: a if c else 0.0,
+    "select": lambda c, a, b: a if c else b,
+    "pow": math.pow,
     **{op: getattr(math, op) for op in ("exp", "log", "sin", "cos", "tan", "atan", "tanh")},
-}  # fmt: skip
+}
 
 
 def computed(
@@ -108,8 +122,10 @@ def test_every_operation_is_what_it_is_in_python(tmp_path: Path, seed: int) -> N
     used = {graph.nodes[n].op for n in graph.read_by(roots)}
     assert used >= set(OPERATIONS)
     half = len(roots) // 2  # what the first keeps, the second reads
-    made = [Formula(graph, [(6 + k, node) for k, node in enumerate(part)])
-            for part in (roots[:half], roots)]  # fmt: skip
+    made = [
+        Formula(graph, [(6 + k, node) for k, node in enumerate(part)])
+        for part in (roots[:half], roots)
+    ]
     got, _ = computed(made, area, tmp_path)
     expected = evaluated(graph, roots, area)
     np.testing.assert_allclose(got[6 : 6 + len(roots)], expected, rtol=1e-12, atol=1e-300)

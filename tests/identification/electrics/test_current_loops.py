@@ -23,11 +23,15 @@ MOTORCYCLE, WEDGE = parameters("dardanelli2010"), parameters("roberts2003")
 WINDING, LOOP, DRIVE = motor_winding.METHOD, current_loop.METHOD, drive_current_loop.METHOD
 CASES = {
     "stuck rotor": (WINDING, MOTORCYCLE, {}, ("motor.R_m", "motor.L_m")),
-    "turning rotor": (WINDING, MOTORCYCLE, {"rotor": "turning"},
-                      ("motor.R_m", "motor.L_m", "motor.K_e")),
+    "turning rotor": (
+        WINDING,
+        MOTORCYCLE,
+        {"rotor": "turning"},
+        ("motor.R_m", "motor.L_m", "motor.K_e"),
+    ),
     "motorcycle": (LOOP, MOTORCYCLE, {}, ("ecu.current.k_p", "ecu.current.k_i")),
     "wedge": (DRIVE, WEDGE, {}, ("drive.k_p", "drive.k_i")),
-}  # fmt: skip
+}
 
 
 def off(par: object, names: tuple[str, ...], by: float = 1.3) -> object:
@@ -90,8 +94,10 @@ def test_a_wrong_model_is_found_out(case: str, wrong: dict[str, float]) -> None:
     assert not all(check.holds for check in found.checks)
 
 
-@pytest.mark.parametrize(("case", "current", "mean"), [("stuck rotor", "i", 1.0), (
-    "motorcycle", "i", 0.0), ("wedge", "i_1", 0.0)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("case", "current", "mean"),
+    [("stuck rotor", "i", 1.0), ("motorcycle", "i", 0.0), ("wedge", "i_1", 0.0)],
+)
 def test_a_current_that_is_not_of_this_demand_fails(case: str, current: str, mean: float) -> None:
     method, par, changes, _ = CASES[case]
     options = method.defaults.replace(changes)
@@ -122,8 +128,9 @@ def test_gains_and_winding_together_are_told_but_for_their_scale(case: str) -> N
     assert everything[gains[1]] / R == pytest.approx(wanted[gains[1]] / R_true, rel=5e-3)
 
 
-@pytest.mark.parametrize(("method", "signal"), [(WINDING, "v"), (LOOP, "i_set"),
-                                               (DRIVE, "i_1_set")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("method", "signal"), [(WINDING, "v"), (LOOP, "i_set"), (DRIVE, "i_1_set")]
+)
 def test_a_demand_at_rest_is_refused(method: Method, signal: str) -> None:
     par = WEDGE if method is DRIVE else MOTORCYCLE
     data = method.synthetic(par, method.defaults, 1)

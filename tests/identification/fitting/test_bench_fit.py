@@ -33,9 +33,12 @@ def bench(p_start: float | None = 10e5, f: str = "4 Hz", **overrides: float) -> 
     options = KNOWN if p_start is None else {**KNOWN, "p_start": p_start}
     changed = {name.replace("__", "."): value for name, value in overrides.items()}
     return bywire.Bench(
-        "motor-open-loop", "dardanelli2010", overrides=changed, options=options,
+        "motor-open-loop",
+        "dardanelli2010",
+        overrides=changed,
+        options=options,
         stimulus={**SINE, "f": f},
-    )  # fmt: skip
+    )
 
 
 def record(made_on: bywire.Bench, seed: int, question: Question = TWO) -> xr.Dataset:
@@ -59,7 +62,10 @@ def inside(found: Identified, truth: dict[str, float]) -> None:
 
 
 def require_derivatives(
-    made_on: bywire.Bench, on: bywire.Bench, question: Question, own: tuple[str, ...],
+    made_on: bywire.Bench,
+    on: bywire.Bench,
+    question: Question,
+    own: tuple[str, ...],
     speed: float | None,
 ) -> None:
     """Compare the Jacobian at the starts with central differences."""
@@ -68,7 +74,7 @@ def require_derivatives(
     one = fit.record(on, data, OPTIONS)
     trial = fit.trial(one, "")
     unknowns = [*unknowns_of(case_of(on, ""), on.par, question), *fit.starts(one, trial)]
-    assert tuple(u.name for u in unknowns[len(question.ranges):]) == own
+    assert tuple(u.name for u in unknowns[len(question.ranges) :]) == own
     problem = output_error([trial], unknowns)
     values = np.array([u.start for u in unknowns])
     if speed is not None:
@@ -101,11 +107,14 @@ def test_derivatives_of_a_closed_loop_follow_the_controllers_start() -> None:
     stimulus = {**SINE, "mean": "0 bar", "amplitude": "5 bar", "f": "2 Hz"}
     made_on, on = (
         bywire.Bench(
-            "motor-open-loop", "dardanelli2010", overrides=still, stimulus=stimulus,
+            "motor-open-loop",
+            "dardanelli2010",
+            overrides=still,
+            stimulus=stimulus,
             options={"source": "pressure", "add_holding": True, "duration": 0.12, **start},
         )
         for start in ({"p_start": 10e5}, {})
-    )  # fmt: skip
+    )
     question = Question(outputs=TWO.outputs, unknowns={"motor.K_e": "", "caliper.K_pd": ""})
     require_derivatives(made_on, on, question, ("start.p_start",), None)
     fit = BenchFit(on, question)
@@ -128,13 +137,23 @@ def test_records_of_different_starts_are_one_fit() -> None:
     truth = {"motor__R_m": 0.42, "motor__K_e": 0.028}
     slow, quick = record(bench(8e5, **truth), 3), record(bench(14e5, "9 Hz", **truth), 4)
     both = identified(bench(None), joined({"slow": slow, "quick": quick}))
-    inside(both, {"motor.R_m": 0.42, "motor.K_e": 0.028, "slow:start.p_start": 8e5,
-                  "quick:start.p_start": 14e5})  # fmt: skip
+    inside(
+        both,
+        {
+            "motor.R_m": 0.42,
+            "motor.K_e": 0.028,
+            "slow:start.p_start": 8e5,
+            "quick:start.p_start": 14e5,
+        },
+    )
     one = identified(bench(None), slow).estimates["output error"]
     assert both.estimates["output error"].deviations[0] < one.deviations[0]
     assert {c.name for c in both.curves} == {
-        "fit-p_mc-slow", "fit-i-slow", "fit-p_mc-quick", "fit-i-quick",
-    }  # fmt: skip
+        "fit-p_mc-slow",
+        "fit-i-slow",
+        "fit-p_mc-quick",
+        "fit-i-quick",
+    }
 
 
 def test_intervals_hold_what_was_put_in() -> None:

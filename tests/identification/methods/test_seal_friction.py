@@ -96,8 +96,9 @@ def test_a_known_bore_shows_a_wrong_unit(signal: str, factor: float) -> None:
 
 
 def test_force_is_shown_over_travel() -> None:
-    result = METHOD.identify(METHOD.synthetic(None, METHOD.defaults, 1), None, METHOD.defaults,
-                             Effort())  # fmt: skip
+    result = METHOD.identify(
+        METHOD.synthetic(None, METHOD.defaults, 1), None, METHOD.defaults, Effort()
+    )
     loops = next(curve for curve in result.curves if curve.name == "loops")
     there = np.isfinite(loops.data["measured"].values)
     x = loops.data["x"].values[there]

@@ -28,9 +28,11 @@ def stop() -> xr.Dataset:
 @pytest.fixture(scope="module")
 def ramp() -> xr.Dataset:
     bench = bywire.Bench(
-        "motor-open-loop", "dardanelli2010", options={"source": "current", "duration": 0.6},
+        "motor-open-loop",
+        "dardanelli2010",
+        options={"source": "current", "duration": 0.6},
         stimulus={"kind": "step", "start": 1.0, "end": 3.0, "t_step": 0.2},
-    )  # fmt: skip
+    )
     return run_once(bench).recording
 
 
@@ -43,12 +45,16 @@ def test_a_wedge_recording_gives_itself_back(stop: xr.Dataset) -> None:
 
 
 def test_a_record_with_a_fault_is_explained_by_the_bench_that_has_it(stop: xr.Dataset) -> None:
-    faults = [{"fault": "moment.offset", "value": "50 N*m", "onset": "0.1 s"},
-              {"set": {"bearing.C_0": "+50%"}, "onset": "0.12 s"}]  # fmt: skip
+    faults = [
+        {"fault": "moment.offset", "value": "50 N*m", "onset": "0.1 s"},
+        {"set": {"bearing.C_0": "+50%"}, "onset": "0.12 s"},
+    ]
     failing = bywire.Bench(STOP.experiment, STOP.parameters, options=STOP.options, faults=faults)
     measured = bywire.run(failing, estimate_error=False).recording
-    known, unknown = (replay(bench, measured, {"M_set": "M_set"}, ["y_M"]).outputs["y_M"]
-                      for bench in (failing, STOP))  # fmt: skip
+    known, unknown = (
+        replay(bench, measured, {"M_set": "M_set"}, ["y_M"]).outputs["y_M"]
+        for bench in (failing, STOP)
+    )
     span = float(np.ptp(measured["y_M"].values))
     assert np.abs(known["modeled"] - known["measured"]).max() < 1e-9 * span
     assert np.abs(unknown["modeled"] - unknown["measured"]).max() > 0.05 * span
@@ -59,9 +65,10 @@ def test_a_motorcycle_starts_at_the_measured_pressure(ramp: xr.Dataset) -> None:
     later = ramp[["i", "p_mc"]].sel(time=slice(0.0, None)).rename(i="current")
     later = later.assign_coords(time=later["time"] + 7.0)
     bench = bywire.Bench(
-        "motor-open-loop", "dardanelli2010",
+        "motor-open-loop",
+        "dardanelli2010",
         stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
-    )  # fmt: skip
+    )
     found = replay(bench, later, {"i_set": "current"})
     assert list(found.outputs) == ["p_mc"]
     pair = found.outputs["p_mc"]
@@ -72,9 +79,11 @@ def test_a_motorcycle_starts_at_the_measured_pressure(ramp: xr.Dataset) -> None:
 
 def test_wrong_parameters_show(ramp: xr.Dataset) -> None:
     bench = bywire.Bench(
-        "motor-open-loop", "dardanelli2010", overrides={"master_cylinder.A_mc": 2e-4},
+        "motor-open-loop",
+        "dardanelli2010",
+        overrides={"master_cylinder.A_mc": 2e-4},
         stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
-    )  # fmt: skip
+    )
     found = replay(bench, ramp[["i", "p_mc"]], {"i_set": "i"})
     (fit,) = judged(found.outputs, [Segment("all", 0.0, 0.6, {"nrmse": "<= 5 %"})])
     assert not fit.verdicts[0].met
@@ -83,18 +92,25 @@ def test_wrong_parameters_show(ramp: xr.Dataset) -> None:
 def test_figures_know_their_error_from_the_step(ramp: xr.Dataset) -> None:
     """True errors, against steps of 2 us; and a tolerance that is closer is undecided."""
     coarse, fine = (
-        bywire.replay(ramp, "motor-open-loop", {"simulation.step": step, "motor.R_m": "0.4 ohm"},
-                      inputs={"i_set": "i"}, outputs=["p_mc"])
+        bywire.replay(
+            ramp,
+            "motor-open-loop",
+            {"simulation.step": step, "motor.R_m": "0.4 ohm"},
+            inputs={"i_set": "i"},
+            outputs=["p_mc"],
+        )
         for step in ("100 us", "2 us")
-    )  # fmt: skip
+    )
     figures = {k.name: k for k in coarse.fits[0].kpis}
     true = {k.name: k.value for k in fine.fits[0].kpis}
     for name in ("rmse", "nrmse", "bias"):
         assert figures[name].error > 0.0
         assert abs(figures[name].value - true[name]) <= 3.0 * figures[name].error
     rmse = figures["rmse"]
-    for limit, outcome in ((rmse.value + 0.5 * rmse.bound, "undecided"),
-                           (rmse.value + 2.0 * rmse.bound, "met")):  # fmt: skip
+    for limit, outcome in (
+        (rmse.value + 0.5 * rmse.bound, "undecided"),
+        (rmse.value + 2.0 * rmse.bound, "met"),
+    ):
         (verdict,) = judge_fit({"rmse": f"<= {limit!r} Pa"}, "p_mc", [rmse])
         assert verdict.outcome == outcome
     plain = bywire.replay(
@@ -107,9 +123,12 @@ def test_figures_by_hand() -> None:
     t = 1e-3 * np.arange(2000)
     measured, modeled = np.sin(20.0 * t), np.sin(20.0 * (t - 0.0123)) + 0.1
     pair = xr.Dataset(
-        {"measured": ("time", measured, {"units": "Pa"}),
-         "modeled": ("time", modeled, {"units": "Pa"})}, {"time": ("time", t, {"units": "s"})},
-    )  # fmt: skip
+        {
+            "measured": ("time", measured, {"units": "Pa"}),
+            "modeled": ("time", modeled, {"units": "Pa"}),
+        },
+        {"time": ("time", t, {"units": "s"})},
+    )
     found = {k.name: k.value for k in fit_figures(pair, Segment("all", 0.0, 2.0))}
     error = modeled - measured
     assert found["rmse"] == pytest.approx(np.sqrt(np.mean(error**2)))
@@ -126,15 +145,23 @@ def test_figures_by_hand() -> None:
 def test_tolerances_by_segment_and_signal() -> None:
     t = 1e-3 * np.arange(1000)
     attrs = {"units": "Pa"}
-    good = xr.Dataset({"measured": ("time", t, attrs), "modeled": ("time", t + 1e-3, attrs)},
-                      {"time": ("time", t, {"units": "s"})})  # fmt: skip
+    good = xr.Dataset(
+        {"measured": ("time", t, attrs), "modeled": ("time", t + 1e-3, attrs)},
+        {"time": ("time", t, {"units": "s"})},
+    )
     bad = good.assign(modeled=("time", np.where(t < 0.5, t, t + 0.5), attrs))
-    parts = [Segment("a", 0.0, 0.4, {"nrmse": "<= 5 %"}),
-             Segment("b", 0.6, 0.9, {"nrmse": "<= 5 %", "bad.max_error": "<= 1 Pa"})]  # fmt: skip
+    parts = [
+        Segment("a", 0.0, 0.4, {"nrmse": "<= 5 %"}),
+        Segment("b", 0.6, 0.9, {"nrmse": "<= 5 %", "bad.max_error": "<= 1 Pa"}),
+    ]
     found = judged({"good": good, "bad": bad}, parts)
     met = {(f.segment.name, f.signal): [v.met for v in f.verdicts] for f in found}
-    assert met == {("a", "good"): [True], ("a", "bad"): [True], ("b", "good"): [True],
-                   ("b", "bad"): [False, True]}  # fmt: skip
+    assert met == {
+        ("a", "good"): [True],
+        ("a", "bad"): [True],
+        ("b", "good"): [True],
+        ("b", "bad"): [False, True],
+    }
     with pytest.raises(UnknownNameError, match="nrmse"):
         judged({"good": good}, [Segment("a", 0.0, 0.4, {"nmrse": "<= 5 %"})])
     with pytest.raises(UnitError):
@@ -149,10 +176,12 @@ def test_errors_are_bounded_both_ways() -> None:
     t = 1e-3 * np.arange(2000)
     attrs = {"units": "Pa"}
     pair = xr.Dataset(
-        {"measured": ("time", 100.0 * np.sin(20.0 * t), attrs),
-         "modeled": ("time", 100.0 * np.sin(20.0 * (t + 0.05)) - 10.0, attrs)},
+        {
+            "measured": ("time", 100.0 * np.sin(20.0 * t), attrs),
+            "modeled": ("time", 100.0 * np.sin(20.0 * (t + 0.05)) - 10.0, attrs),
+        },
         {"time": ("time", t, {"units": "s"})},
-    )  # fmt: skip
+    )
 
     def met(name: str, text: str) -> list[bool]:
         (fit,) = judged({"p": pair}, [Segment("all", 0.0, 2.0, {name: text})])
@@ -170,9 +199,10 @@ def test_errors_are_bounded_both_ways() -> None:
 
 def test_missing_samples_are_named(ramp: xr.Dataset) -> None:
     bench = bywire.Bench(
-        "motor-open-loop", "dardanelli2010",
+        "motor-open-loop",
+        "dardanelli2010",
         stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
-    )  # fmt: skip
+    )
     gap = ramp[["i", "p_mc"]].copy(deep=True)
     gap["p_mc"][40:70] = np.nan
     found = replay(bench, gap, {"i_set": "i"})
@@ -185,9 +215,10 @@ def test_missing_samples_are_named(ramp: xr.Dataset) -> None:
 
 def test_by_default_what_a_sensor_could_have_measured_is_compared(ramp: xr.Dataset) -> None:
     bench = bywire.Bench(
-        "motor-open-loop", "dardanelli2010",
+        "motor-open-loop",
+        "dardanelli2010",
         stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
-    )  # fmt: skip
+    )
     found = replay(bench, ramp, {"i_set": "i"})
     assert {"p_mc", "omega"} <= set(found.outputs)
     assert not {"stuck", "E_copper", "t_stuck"} & set(found.outputs)
@@ -224,16 +255,18 @@ def test_files_of_segments(tmp_path: Path) -> None:
         ("a = ", "is not valid TOML"),
     ):
         path.write_text(text)
-        with pytest.raises((ParameterError, UnknownNameError, bywire.core.errors.FileError),
-                           match=wanted):  # fmt: skip
+        with pytest.raises(
+            (ParameterError, UnknownNameError, bywire.core.errors.FileError), match=wanted
+        ):
             read_segments(path, {})
 
 
 def test_what_does_not_fit_is_refused(ramp: xr.Dataset) -> None:
     bench = bywire.Bench(
-        "motor-open-loop", "dardanelli2010",
+        "motor-open-loop",
+        "dardanelli2010",
         stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
-    )  # fmt: skip
+    )
     with pytest.raises(ParameterError, match="nothing measured drives the model"):
         replay(bench, ramp[["i", "p_mc"]])
     with pytest.raises(UnknownNameError, match="i_set"):
@@ -248,8 +281,10 @@ def test_what_does_not_fit_is_refused(ramp: xr.Dataset) -> None:
 
 def test_a_replay_whose_energy_balance_is_open_says_so(ramp: xr.Dataset) -> None:
     bench = bywire.Bench(
-        "motor-open-loop", "dardanelli2010", overrides={"pipeline.k_lf": 3.2e-19},
+        "motor-open-loop",
+        "dardanelli2010",
+        overrides={"pipeline.k_lf": 3.2e-19},
         stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
-    )  # fmt: skip
+    )
     replayed = replay(bench, ramp[["i", "p_mc"]], {"i_set": "i"})
     assert any("energy balance is open" in note for note in replayed.notes)

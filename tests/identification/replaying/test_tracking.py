@@ -23,9 +23,11 @@ def brakings() -> tuple[xr.Dataset, np.ndarray]:
     parts, truth = [], []
     for mu in FADING:
         bench = bywire.Bench(
-            "moment-pulses", "roberts2003", overrides={"wedge.mu_B": float(mu)},
+            "moment-pulses",
+            "roberts2003",
+            overrides={"wedge.mu_B": float(mu)},
             options={"t_hold": 0.4, "pulses": 1},
-        )  # fmt: skip
+        )
         run = run_once(bench).recording[[*NOISE, "f_1", "f_2"]].drop_vars("time")
         parts.append(run)
         truth.append(np.full(run.sizes["time"], mu))
@@ -71,10 +73,12 @@ def test_the_actuation_force_tells_it_within_the_wedge_friction(
     most = known["wedge_friction.mu_R"] * data["F_N"] + known["wedge_friction.mu_int"] * np.tan(
         known["wedge.alpha"]
     ) * (data["f_1"] + data["f_2"])
-    bound = np.array([
-        float((most[np.abs(t - now) < 0.05] / data["F_N"][np.abs(t - now) < 0.05]).median())
-        for now in one["time"].values
-    ])  # fmt: skip
+    bound = np.array(
+        [
+            float((most[np.abs(t - now) < 0.05] / data["F_N"][np.abs(t - now) < 0.05]).median())
+            for now in one["time"].values
+        ]
+    )
     error = np.abs(one["value"].values - at)
     band = one["high"].values - one["value"].values
     assert np.all(error[rows] < (bound + band)[rows])
@@ -88,8 +92,10 @@ def test_clearance_is_told_by_travel_and_force(
     par = parameters("roberts2003")
     worn = data.assign(x=data["x"] + 5e-5)  # pads worn: the wedge travels further
     gained = 5e-5 * np.tan(par.leaves()["wedge.alpha"])
-    for record, wanted in ((data, par.leaves()["caliper.clearance"]),
-                           (worn, par.leaves()["caliper.clearance"] + gained)):  # fmt: skip
+    for record, wanted in (
+        (data, par.leaves()["caliper.clearance"]),
+        (worn, par.leaves()["caliper.clearance"] + gained),
+    ):
         last = track("clearance", record, par).data.sel(parameter="caliper.clearance").isel(time=-1)
         assert float(last["low"]) <= wanted <= float(last["high"])
         assert float(last["high"] - last["low"]) < 3e-6

@@ -26,8 +26,12 @@ def test_numbers_come_through() -> None:
     (text,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', page)
     data = json.loads(text)
     assert data["time"] == [0.0, 0.02, 0.04]
-    assert data["moves"]["wheel"] == {"x": [0.0, -2.0, -4.0], "y": 0.0,
-                                      "turn": [0.0, 0.02, 0.04], "stretch": 0.5}  # fmt: skip
+    assert data["moves"]["wheel"] == {
+        "x": [0.0, -2.0, -4.0],
+        "y": 0.0,
+        "turn": [0.0, 0.02, 0.04],
+        "stretch": 0.5,
+    }
     assert data["dials"][0]["values"] == [10.0, 5.0, 0.0]
     assert "a &lt;stop&gt;" in page
     assert "-0.0" not in text

@@ -30,7 +30,8 @@ BENCH_OF = {
     "moment": (BENCHES["wedge"], (*VARIED["wedge"], "flywheel.Omega_0")),
     "current": (bywire.Bench("current-step", "dardanelli2010"), VARIED["motorcycle"][:2]),
     "drive-current": (
-        bywire.Bench("current-loop", "roberts2003"), ("drive.k_p", "drive.k_i", "motor_1.L_M")
+        bywire.Bench("current-loop", "roberts2003"),
+        ("drive.k_p", "drive.k_i", "motor_1.L_M"),
     ),
 }
 

@@ -21,10 +21,15 @@ from systems.loading import loaded
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 MODELS = {
-    "motorcycle-brake": None, "two-wheeler-by-wire": None, "wedge-brake": None,
-    "wedge-corner": None, "wheel-on-drum": None, "two-wheeler-whole-rear": None,
-    "hydraulic-brake": EXAMPLES / "hydraulic_brake.py", "emb-caliper": EXAMPLES / "emb_caliper",
-}  # fmt: skip
+    "motorcycle-brake": None,
+    "two-wheeler-by-wire": None,
+    "wedge-brake": None,
+    "wedge-corner": None,
+    "wheel-on-drum": None,
+    "two-wheeler-whole-rear": None,
+    "hydraulic-brake": EXAMPLES / "hydraulic_brake.py",
+    "emb-caliper": EXAMPLES / "emb_caliper",
+}
 
 
 @pytest.fixture(scope="module", params=MODELS)
@@ -52,7 +57,7 @@ def test_every_part_and_wire_is_in_it(known: tuple[type, Network, Schematic]) ->
 
 
 def test_no_box_lies_on_another_and_no_connection_crosses_one(
-    known: tuple[type, Network, Schematic]
+    known: tuple[type, Network, Schematic],
 ) -> None:
     _, _, plan = known
     for a, b in combinations(plan.boxes.values(), 2):
@@ -64,8 +69,10 @@ def test_no_box_lies_on_another_and_no_connection_crosses_one(
                 is_beside = box.x > max(start, end) or box.x + box.width < min(start, end)
                 assert is_beside or not box.y < y < box.y + box.height, box.node
     width, height = plan.size
-    assert all(b.x >= 0 and b.x + b.width <= width and b.y + b.height <= height
-               for b in plan.boxes.values())  # fmt: skip
+    assert all(
+        b.x >= 0 and b.x + b.width <= width and b.y + b.height <= height
+        for b in plan.boxes.values()
+    )
 
 
 def test_connections_are_those_of_the_equations() -> None:

@@ -91,9 +91,17 @@ def closed_again(model: Model, system: SampledSystem, inputs: Sequence[str]) -> 
     C = np.hstack([plant.C + plant.D @ M_x, plant.D @ M_m])
     stimuli, held = signals_of(model.Stimulus), signals_of(model.Memory)
     return LinearModel(
-        model.name, A, B, C, plant.D @ M_u,
-        (*plant.states, *(f"{name}[k]" for name in fields)), tuple(inputs), plant.outputs,
+        model.name,
+        A,
+        B,
+        C,
+        plant.D @ M_u,
+        (*plant.states, *(f"{name}[k]" for name in fields)),
+        tuple(inputs),
+        plant.outputs,
         (*plant.state_units, *(held[name].unit for name in fields)),
-        tuple(stimuli[name].unit for name in inputs), plant.output_units,
-        np.zeros(size), system.common * system.frame,
-    )  # fmt: skip
+        tuple(stimuli[name].unit for name in inputs),
+        plant.output_units,
+        np.zeros(size),
+        system.common * system.frame,
+    )

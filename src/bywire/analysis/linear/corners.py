@@ -298,9 +298,7 @@ def _limits_reached(of: Linearization) -> list[str]:
     point = of.point
     fields, usual = point.model.State._fields, magnitudes(point)
     places = {name: fields.index(name) for name in point.model.limits}
-    return [
-        name for name, k in places.items() if of.free[k] and point.state[k] <= REACH * usual[k]
-    ]
+    return [name for name, k in places.items() if of.free[k] and point.state[k] <= REACH * usual[k]]
 
 
 class _Corner:

@@ -75,10 +75,16 @@ class LinearModel:
         A, B, C = self.A[np.ix_(k, k)], self.B[k], self.C[:, k]
         scale = state_scale(A, B, C)
         return control.ss(
-            A * scale / scale[:, None], B / scale[:, None], C * scale, self.D, self.period,
-            states=[self.states[j] for j in k], inputs=list(self.inputs),
-            outputs=list(self.outputs), name=self.name,
-        )  # fmt: skip
+            A * scale / scale[:, None],
+            B / scale[:, None],
+            C * scale,
+            self.D,
+            self.period,
+            states=[self.states[j] for j in k],
+            inputs=list(self.inputs),
+            outputs=list(self.outputs),
+            name=self.name,
+        )
 
     def transfer_function(self, input: str = "", output: str = "") -> Any:
         """Return one path as ``control.TransferFunction`` with named signals.
@@ -120,10 +126,12 @@ class LinearModel:
             self.A[np.ix_(kept, kept)], self.B[kept, j], self.C[i, kept], float(self.D[i, j])
         )
         return Transfer.of_path(
-            path, f"{self.name}: {self.outputs[i]} by {self.inputs[j]}",
-            (self.inputs[j], self.input_units[j]), (self.outputs[i], self.output_units[i]),
+            path,
+            f"{self.name}: {self.outputs[i]} by {self.inputs[j]}",
+            (self.inputs[j], self.input_units[j]),
+            (self.outputs[i], self.output_units[i]),
             self.period,
-        )  # fmt: skip
+        )
 
     def poles(self) -> Complex:
         """Return the eigenvalues of A, the slowest first; [rad/s] for a continuous model."""
@@ -188,14 +196,15 @@ class LinearModel:
             )
         return replace(
             self,
-            A=self.A[np.ix_(kept, kept)], B=self.B[kept], C=self.C[:, kept],
-            states=tuple(states), state_units=tuple(self.state_units[k] for k in kept),
+            A=self.A[np.ix_(kept, kept)],
+            B=self.B[kept],
+            C=self.C[:, kept],
+            states=tuple(states),
+            state_units=tuple(self.state_units[k] for k in kept),
             rate=self.rate[kept],
-        )  # fmt: skip
+        )
 
-    def channels(
-        self, *, inputs: Sequence[str] = (), outputs: Sequence[str] = ()
-    ) -> LinearModel:
+    def channels(self, *, inputs: Sequence[str] = (), outputs: Sequence[str] = ()) -> LinearModel:
         """Return the model with some of its inputs and outputs, in the order given.
 
         Parameters
@@ -212,12 +221,14 @@ class LinearModel:
         rows = _places("output", outputs or self.outputs, self.outputs)
         return replace(
             self,
-            B=self.B[:, columns], C=self.C[rows], D=self.D[rows][:, columns],
+            B=self.B[:, columns],
+            C=self.C[rows],
+            D=self.D[rows][:, columns],
             inputs=tuple(self.inputs[k] for k in columns),
             outputs=tuple(self.outputs[k] for k in rows),
             input_units=tuple(self.input_units[k] for k in columns),
             output_units=tuple(self.output_units[k] for k in rows),
-        )  # fmt: skip
+        )
 
     def together(self, inputs: Sequence[str]) -> LinearModel:
         """Return the model with some inputs moving as one, named after the first of them."""

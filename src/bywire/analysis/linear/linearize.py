@@ -170,13 +170,19 @@ def plant_model(point: SmoothPoint, inputs: Sequence[str], outputs: Sequence[str
     states, held = signals_of(model.State), signals_of(model.Memory)
     known = states | signals_of(model.Output)
     return LinearModel(
-        model.name, A, B, C, D,
-        tuple(states), tuple(inputs), tuple(outputs),
+        model.name,
+        A,
+        B,
+        C,
+        D,
+        tuple(states),
+        tuple(inputs),
+        tuple(outputs),
         tuple(signal.unit for signal in states.values()),
         tuple(held[name].unit for name in inputs),
         tuple(known[name].unit for name in outputs),
         rate[:, 0],
-    )  # fmt: skip
+    )
 
 
 def _rows(model: Model, outputs: Sequence[str], C: Array, D: Array) -> tuple[Array, Array]:

@@ -90,11 +90,20 @@ def cut_open(model: Model, system: SampledSystem, cut: str) -> LinearModel:
     held = signals_of(model.Memory)
     unit = (signals_of(model.State) | held)[cut].unit
     return LinearModel(
-        f"{model.name}, cut at {cut}", A, B, -C, np.zeros((1, 1)),
-        (*system.plant.states, *(f"{name}[k]" for name in fields)), (cut,), (cut,),
-        (*system.plant.state_units, *(held[name].unit for name in fields)), (unit,), (unit,),
-        np.zeros(size), system.common * system.frame,
-    )  # fmt: skip
+        f"{model.name}, cut at {cut}",
+        A,
+        B,
+        -C,
+        np.zeros((1, 1)),
+        (*system.plant.states, *(f"{name}[k]" for name in fields)),
+        (cut,),
+        (cut,),
+        (*system.plant.state_units, *(held[name].unit for name in fields)),
+        (unit,),
+        (unit,),
+        np.zeros(size),
+        system.common * system.frame,
+    )
 
 
 def _is_without_gain(system: SampledSystem, cut: str) -> bool:
@@ -154,9 +163,10 @@ def _cut_writing(system: SampledSystem, row: int, cut: str) -> tuple[Jacobians, 
     kept = np.zeros(system.ticks[0][1].shape[1])
     kept[row] = 1.0
     writers = [
-        k for k, (X, M, _) in enumerate(system.ticks)
+        k
+        for k, (X, M, _) in enumerate(system.ticks)
         if X[row].any() or not np.array_equal(M[row], kept)
-    ]  # fmt: skip
+    ]
     owner = _alone(system, writers, f"{cut} cannot be cut: exactly one controller must write it")
     later = system.due(0)[owner + 1 :]
     taken = system.plant.B[:, row].any() or any(
@@ -249,6 +259,12 @@ def analog_gain(
             return _nothing(model, cut, 0.0)
         raise ParameterError(f"{cut} cannot be cut: nothing in {model.name} reads it")
     return replace(
-        plant, name=f"{model.name}, cut at {cut}", A=A, B=B, C=-plant.C, D=np.zeros((1, 1)),
-        inputs=(cut,), input_units=plant.output_units,
-    )  # fmt: skip
+        plant,
+        name=f"{model.name}, cut at {cut}",
+        A=A,
+        B=B,
+        C=-plant.C,
+        D=np.zeros((1, 1)),
+        inputs=(cut,),
+        input_units=plant.output_units,
+    )

@@ -170,9 +170,7 @@ def frames_of(periods: Sequence[float]) -> tuple[float, list[int]]:
     return frame / whole, [tick // frame for tick in ticks]
 
 
-def _ticks(
-    point: SmoothPoint, inputs: Sequence[str], kept: Sequence[str]
-) -> tuple[Jacobians, ...]:
+def _ticks(point: SmoothPoint, inputs: Sequence[str], kept: Sequence[str]) -> tuple[Jacobians, ...]:
     """Return the Jacobians of every task's new memory by kept states, memory and inputs."""
     rows = [point.model.State._fields.index(name) for name in kept]
     columns = [point.model.Stimulus._fields.index(name) for name in inputs]

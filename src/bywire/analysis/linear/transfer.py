@@ -88,8 +88,11 @@ class Transfer:
         system = control.tf(
             np.atleast_1d(self.factor * np.real(np.poly(self.zeros))),
             np.atleast_1d(np.real(np.poly(self.poles))),
-            self.period, inputs=[self.input], outputs=[self.output], name=self.name,
-        )  # fmt: skip
+            self.period,
+            inputs=[self.input],
+            outputs=[self.output],
+            name=self.name,
+        )
         f = self._range()
         rounded = control.frequency_response(system, 2.0 * np.pi * f).complex.reshape(-1)
         exact = self.response(f)
@@ -124,9 +127,13 @@ class Transfer:
 
     @classmethod
     def of_path(
-        cls, path: Realization, name: str, input: tuple[str, str], output: tuple[str, str],
+        cls,
+        path: Realization,
+        name: str,
+        input: tuple[str, str],
+        output: tuple[str, str],
         period: float,
-    ) -> Transfer:  # fmt: skip
+    ) -> Transfer:
         """Return the transfer function of a path, exact cancellations removed.
 
         Parameters
@@ -144,9 +151,16 @@ class Transfer:
         roots, factor = zeros(least)
         poles = np.linalg.eigvals(least.A) if len(least.A) and factor else np.zeros(0)
         return cls(
-            name, input[0], output[0], input[1], output[1], _sorted(roots), _sorted(poles),
-            factor, period,
-        )  # fmt: skip
+            name,
+            input[0],
+            output[0],
+            input[1],
+            output[1],
+            _sorted(roots),
+            _sorted(poles),
+            factor,
+            period,
+        )
 
 
 def _sorted(roots: Any) -> Complex:

@@ -89,15 +89,19 @@ class PeriodicModel:
         units = [signal.unit for signal in states.values()]
         return LinearModel(
             f"{model.name}, {kind} over {self.run.duration * 1e3:g} ms",
-            self.derivatives.A, self.derivatives.B.sum(axis=1, keepdims=True),
-            C[None, :], np.array([[D]]),
+            self.derivatives.A,
+            self.derivatives.B.sum(axis=1, keepdims=True),
+            C[None, :],
+            np.array([[D]]),
             (*states, *(f"d({name})" for name in states), *(f"{name}[k]" for name in held)),
-            self.inputs[:1], (self.output,),
+            self.inputs[:1],
+            (self.output,),
             (*units, *units, *(signal.unit for signal in held.values())),
             (signals_of(model.Stimulus)[self.inputs[0]].unit,),
             (signals_of(model.Output)[self.output].unit,),
-            np.zeros(len(self.derivatives.A)), self.run.duration,
-        )  # fmt: skip
+            np.zeros(len(self.derivatives.A)),
+            self.run.duration,
+        )
 
     @property
     def steady_gain(self) -> float:

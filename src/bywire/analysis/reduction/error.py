@@ -79,7 +79,7 @@ def reduction_error(full: LinearModel, reduced: LinearModel, high: float) -> Red
     if not seen.any():
         return ReductionError(
             float(f[0]), float(f[-1]), 0.0, 0.0, 0.0, float(f[0]), ("", ""), math.nan
-        )  # fmt: skip
+        )
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(seen[None], other / exact, 1.0)
         relative = np.abs(ratio - 1.0)
@@ -87,10 +87,15 @@ def reduction_error(full: LinearModel, reduced: LinearModel, high: float) -> Red
         phase = np.abs(np.degrees(np.angle(ratio)))
     k, i, j = np.unravel_index(int(np.argmax(relative)), relative.shape)
     return ReductionError(
-        float(f[0]), float(f[-1]), float(relative[k, i, j]), float(np.max(gain)),
-        float(np.max(phase)), float(f[k]), (full.outputs[i], full.inputs[j]),
+        float(f[0]),
+        float(f[-1]),
+        float(relative[k, i, j]),
+        float(np.max(gain)),
+        float(np.max(phase)),
+        float(f[k]),
+        (full.outputs[i], full.inputs[j]),
         _pole_error(full, reduced, float(f[0]), high),
-    )  # fmt: skip
+    )
 
 
 def frequencies(full: LinearModel, reduced: LinearModel, high: float) -> Array:

@@ -204,9 +204,13 @@ def _joined(full: LinearModel, first: Matrices, second: Matrices) -> LinearModel
     A = block_diag(*(part[0] for part in (first, second) if len(part[0])))
     return replace(
         full,
-        A=A, B=np.vstack([first[1], second[1]]), C=np.hstack([first[2], second[2]]),
-        states=tuple(f"z_{k + 1}" for k in range(n)), state_units=("1",) * n, rate=np.zeros(n),
-    )  # fmt: skip
+        A=A,
+        B=np.vstack([first[1], second[1]]),
+        C=np.hstack([first[2], second[2]]),
+        states=tuple(f"z_{k + 1}" for k in range(n)),
+        state_units=("1",) * n,
+        rate=np.zeros(n),
+    )
 
 
 def _band(model: LinearModel, band: float | None) -> float:

@@ -77,6 +77,12 @@ def residualized(
         A, B, rate = (np.linalg.solve(body, M) for M in (A, B, rate))
         C, D = C - C2 @ lag @ A, D - C2 @ lag @ B
     return replace(
-        model, A=A, B=B, C=C, D=D, rate=rate,
-        states=tuple(keep), state_units=tuple(model.state_units[k] for k in first),
-    )  # fmt: skip
+        model,
+        A=A,
+        B=B,
+        C=C,
+        D=D,
+        rate=rate,
+        states=tuple(keep),
+        state_units=tuple(model.state_units[k] for k in first),
+    )

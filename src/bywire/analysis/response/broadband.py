@@ -128,9 +128,12 @@ def broadband_response(
     done = [{k: v[:, :, j] for k, v in measured.items()} for j in range(len(lines))]
     dataset = as_dataset(run, sweep, [k / length for k in lines], done)
     return dataset.assign_attrs(
-        excitation=excitation.kind, seed=excitation.seed, realizations=excitation.count,
-        window=length, rms=float(np.sqrt(np.mean(shapes**2))),
-    )  # fmt: skip
+        excitation=excitation.kind,
+        seed=excitation.seed,
+        realizations=excitation.count,
+        window=length,
+        rms=float(np.sqrt(np.mean(shapes**2))),
+    )
 
 
 def _excitations(windowed: Run, lines: list[int], excitation: Broadband) -> Array:
@@ -178,10 +181,15 @@ def _repeated(
         return np.asarray(np.fft.rfft(window[:, :, 0], axis=1)[:, lines])
 
     return repeat(
-        windowed, np.repeat(cases.matrix, n, axis=1), excited, sweep.recorded, figures,
-        sweep.tolerance, min(sweep.most, MOST),
+        windowed,
+        np.repeat(cases.matrix, n, axis=1),
+        excited,
+        sweep.recorded,
+        figures,
+        sweep.tolerance,
+        min(sweep.most, MOST),
         starts=[start for start in cases.starts for _ in range(n)],
-    )  # fmt: skip
+    )
 
 
 def _measured(

@@ -104,13 +104,22 @@ def as_dataset(
     }
     coordinates: Mapping[str, Any] = {
         "frequency": ("frequency", frequencies, {"units": "Hz"}),
-        "amplitude": ("amplitude", np.asarray(sweep.amplitudes, dtype=float),
-                      {"units": stimuli[sweep.inputs[0]].unit}),
-        **{name: ("variant", np.asarray(values, dtype=float))
-           for name, values in (sweep.variations or {}).items()},
-    }  # fmt: skip
-    attributes = {"model": run.model.name, "inputs": " ".join(sweep.inputs), "output": sweep.output,
-                  "step": run.step}  # fmt: skip
+        "amplitude": (
+            "amplitude",
+            np.asarray(sweep.amplitudes, dtype=float),
+            {"units": stimuli[sweep.inputs[0]].unit},
+        ),
+        **{
+            name: ("variant", np.asarray(values, dtype=float))
+            for name, values in (sweep.variations or {}).items()
+        },
+    }
+    attributes = {
+        "model": run.model.name,
+        "inputs": " ".join(sweep.inputs),
+        "output": sweep.output,
+        "step": run.step,
+    }
     return xr.Dataset(variables, coords=dict(coordinates), attrs=attributes)
 
 

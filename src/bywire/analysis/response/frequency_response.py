@@ -114,9 +114,7 @@ def frequency_response(
     return as_dataset(run, sweep, [periods / window for window, periods in plans], done)
 
 
-def _repeated(
-    windowed: Run, sweep: Sweep, cases: Cases, periods: int, lanes: bool
-) -> Repeated:
+def _repeated(windowed: Run, sweep: Sweep, cases: Cases, periods: int, lanes: bool) -> Repeated:
     """Run all amplitudes and variants at one frequency until they repeat."""
     columns = [windowed.model.Stimulus._fields.index(name) for name in sweep.inputs]
     schedule = windowed.schedule()
@@ -136,9 +134,16 @@ def _repeated(
         return np.asarray(np.einsum("lr,r->l", window[:, :, 0], wave)[:, None])
 
     return repeat(
-        windowed, cases.matrix, sines, sweep.recorded, figures, sweep.tolerance, sweep.most,
-        starts=cases.starts, lanes=lanes,
-    )  # fmt: skip
+        windowed,
+        cases.matrix,
+        sines,
+        sweep.recorded,
+        figures,
+        sweep.tolerance,
+        sweep.most,
+        starts=cases.starts,
+        lanes=lanes,
+    )
 
 
 def _measured(repeated: Repeated, sizes: Array, periods: int, least: float) -> dict[str, Array]:

@@ -150,8 +150,10 @@ def width(variant: Variant, response: xr.Dataset) -> Width:
 def widths(variants: Sequence[Variant], response: xr.Dataset) -> list[list[Width]]:
     """Return the figures of every variant and, within it, amplitude."""
     return [
-        [width(variant, response.isel(variant=k, amplitude=j))
-         for j in range(response.sizes["amplitude"])]
+        [
+            width(variant, response.isel(variant=k, amplitude=j))
+            for j in range(response.sizes["amplitude"])
+        ]
         for k, variant in enumerate(variants)
     ]
 
@@ -165,9 +167,7 @@ def with_widths(response: xr.Dataset, figures: Sequence[Sequence[Width]]) -> xr.
         "gain_margin": "1",
         "lower_gain_margin": "1",
     }
-    rows = {
-        name: [[getattr(figure, name) for figure in row] for row in figures] for name in units
-    }
+    rows = {name: [[getattr(figure, name) for figure in row] for row in figures] for name in units}
     return response.assign(
         {name: (("variant", "amplitude"), rows[name], {"units": units[name]}) for name in units}
     )

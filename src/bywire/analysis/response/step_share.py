@@ -37,14 +37,16 @@ def with_step_errors(response: xr.Dataset, finer: xr.Dataset, share: float) -> x
         With ``NAME_step_error`` beside each figure, in its unit: NaN where neither of both has it,
         infinite where one has. What never repeats counts, too: a limit cycle's gain differs.
     """
-    return response.assign({
-        f"{name}_step_error": (
-            response[name].dims,
-            share * _apart(response[name].values, finer[name].values, name),
-            dict(response[name].attrs),
-        )
-        for name in FIGURES
-    })  # fmt: skip
+    return response.assign(
+        {
+            f"{name}_step_error": (
+                response[name].dims,
+                share * _apart(response[name].values, finer[name].values, name),
+                dict(response[name].attrs),
+            )
+            for name in FIGURES
+        }
+    )
 
 
 def _apart(value: Array, other: Array, name: str) -> Array:

@@ -149,9 +149,7 @@ def kept(figures: Complex, settled: NDArray[np.bool_]) -> np.ma.MaskedArray[Any,
     return np.ma.array(figures, mask=np.isnan(figures) | old[:, :, None])
 
 
-def spread_of(
-    figures: Complex, settled: NDArray[np.bool_]
-) -> tuple[Complex, Array]:
+def spread_of(figures: Complex, settled: NDArray[np.bool_]) -> tuple[Complex, Array]:
     """Return complex amplitudes and their scatter.
 
     Parameters

@@ -62,8 +62,13 @@ GENERIC = GenericExperiment(
     options=Options,
     signals={"input": "stimulus", "output": "recording"},
     defaults={
-        "start": 0.0, "end": 1.0, "period": 1.0, "share": 1.0, "duration": 60.0, "record": 1e-2,
+        "start": 0.0,
+        "end": 1.0,
+        "period": 1.0,
+        "share": 1.0,
+        "duration": 60.0,
+        "record": 1e-2,
         "settle": 0.0,
     },
     build=build,
-)  # fmt: skip
+)

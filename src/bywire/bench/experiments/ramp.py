@@ -56,9 +56,13 @@ def build(subject: Subject) -> Experiment:
                 f"options.start and options.end are both {options.end:g} {unit}: that is no ramp"
             )
         shape = ramp.Parameters(
-            start=options.start, end=options.end, slope=options.slope, t_start=0.0,
-            t_hold=options.t_hold, after="return",
-        )  # fmt: skip
+            start=options.start,
+            end=options.end,
+            slope=options.slope,
+            t_start=0.0,
+            t_hold=options.t_hold,
+            after="return",
+        )
         return lambda t: ramp.sample(t, shape)
 
     def duration(options: Any) -> float:
@@ -85,8 +89,13 @@ GENERIC = GenericExperiment(
     options=Options,
     signals={"input": "stimulus", "output": "recording", "drive": "input or recording"},
     defaults={
-        "start": 0.0, "end": 1.0, "slope": 0.1, "t_hold": 0.0, "record": 1e-3, "settle": 0.0,
+        "start": 0.0,
+        "end": 1.0,
+        "slope": 0.1,
+        "t_hold": 0.0,
+        "record": 1e-3,
+        "settle": 0.0,
         "smoothing": 0.0,
     },
     build=build,
-)  # fmt: skip
+)

@@ -62,8 +62,13 @@ GENERIC = GenericExperiment(
     options=Options,
     signals={"input": "stimulus", "output": "recording"},
     defaults={
-        "start": 1.0, "end": 0.0, "t_ramp": 0.0, "empty": 0.02, "duration": 1.0, "record": 1e-3,
+        "start": 1.0,
+        "end": 0.0,
+        "t_ramp": 0.0,
+        "empty": 0.02,
+        "duration": 1.0,
+        "record": 1e-3,
         "settle": 1.0,
     },
     build=build,
-)  # fmt: skip
+)

@@ -68,9 +68,13 @@ def build(subject: Subject) -> Experiment:
 
     gain = sine_sweep.gain_unit(subject.units["input"], subject.units["output"])
     return subject.experiment(
-        driven, {"sine_sweep": sweep}, "sine-sweep",
-        duration=lambda options: windows(options)[-1][2], resolved={"gain": gain}, sweep=sweep,
-    )  # fmt: skip
+        driven,
+        {"sine_sweep": sweep},
+        "sine-sweep",
+        duration=lambda options: windows(options)[-1][2],
+        resolved={"gain": gain},
+        sweep=sweep,
+    )
 
 
 def windows(options: Any) -> tuple[tuple[float, float, float], ...]:
@@ -114,8 +118,15 @@ GENERIC = GenericExperiment(
     options=Options,
     signals={"input": "stimulus", "output": "recording"},
     defaults={
-        "mean": 0.5, "amplitude": 0.1, "f_start": 0.5, "f_end": 50.0, "n": 13, "n_settle": 3,
-        "n_periods": 5, "record": 1e-3, "settle": 1.0,
+        "mean": 0.5,
+        "amplitude": 0.1,
+        "f_start": 0.5,
+        "f_end": 50.0,
+        "n": 13,
+        "n_settle": 3,
+        "n_periods": 5,
+        "record": 1e-3,
+        "settle": 1.0,
     },
     build=build,
-)  # fmt: skip
+)

@@ -43,14 +43,20 @@ def build(subject: Subject) -> Experiment:
         if not subject.is_set_point:
             return step_response.Setting(subject.output, 0.0, smoothing=options.smoothing)
         return step_response.Setting(
-            subject.output, 0.0, options.start, options.end, smoothing=options.smoothing,
+            subject.output,
+            0.0,
+            options.start,
+            options.end,
+            smoothing=options.smoothing,
             set_point=subject.input,
-        )  # fmt: skip
+        )
 
     return subject.experiment(
         lambda options, _: lambda t: np.where(reached(t, 0.0), options.end, options.start),
-        {"step_response": step}, "step-response", step=step,
-    )  # fmt: skip
+        {"step_response": step},
+        "step-response",
+        step=step,
+    )
 
 
 GENERIC = GenericExperiment(
@@ -59,7 +65,12 @@ GENERIC = GenericExperiment(
     options=Options,
     signals={"input": "stimulus", "output": "recording"},
     defaults={
-        "start": 0.0, "end": 1.0, "duration": 1.0, "record": 1e-3, "settle": 0.0, "smoothing": 0.0
+        "start": 0.0,
+        "end": 1.0,
+        "duration": 1.0,
+        "record": 1e-3,
+        "settle": 0.0,
+        "smoothing": 0.0,
     },
     build=build,
-)  # fmt: skip
+)

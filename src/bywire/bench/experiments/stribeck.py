@@ -53,20 +53,23 @@ def build(subject: Subject) -> Experiment:
 
     figures = Figures(
         breakaway_forward=(
-            force, "Largest friction from rest toward positive speeds, over the levels."
+            force,
+            "Largest friction from rest toward positive speeds, over the levels.",
         ),
         breakaway_backward=(
-            force, "Largest friction from rest toward negative speeds, over the levels."
+            force,
+            "Largest friction from rest toward negative speeds, over the levels.",
         ),
         least_friction=(force, "Smallest friction in either direction, over speeds and levels."),
-    )  # fmt: skip
+    )
 
     def static(par: Any, options: Any) -> dict[str, xr.Dataset]:
         """Return friction over level and speed; at rest the breakaway force of each side."""
         side = np.linspace(0.0, options.speed_max, _SIDE)
         speeds = np.concatenate((-side[::-1], side))
-        values = np.array([_curve(subject.model, par, velocity, along, level, side)
-                           for level in options.levels])  # fmt: skip
+        values = np.array(
+            [_curve(subject.model, par, velocity, along, level, side) for level in options.levels]
+        )
         states = signals_of(subject.model.State)
         dims = (f"{along}_level" if along == velocity else along, velocity)
         labels = (states[along].label, states[velocity].label)

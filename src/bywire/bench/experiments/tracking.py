@@ -49,9 +49,11 @@ def build(subject: Subject) -> Experiment:
 
     return subject.experiment(
         lambda options, stimuli: wanted(stimuli.get(""), "tracking").sample,
-        {"tracking": followed}, "tracking",
-        followed=followed, driven_unit=lambda _: subject.units["input"],
-    )  # fmt: skip
+        {"tracking": followed},
+        "tracking",
+        followed=followed,
+        driven_unit=lambda _: subject.units["input"],
+    )
 
 
 GENERIC = GenericExperiment(

@@ -82,8 +82,10 @@ class Course(ParameterSet):
         if self.every > 0:
             begun = max(math.floor((first - self.onset) / self.every), 0)
             count = math.ceil(self.returns(first, last)) + 1
-            pairs = ((self.onset + k * self.every, self.onset + (k + self.share) * self.every)
-                     for k in range(begun, begun + count))  # fmt: skip
+            pairs = (
+                (self.onset + k * self.every, self.onset + (k + self.share) * self.every)
+                for k in range(begun, begun + count)
+            )
             return [min(t, ends) for pair in pairs if pair[0] < min(last, ends) for t in pair]
         edges = [self.onset, *([ends] if np.isfinite(ends) else [])]
         if not self.ramp > 0:

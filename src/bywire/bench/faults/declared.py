@@ -46,10 +46,13 @@ def channels_of(model: Any) -> Iterator[Channel]:
                 continue  # what the holder's tasks give
             seen = None if channel.seen is None else partial(_seen_within, sub, channel.seen)
             yield replace(
-                channel, name=f"{sub.path}.{channel.name}",
-                summary=f"{sub.label}: {channel.summary}", signal=sub.named(channel.signal),
-                seen=seen, task=sub.named(channel.task) if channel.task else "",
-            )  # fmt: skip
+                channel,
+                name=f"{sub.path}.{channel.name}",
+                summary=f"{sub.label}: {channel.summary}",
+                signal=sub.named(channel.signal),
+                seen=seen,
+                task=sub.named(channel.task) if channel.task else "",
+            )
 
 
 def _own_channels(model: Any) -> tuple[Channel, ...]:

@@ -16,8 +16,14 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 
 _OWN = ("fault", "value", "seed", "set")
-_RANGES = {"dropout": (0.0, 1.0), "missed": (0.0, 1.0), "noise": (0.0, math.inf),
-           "late": (1.0, 1000.0), "dropped": (2.0, 1e6), "restarted": (1e-6, math.inf)}  # fmt: skip
+_RANGES = {
+    "dropout": (0.0, 1.0),
+    "missed": (0.0, 1.0),
+    "noise": (0.0, math.inf),
+    "late": (1.0, 1000.0),
+    "dropped": (2.0, 1e6),
+    "restarted": (1e-6, math.inf),
+}
 
 
 @dataclass(frozen=True)
@@ -64,10 +70,13 @@ def from_text(text: str) -> dict[str, Any]:
 def with_units_wanted(section: Mapping[str, Any]) -> dict[str, Any]:
     """Return a section of a file, whose plain numbers are refused where they lack a unit."""
     return {
-        key: with_units_wanted(value) if isinstance(value, Mapping)
-        else repr(value) if key != "seed" and type(value) in (int, float) else value
+        key: with_units_wanted(value)
+        if isinstance(value, Mapping)
+        else repr(value)
+        if key != "seed" and type(value) in (int, float)
+        else value
         for key, value in section.items()
-    }  # fmt: skip
+    }
 
 
 def injections(

@@ -34,9 +34,7 @@ def checked_sections(sections: Any) -> list[dict[str, Any]]:
     return [dict(each) for each in sections]
 
 
-def with_faults(
-    cases: Sequence[Case], sections: Sequence[Mapping[str, Any]]
-) -> tuple[Case, ...]:
+def with_faults(cases: Sequence[Case], sections: Sequence[Mapping[str, Any]]) -> tuple[Case, ...]:
     """Return the runs of an experiment with the faults that the sections describe.
 
     Raises
@@ -165,8 +163,7 @@ def _falsified(
 def _changes(faults: Sequence[Injection], case: Case) -> Iterator[tuple[float, ParameterSet]]:
     """Yield when parameters change, and what they are from then on."""
     changing = [fault for fault in faults if fault.mode.changes is not None]
-    instants = {t for fault in changing
-                for t in fault.course.instants(-case.settle, case.duration)}  # fmt: skip
+    instants = {t for fault in changing for t in fault.course.instants(-case.settle, case.duration)}
     times = sorted({max(t, -case.settle) for t in instants if t < case.duration})
     for t in times:
         yield t, _at(changing, t, case.par)

@@ -134,8 +134,14 @@ def _every(model: Model, par: ParameterSet) -> Iterator[Mode]:
         yield from _of_channel(channel, [task.name for task in tasks])
     for task in tasks:
         for name, (summary, kind, value) in _TASK.items():
-            yield Mode(f"{task.name}.{name}", f"task {task.name} {summary}", _unit(kind, ""),
-                       value, falsified=name, task=task.name)  # fmt: skip
+            yield Mode(
+                f"{task.name}.{name}",
+                f"task {task.name} {summary}",
+                _unit(kind, ""),
+                value,
+                falsified=name,
+                task=task.name,
+            )
     for each in failures_of(model):
         yield Mode(each.name, each.summary, each.unit, each.value, each.changes)
 
@@ -150,8 +156,9 @@ def _groups(par: ParameterSet, prefix: str = "") -> Iterator[tuple[str, Paramete
 def _of_element(place: str, fault: ParameterFault, par: ParameterSet) -> Mode:
     def changes(now: Any, value: float) -> Mapping[str, Any]:
         changed = {f"{place}.{name}": each for name, each in fault.with_it.items()}
-        changed |= {f"{place}.{name}": value * now.value(f"{place}.{name}")
-                    for name in fault.scaled}  # fmt: skip
+        changed |= {
+            f"{place}.{name}": value * now.value(f"{place}.{name}") for name in fault.scaled
+        }
         return changed | ({f"{place}.{fault.replaced}": value} if fault.replaced else {})
 
     unit = "1"
@@ -177,9 +184,13 @@ def _of_channel(channel: Channel, tasks: Collection[str]) -> Iterator[Mode]:
             continue
         value = {"level": channel.stuck, "offset": channel.offset, "rate": channel.offset}
         yield Mode(
-            f"{channel.name}.{name}", f"{channel.summary} {summary}", _unit(kind, channel.unit),
-            value.get(kind, _VALUES.get(kind, 0.0)), channel=channel, falsified=name,
-        )  # fmt: skip
+            f"{channel.name}.{name}",
+            f"{channel.summary} {summary}",
+            _unit(kind, channel.unit),
+            value.get(kind, _VALUES.get(kind, 0.0)),
+            channel=channel,
+            falsified=name,
+        )
 
 
 def _unit(kind: str, unit: str) -> str:

@@ -100,9 +100,7 @@ def signals_of_setting(setting: Any) -> set[str]:
     return {value for value in vars(setting).values() if isinstance(value, str) and value}
 
 
-def evaluate_cases(
-    name: str, rows: Rows, settings: Sequence[Any]
-) -> dict[str, KpiOfCases]:
+def evaluate_cases(name: str, rows: Rows, settings: Sequence[Any]) -> dict[str, KpiOfCases]:
     """Return all figures of a family by name, of many cases at once.
 
     Where the settings differ in no more than what the family declares as ``BY_CASE``, they are
@@ -156,9 +154,7 @@ def _together(
     )
     blank = dict.fromkeys(by_case)
     if not is_alike or any(
-        other is not first
-        and other != first
-        and replace(other, **blank) != replace(first, **blank)
+        other is not first and other != first and replace(other, **blank) != replace(first, **blank)
         for other in settings
     ):
         return None
@@ -192,9 +188,14 @@ def _in_c(
     if each[0] is None and not all(figure.needs for figure in figures):
         return None
     given = figures_in_c(
-        chosen.name, chosen.path, how, joined, rows["time"].values,
-        [None if one is None else one[0] for one in each], len(figures),
-    )  # fmt: skip
+        chosen.name,
+        chosen.path,
+        how,
+        joined,
+        rows["time"].values,
+        [None if one is None else one[0] for one in each],
+        len(figures),
+    )
     if given is None:
         return None
     units = how.units("1" if each[0] is None else each[0][1], joined)
@@ -206,8 +207,12 @@ def _in_c(
 
     return {
         figure.name: KpiOfCases(
-            figure.name, values, units.get(figure.unit, figure.unit), figure.definition,
-            partial(told, figure, why), np.isin(why, how.open).tolist().__getitem__,
+            figure.name,
+            values,
+            units.get(figure.unit, figure.unit),
+            figure.definition,
+            partial(told, figure, why),
+            np.isin(why, how.open).tolist().__getitem__,
         )
         for figure, values, why in zip(figures, *given, strict=True)
-    }  # fmt: skip
+    }

@@ -99,9 +99,14 @@ def _function(family: str, path: Path) -> Any:
 
 
 def figures_in_c(
-    family: str, path: Path, how: InC, setting: Any, time: Array,
-    signals: Sequence[Array | None], count: int,
-) -> tuple[Array, NDArray[np.int32]] | None:  # fmt: skip
+    family: str,
+    path: Path,
+    how: InC,
+    setting: Any,
+    time: Array,
+    signals: Sequence[Array | None],
+    count: int,
+) -> tuple[Array, NDArray[np.int32]] | None:
     """Return a family's figures of many cases, and which of them are not defined.
 
     Parameters

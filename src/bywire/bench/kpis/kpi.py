@@ -212,9 +212,13 @@ class KpiOfCases:
     def case(self, k: Any) -> Kpi:
         """Return the figure of one case."""
         return Kpi(
-            self.name, float(self.values[k]), self.unit, self.definition, self.told(k),
+            self.name,
+            float(self.values[k]),
+            self.unit,
+            self.definition,
+            self.told(k),
             is_open=self.opened(k),
-        )  # fmt: skip
+        )
 
 
 class Data(Protocol):
@@ -278,15 +282,20 @@ class Measure(Generic[D]):
         """Return the figure of all cases that the data hold."""
         unit, note = data.units.get(self.unit, self.unit), data.note
         value: Any = (
-            Undefined(data.defect, getattr(data, "is_open", False)) if data.defect
+            Undefined(data.defect, getattr(data, "is_open", False))
+            if data.defect
             else self.__wrapped__(data)
-        )  # fmt: skip
+        )
         if isinstance(value, Undefined):
             reason = value.reason
             value = Values(math.nan, Why(True, lambda _: reason, value.is_open))
         figure = value if isinstance(value, Values) else Values(value)
         return KpiOfCases(
-            self.name, figure.values, unit, self.definition, lambda k: figure.reason(k) or note,
+            self.name,
+            figure.values,
+            unit,
+            self.definition,
+            lambda k: figure.reason(k) or note,
             figure.is_open,
         )
 

@@ -87,9 +87,7 @@ def share_stuck(data: Occupation) -> Array | Values | Undefined:
     two samples counts. Else from the samples of the mode, as `share_sat_current`.
     """
     if data.t_stuck is not None:
-        return np.asarray(
-            (data.t_stuck[..., -1] - data.t_stuck[..., 0]) / (data.t[-1] - data.t[0])
-        )
+        return np.asarray((data.t_stuck[..., -1] - data.t_stuck[..., 0]) / (data.t[-1] - data.t[0]))
     return _share(data.t, data.stuck, "stuck")
 
 

@@ -80,19 +80,23 @@ class Sweep:
     @cached_property
     def values(self) -> NDArray[np.complexfloating[Any, Any]]:
         """Response at these frequencies, shape (k,)."""
-        return np.array([
-            self._line(self.response, *window) / self._line(self.drive, *window)
-            for window in self.windows[: self.frequencies.size]
-        ])  # fmt: skip
+        return np.array(
+            [
+                self._line(self.response, *window) / self._line(self.drive, *window)
+                for window in self.windows[: self.frequencies.size]
+            ]
+        )
 
     @cached_property
     def moves(self) -> NDArray[np.bool_]:
         """Whether the output moves at each of these frequencies, shape (k,)."""
         least = _ROUNDED * float(np.max(np.abs(self.response)))
-        return np.array([
-            np.ptp(self.response[self._rows(begin, end)]) > least
-            for _, begin, end in self.windows[: self.frequencies.size]
-        ])  # fmt: skip
+        return np.array(
+            [
+                np.ptp(self.response[self._rows(begin, end)]) > least
+                for _, begin, end in self.windows[: self.frequencies.size]
+            ]
+        )
 
     def _rows(self, begin: float, end: float) -> slice:
         return slice(*np.searchsorted(self.t, [begin - 1e-9, end + 1e-9]))

@@ -65,7 +65,9 @@ def _units(level: str, setting: Setting) -> dict[str, str]:
 IN_C = InC(
     signals=("signal",),
     reasons=(
-        "nothing is stepped", "the step height is zero", "the response does not move",
+        "nothing is stepped",
+        "the step height is zero",
+        "the response does not move",
         "the response changes by less than its ripple: no step is seen",
         "the response still moves at the end",
     ),

@@ -163,8 +163,10 @@ class StepResponse:
         way, unit = np.asarray(np.max(np.abs(self.y - self.y[..., :1]), axis=-1)), self.unit
         return Why(
             way <= _DEAD * height,
-            lambda c: f"the response does not move: {_at(way, c):.3g} of a step of "
-            f"{_at(height, c):.3g} {unit} at most",
+            lambda c: (
+                f"the response does not move: {_at(way, c):.3g} of a step of "
+                f"{_at(height, c):.3g} {unit} at most"
+            ),
             is_open=True,
         )
 
@@ -203,9 +205,11 @@ class StepResponse:
         drift = np.maximum(np.abs(then - first), np.maximum(low - lower, higher - high))
         return Why(
             (drift > _MOVING * height) & ~self.flat.where,
-            lambda c: "the response still moves at the end: by "
-            f"{100 * _at(drift, c) / _at(height, c):.3g} % of the step height in the window of the "
-            "steady state; record longer",
+            lambda c: (
+                "the response still moves at the end: by "
+                f"{100 * _at(drift, c) / _at(height, c):.3g} % of the step height in the window of "
+                "the steady state; record longer"
+            ),
             is_open=True,
         )
 
@@ -307,8 +311,10 @@ def settling_time(response: StepResponse) -> Values:
         ),
         Why(
             late,
-            lambda c: f"enters the band only {t[-1] - entry[c]:.3g} s before the recording ends: "
-            "record longer",
+            lambda c: (
+                f"enters the band only {t[-1] - entry[c]:.3g} s before the recording ends: "
+                "record longer"
+            ),
             is_open=True,
         ),
     )
@@ -376,8 +382,10 @@ def _first(response: StepResponse, level: float) -> Values:
         *response.blind,
         Why(
             ~reached.any(axis=-1),
-            lambda c: f"never reaches {100 * level:g} % of the step height: "
-            f"{100 * np.max(z[c]):.4g} % at most",
+            lambda c: (
+                f"never reaches {100 * level:g} % of the step height: "
+                f"{100 * np.max(z[c]):.4g} % at most"
+            ),
         ),
         Why(
             k == 0,

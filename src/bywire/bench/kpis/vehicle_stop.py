@@ -61,9 +61,18 @@ class Setting:
 
 
 _SIGNALS = (
-    "v", "x", "a", "phi", "support", "heat_front", "heat_rear", "slip_front", "slip_rear",
-    "omega_front", "omega_rear",
-)  # fmt: skip
+    "v",
+    "x",
+    "a",
+    "phi",
+    "support",
+    "heat_front",
+    "heat_rear",
+    "slip_front",
+    "slip_rear",
+    "omega_front",
+    "omega_rear",
+)
 
 
 def _packed(setting: Setting, cases: int) -> Array:

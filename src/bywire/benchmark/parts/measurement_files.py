@@ -45,14 +45,17 @@ def measured() -> list[Result]:
         )
     return [
         at_most(
-            "read.mdf4", ratio(seconds, "bywire", "alone"), _GOAL, "times as long",
+            "read.mdf4",
+            ratio(seconds, "bywire", "alone"),
+            _GOAL,
+            "times as long",
             f"{len(READ)} of {CHANNELS} channels of {SECONDS} s at {RATE} Hz, a thirtieth of an "
             "hour: read in a child process, in SI, with instants that increase, "
             f"{median(seconds['bywire']):.2g} s, over asammdf's select, "
             f"{median(seconds['alone']):.2g} s; files above 0.5 GB are read piece by piece "
             "within bounded memory, which takes several times as long",
         )
-    ]  # fmt: skip
+    ]
 
 
 def _write(asammdf: Any, path: Path) -> None:

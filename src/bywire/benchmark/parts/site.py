@@ -54,10 +54,16 @@ def _made(root: Path) -> subprocess.CompletedProcess[str]:
     """Make the site as ``tasks.py docs`` does."""
     options = ("-q", "-W", "-n", "-b", "html", "docs", "docs/_build")
     return subprocess.run(
-        python_command("-m", "sphinx", *options), cwd=root, check=False, stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, encoding="utf-8", errors="replace",
+        python_command("-m", "sphinx", *options),
+        cwd=root,
+        check=False,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        errors="replace",
         env={"OMP_NUM_THREADS": "1", **environment()},
-    )  # fmt: skip
+    )
 
 
 def _skipped(why: str) -> list[Result]:

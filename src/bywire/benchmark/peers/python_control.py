@@ -33,9 +33,13 @@ def nonlinear_system(point: Point) -> Any:
         return [f / m for f, m in zip(force, model.mass(at, par), strict=True)]
 
     return control.NonlinearIOSystem(
-        rates, lambda t, x, u, params: x, states=list(State._fields), inputs=list(Memory._fields),
-        outputs=[f"y_{name}" for name in State._fields], params={},
-    )  # fmt: skip
+        rates,
+        lambda t, x, u, params: x,
+        states=list(State._fields),
+        inputs=list(Memory._fields),
+        outputs=[f"y_{name}" for name in State._fields],
+        params={},
+    )
 
 
 def by_differences(system: Any, point: Point) -> Array:

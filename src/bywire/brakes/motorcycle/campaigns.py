@@ -11,11 +11,17 @@ CAMPAIGN = DeclaredCampaign(
         "bench": "hard-braking",
         "set": {"options.p_from": "1 Pa", "options.p_to": "37 bar", "options.duration": "2.5 s"},
         "vary": {
-            "motor.R_m": "+-10 %", "motor.K_e": "+-5 %", "seal.T_pr": "+-20 %",
-            "caliper.K_pd": "+-10 %", "supply.V_bat": "+-10 %",
+            "motor.R_m": "+-10 %",
+            "motor.K_e": "+-5 %",
+            "seal.T_pr": "+-20 %",
+            "caliper.K_pd": "+-10 %",
+            "supply.V_bat": "+-10 %",
         },
         "campaign": {
-            "onset": "0.8 s", "spread": "20 ms", "onsets": 8, "healthy": 256,
+            "onset": "0.8 s",
+            "spread": "20 ms",
+            "onsets": 8,
+            "healthy": 256,
             "present": ["fluid.*", "caliper.knocked-back", "piston.*"],
             "leave_out": ["pedal_force.*", "i_set.*", "v_set.*"],
         },
@@ -29,11 +35,19 @@ CAMPAIGN = DeclaredCampaign(
             "ecu.dropped": [2, 5],
         },
         "criteria": [
-            {"name": "loss of braking", "signal": "p_pd", "below_share": "80 %",
-             "lasting": "50 ms"},
-            {"name": "unintended braking", "signal": "p_pd", "above_healthy": "5 bar",
-             "lasting": "50 ms"},
+            {
+                "name": "loss of braking",
+                "signal": "p_pd",
+                "below_share": "80 %",
+                "lasting": "50 ms",
+            },
+            {
+                "name": "unintended braking",
+                "signal": "p_pd",
+                "above_healthy": "5 bar",
+                "lasting": "50 ms",
+            },
         ],
         "reaction": {"fault": "bridge.open-phase", "delay": "10 ms"},
     },
-)  # fmt: skip
+)

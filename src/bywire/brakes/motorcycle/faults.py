@@ -26,12 +26,11 @@ def _current(value: float, par: Any) -> float:
 CHANNELS = Channels(
     NAME,
     (
-        Channel("pressure", "pressure sensor", "Pa", "y_p", seen=_pressure,
-                stuck=20e5, offset=2e5),
+        Channel("pressure", "pressure sensor", "Pa", "y_p", seen=_pressure, stuck=20e5, offset=2e5),
         Channel("current", "current sensor", "A", "y_i", seen=_current, offset=1.0),
         Channel("bridge", "bridge", "1", "duty", "drive", stuck=1.0, task="ecu"),
     ),
-)  # fmt: skip
+)
 
 
 def _source(mode: str) -> Any:
@@ -68,16 +67,46 @@ def _boiling(par: Any, T: float) -> Mapping[str, Any]:
 
 
 FAULTS = (
-    Fault("fluid.vapor", "the fluid in the caliper boils, by its temperature", _boiling, NAME,
-          "K", 433.15),
-    Fault("battery.lost", "battery lost, the bridge opens: no current", _source("current-source"),
-          NAME),
-    Fault("battery.shorted", "battery lost, the bridge shorts the motor", _source("voltage-source"),
-          NAME),
-    Fault("bridge.open-phase", "a phase of the motor is open: no current",
-          _source("current-source"), NAME),
-    Fault("gear.jammed", "the screw jams where it is",
-          lambda par, value: {"seal.T_pr": value}, NAME, "N*m", 100.0),
-    Fault("caliper.knocked-back", "the disc has pushed the pads back, by the gap",
-          _knocked_back, NAME, "m", 0.3e-3),
-)  # fmt: skip
+    Fault(
+        "fluid.vapor",
+        "the fluid in the caliper boils, by its temperature",
+        _boiling,
+        NAME,
+        "K",
+        433.15,
+    ),
+    Fault(
+        "battery.lost",
+        "battery lost, the bridge opens: no current",
+        _source("current-source"),
+        NAME,
+    ),
+    Fault(
+        "battery.shorted",
+        "battery lost, the bridge shorts the motor",
+        _source("voltage-source"),
+        NAME,
+    ),
+    Fault(
+        "bridge.open-phase",
+        "a phase of the motor is open: no current",
+        _source("current-source"),
+        NAME,
+    ),
+    Fault(
+        "gear.jammed",
+        "the screw jams where it is",
+        lambda par, value: {"seal.T_pr": value},
+        NAME,
+        "N*m",
+        100.0,
+    ),
+    Fault(
+        "caliper.knocked-back",
+        "the disc has pushed the pads back, by the gap",
+        _knocked_back,
+        NAME,
+        "m",
+        0.3e-3,
+    ),
+)

@@ -20,11 +20,10 @@ from bywire.core.typing import Array, Complex
 _STEP = 10e-6  # substep [s]: at most 1/(100 f) of the current loop's band, or its error shows
 
 CAUSES: Mapping[str, Mapping[str, Any]] = {
-    "seal friction": {"seal.T_pr": 0.0, "seal.f_cfr_p": 0.0, "seal.f_cfr_n": 0.0,
-                      "seal.mu_T": 0.0},
+    "seal friction": {"seal.T_pr": 0.0, "seal.f_cfr_p": 0.0, "seal.f_cfr_n": 0.0, "seal.mu_T": 0.0},
     "dither": {"ecu.dither.waveform": "off"},
     "converter": {"adc.law": "ideal"},
-}  # fmt: skip
+}
 """cause -> parameters without it"""
 
 
@@ -80,8 +79,10 @@ _SLOWEST = 1e-2  # time constant of the derivative's filter [s]
 _GAINS = {"k_p": (5e-7, 1e-4), "k_i": (1e-6, 3e-3), "k_d": (1e-9, 3e-6)}
 _OWN = {f"ecu.pressure.{name}": span for name, span in _GAINS.items()} | {
     "ecu.pressure.tau_d": (5e-5, _SLOWEST),
-    "ecu.pressure.b": (0.0, 1.0), "ecu.pressure.c": (0.0, 1.0),
-}  # fmt: skip
+    "ecu.pressure.b": (0.0, 1.0),
+    "ecu.pressure.c": (0.0, 1.0),
+}
+
 
 def in_ecu(par: ParameterSet) -> Mapping[str, tuple[float, float]]:
     """Return what a design of the pressure PID keeps to, so that an ECU can run it.

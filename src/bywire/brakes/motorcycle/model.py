@@ -62,9 +62,10 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     gear = Part(ball_screw_gear, output={"x": "x_mc"})
     # The source's law gives energy where the load drives the gear, less than it took before.
     E_gear = Integral(
-        "J", "loss of gear and screw, signed",
+        "J",
+        "loss of gear and screw, signed",
         role=Role("sink", "gear and screw", returns="taken"),
-    )  # fmt: skip
+    )
     seal = Part(seal_friction)
     E_seal = Integral("J", "loss of the seals' friction", role=Role("sink", "seal friction"))
     chamber = Part(master_cylinder, par="master_cylinder", state={"p": "p_mc"}, loss="E_damping")
@@ -77,7 +78,8 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     )
     port = Part(reservoir_port)
     E_port = Integral(
-        "J", "energy out through port and leak, less that of fluid that warms",
+        "J",
+        "energy out through port and leak, less that of fluid that warms",
         role=Role("sink", "port, leak, warming fluid", returns="any"),  # which expands
     )
     W_shaft = Integral("J", "work of the motor on the gear")
@@ -97,9 +99,12 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         labels={"y": "filtered current reading"},
     )
     heat = Part(
-        motor_heat, par="motor_heat", fixed=motor_heat.State._fields, outside=True,
+        motor_heat,
+        par="motor_heat",
+        fixed=motor_heat.State._fields,
+        outside=True,
         loss="E_motor_air",
-    )  # fmt: skip
+    )
 
     current = Wire("A", "motor current", 5.0)
     voltage = Wire("V", "motor voltage", 5.0)
@@ -118,13 +123,54 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     E_housing = Shown("J", "heat in the motor's housing", role=motor_heat.HOUSING)
 
     records: ClassVar[tuple[str, ...]] = (
-        "i", "i_ref", "i_star", "i_dit", "i_meas", "duty", "voltage", "theta", "omega", "x_mc",
-        "p_mc", "p_pd", "p_ref", "p_meas", "V_pedal", "q", "Re", "torque", "T_fr", "F_stop",
-        "q_makeup", "stuck", "at_stop", "sat_current", "sat_duty", "P_gear", "P_el", "E_source",
-        "E_supply", "E_copper", "E_gear", "E_seal", "E_damping", "E_pipeline", "E_stop", "E_port",
-        "E_stored", "W_shaft", "t_stuck", "T_winding", "T_housing", "derated", "E_warming",
-        "E_winding", "E_housing", "E_motor_air", "E_piston",
-    )  # fmt: skip
+        "i",
+        "i_ref",
+        "i_star",
+        "i_dit",
+        "i_meas",
+        "duty",
+        "voltage",
+        "theta",
+        "omega",
+        "x_mc",
+        "p_mc",
+        "p_pd",
+        "p_ref",
+        "p_meas",
+        "V_pedal",
+        "q",
+        "Re",
+        "torque",
+        "T_fr",
+        "F_stop",
+        "q_makeup",
+        "stuck",
+        "at_stop",
+        "sat_current",
+        "sat_duty",
+        "P_gear",
+        "P_el",
+        "E_source",
+        "E_supply",
+        "E_copper",
+        "E_gear",
+        "E_seal",
+        "E_damping",
+        "E_pipeline",
+        "E_stop",
+        "E_port",
+        "E_stored",
+        "W_shaft",
+        "t_stuck",
+        "T_winding",
+        "T_housing",
+        "derated",
+        "E_warming",
+        "E_winding",
+        "E_housing",
+        "E_motor_air",
+        "E_piston",
+    )
 
     def wire(self, w: Self) -> None:
         """Say what every part feels: electrics, piston, fluid, load, sensors."""
@@ -134,9 +180,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         w.supply.u = battery_supply.Input(w.i_dc)
         w.motor.u = dc_motor.Input(w.voltage, w.gear.x.omega)
         w.torque = dc_motor.output(dc_motor.State(w.current), w.motor.par).torque
-        w.heat.u = motor_heat.Input(
-            dc_motor.power_loss(dc_motor.State(w.current), w.motor.par)
-        )
+        w.heat.u = motor_heat.Input(dc_motor.power_loss(dc_motor.State(w.current), w.motor.par))
         piston = ball_screw_gear.output(w.gear.x, w.gear.par)
         cylinder = w.chamber.par
         w.stop.u = end_stop.Input(piston.x, piston.v, cylinder.x_rest, cylinder.x_end)

@@ -47,13 +47,16 @@ def linear(
     except ParameterError as error:
         if at.quantity is _PRESSURE:
             raise
-        raise ParameterError(
-            f"current = {at.value:g} A is no operating point: {error}"
-        ) from None
+        raise ParameterError(f"current = {at.value:g} A is no operating point: {error}") from None
     whole = linearize(
-        MotorcycleBrake(), driven, state, memory_at(p, driven),
-        inputs=inputs, outputs=outputs, friction=at.friction,
-    )  # fmt: skip
+        MotorcycleBrake(),
+        driven,
+        state,
+        memory_at(p, driven),
+        inputs=inputs,
+        outputs=outputs,
+        friction=at.friction,
+    )
     return whole.reduced(whole.live)
 
 

@@ -65,9 +65,15 @@ def rolling_case(
         }
 
     return Case(
-        label, model(), changed, state, memory, stimulus, duration,
+        label,
+        model(),
+        changed,
+        state,
+        memory,
+        stimulus,
+        duration,
         start=lambda par: rolling(v_0, par, heat),
-    )  # fmt: skip
+    )
 
 
 def on_surface(first: SurfaceName, further: SurfaceName | None = None) -> dict[str, float]:

@@ -112,9 +112,7 @@ def tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
         on_front = _lowered(
             front, m.v_hat, (u.p_f_set, p_f, before.p_f_most), par.ecu.front_slip, par
         )
-        on_rear = _lowered(
-            rear, m.v_hat, (u.p_r_set, p_r, before.p_r_most), par.ecu.rear_slip, par
-        )
+        on_rear = _lowered(rear, m.v_hat, (u.p_r_set, p_r, before.p_r_most), par.ecu.rear_slip, par)
         p_f, p_r = on_front.p, on_rear.p
         m = m._replace(
             slip_f_integral=on_front.integral,
@@ -201,12 +199,16 @@ def _measured(r: Readings, m: Memory, par: Par) -> Memory:
     T, ecu, vehicle = par.ecu.T_s, par.ecu, par.vehicle
     front = wheel_speed.output(
         wheel_speed.State(m.edge_f, m.age_f, m.omega_f_hat),
-        wheel_speed.Input(r.angle_f, r.age_f), T, ecu.wheel_speed,
-    )  # fmt: skip
+        wheel_speed.Input(r.angle_f, r.age_f),
+        T,
+        ecu.wheel_speed,
+    )
     rear = wheel_speed.output(
         wheel_speed.State(m.edge_r, m.age_r, m.omega_r_hat),
-        wheel_speed.Input(r.angle_r, r.age_r), T, ecu.wheel_speed,
-    )  # fmt: skip
+        wheel_speed.Input(r.angle_r, r.age_r),
+        T,
+        ecu.wheel_speed,
+    )
     shown = (m.v_last - r.v) / T - vehicle.body.g * r.sine + par.sensors.a_offset
     a_hat = m.a_hat + T / (par.sensors.tau_a + T) * (shown - m.a_hat)
     if ecu.sees == "known":
@@ -231,4 +233,3 @@ def _measured(r: Readings, m: Memory, par: Par) -> Memory:
         age_r=rear.age,
         v_last=r.v,
     )
-

@@ -25,6 +25,12 @@ CHANNELS = (
 )
 
 FAULTS = (
-    Fault("accelerometer.offset", "the accelerometer shows too much deceleration",
-          lambda par, value: {"sensors.a_offset": value}, (NAME, WHOLE_REAR), "m/s**2", 1.0),
-)  # fmt: skip
+    Fault(
+        "accelerometer.offset",
+        "the accelerometer shows too much deceleration",
+        lambda par, value: {"sensors.a_offset": value},
+        (NAME, WHOLE_REAR),
+        "m/s**2",
+        1.0,
+    ),
+)

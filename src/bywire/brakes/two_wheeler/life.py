@@ -44,9 +44,12 @@ def follows(z: Values, par: TwoWheelerParameters, wear: WearParameters) -> Mappi
 
 
 def effects(
-    figures: Mapping[str, Array], stops: Mapping[str, Array], z: Values,
-    par: TwoWheelerParameters, wear: WearParameters,
-) -> Effects:  # fmt: skip
+    figures: Mapping[str, Array],
+    stops: Mapping[str, Array],
+    z: Values,
+    par: TwoWheelerParameters,
+    wear: WearParameters,
+) -> Effects:
     """Return what each stop wears, and the fluid that follows the pistons of all faces."""
     work = figures["disc_energy"] * figures["disc_share_front"] / 100.0
     before, after = warm_stops.temperatures(work, stops["pause"], stops["T_air"], wear.disc)
@@ -91,12 +94,15 @@ TWO_WHEELER_PADS = Life(
     left=left,
     figures=("disc_energy", "disc_share_front"),
     settings={
-        "options.p_front": "15.4 bar", "options.p_rear": "37 bar", "options.duration": "7 s",
+        "options.p_front": "15.4 bar",
+        "options.p_rear": "37 bar",
+        "options.duration": "7 s",
     },
     population={
         "options.v_0": {
-            "kind": "discrete", "values": ["50 km/h", "100 km/h", "150 km/h"],
+            "kind": "discrete",
+            "values": ["50 km/h", "100 km/h", "150 km/h"],
             "weights": [70, 25, 5],
         },
     },
-)  # fmt: skip
+)

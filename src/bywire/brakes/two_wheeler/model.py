@@ -33,14 +33,68 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
     rear_disc = Part(brake_disc, par="rear.disc")
 
     records: ClassVar[tuple[str, ...]] = (
-        "x", "v", "v_f", "v_r", "a", "omega_f", "omega_r", "slip_f", "slip_r", "mu_f", "mu_r",
-        "sliding_f", "sliding_r", "u_f", "u_r", "F_f", "F_r", "N_f", "N_r", "support", "phi",
-        "phi_rate", "p_f", "p_r", "p_f_ref", "p_r_ref", "v_hat", "slip_f_hat", "slip_r_hat",
-        "a_hat", "eta_f", "abs_f", "abs_r", "lift", "phase_f", "phase_r", "T_f", "T_r",
-        "t_locked_f", "t_locked_r", "E_vehicle", "E_brake_f", "E_brake_r", "E_tyre_f", "E_tyre_r",
-        "E_drag", "E_roll", "E_ground", "W_slope", "W_pitch", "T_disc_f", "T_pads_f", "T_fluid_f",
-        "T_disc_r", "T_pads_r", "T_fluid_r", "E_friction", "E_discs", "E_pads", "E_fluid", "E_air",
-    )  # fmt: skip
+        "x",
+        "v",
+        "v_f",
+        "v_r",
+        "a",
+        "omega_f",
+        "omega_r",
+        "slip_f",
+        "slip_r",
+        "mu_f",
+        "mu_r",
+        "sliding_f",
+        "sliding_r",
+        "u_f",
+        "u_r",
+        "F_f",
+        "F_r",
+        "N_f",
+        "N_r",
+        "support",
+        "phi",
+        "phi_rate",
+        "p_f",
+        "p_r",
+        "p_f_ref",
+        "p_r_ref",
+        "v_hat",
+        "slip_f_hat",
+        "slip_r_hat",
+        "a_hat",
+        "eta_f",
+        "abs_f",
+        "abs_r",
+        "lift",
+        "phase_f",
+        "phase_r",
+        "T_f",
+        "T_r",
+        "t_locked_f",
+        "t_locked_r",
+        "E_vehicle",
+        "E_brake_f",
+        "E_brake_r",
+        "E_tyre_f",
+        "E_tyre_r",
+        "E_drag",
+        "E_roll",
+        "E_ground",
+        "W_slope",
+        "W_pitch",
+        "T_disc_f",
+        "T_pads_f",
+        "T_fluid_f",
+        "T_disc_r",
+        "T_pads_r",
+        "T_fluid_r",
+        "E_friction",
+        "E_discs",
+        "E_pads",
+        "E_fluid",
+        "E_air",
+    )
 
     def cold_torques(self, w: Self) -> tuple[float, float]:
         """Return what cold discs hold at the pressures of both circuits."""
@@ -66,20 +120,30 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
         ways, x = par.vehicle.road, recording["x"].values
         front, rear = par.ecu.front_slip.slip_set, par.ecu.rear_slip.slip_set
         return [
-            *far_from_peak(x, recording["abs_f"].values, front, "ecu.front_slip.slip_set",
-                           par.vehicle.front_tyre, ways),
-            *far_from_peak(x - par.vehicle.body.L, recording["abs_r"].values, rear,
-                           "ecu.rear_slip.slip_set", par.vehicle.rear_tyre, ways),
-        ]  # fmt: skip
+            *far_from_peak(
+                x,
+                recording["abs_f"].values,
+                front,
+                "ecu.front_slip.slip_set",
+                par.vehicle.front_tyre,
+                ways,
+            ),
+            *far_from_peak(
+                x - par.vehicle.body.L,
+                recording["abs_r"].values,
+                rear,
+                "ecu.rear_slip.slip_set",
+                par.vehicle.rear_tyre,
+                ways,
+            ),
+        ]
 
     def rest(self, par: Par) -> tuple[Any, ecu.Memory]:
         """Return the vehicle standing on its wheels, brakes open."""
         return at_speed(0.0, par)
 
 
-def at_speed(
-    v: float, par: Par, heat: Mapping[str, Any] | None = None
-) -> tuple[Any, ecu.Memory]:
+def at_speed(v: float, par: Par, heat: Mapping[str, Any] | None = None) -> tuple[Any, ecu.Memory]:
     """Return the vehicle rolling at a speed [m/s], brakes open, its ECU awake.
 
     ``heat``: temperatures of the brakes by their parts, see `cold_start`, which is the default.
@@ -93,9 +157,15 @@ def awake(v: float, vehicle: VehicleParameters, T_s: float) -> ecu.Memory:
     """Return what the ECU, of a sample time [s], holds while the vehicle rolls [m/s]."""
     front, rear = v / vehicle.front_wheel.r, v / vehicle.rear_wheel.r
     return zeros(ecu.Memory)._replace(
-        v_hat=v, v_last=v, tread_f=v, tread_r=v, omega_f_hat=front, omega_r_hat=rear,
-        edge_f=-front * T_s, edge_r=-rear * T_s,
-    )  # fmt: skip
+        v_hat=v,
+        v_last=v,
+        tread_f=v,
+        tread_r=v,
+        omega_f_hat=front,
+        omega_r_hat=rear,
+        edge_f=-front * T_s,
+        edge_r=-rear * T_s,
+    )
 
 
 def tick(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:

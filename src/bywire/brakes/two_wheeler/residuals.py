@@ -45,10 +45,31 @@ def _speed(signals: Signals, par: Any, dt: float) -> Array:
 
 
 RESIDUALS = (
-    Residual("slip-front", "slip of the front wheel, which control keeps small", VEHICLES, "1",
-             ("slip_f_hat", "v_hat"), _slip("f"), hold=50e-3),
-    Residual("slip-rear", "slip of the rear wheel, which control keeps small", VEHICLES, "1",
-             ("slip_r_hat", "v_hat"), _slip("r"), hold=50e-3),
-    Residual("speed", "speed of the wheels and what the accelerometer shows", VEHICLES, "m/s",
-             ("v_hat", "a_hat"), _speed, hold=5e-3),
-)  # fmt: skip
+    Residual(
+        "slip-front",
+        "slip of the front wheel, which control keeps small",
+        VEHICLES,
+        "1",
+        ("slip_f_hat", "v_hat"),
+        _slip("f"),
+        hold=50e-3,
+    ),
+    Residual(
+        "slip-rear",
+        "slip of the rear wheel, which control keeps small",
+        VEHICLES,
+        "1",
+        ("slip_r_hat", "v_hat"),
+        _slip("r"),
+        hold=50e-3,
+    ),
+    Residual(
+        "speed",
+        "speed of the wheels and what the accelerometer shows",
+        VEHICLES,
+        "m/s",
+        ("v_hat", "a_hat"),
+        _speed,
+        hold=5e-3,
+    ),
+)

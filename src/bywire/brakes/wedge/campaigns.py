@@ -10,12 +10,19 @@ CAMPAIGN = DeclaredCampaign(
     {
         "bench": "moment-ramp",
         "vary": {
-            "wedge.mu_B": "+-5 %", "caliper.K_cal": "+-10 %", "bearing.C_0": "+-20 %",
-            "heart.g_1": "+-20 %", "heart.g_2": "+-20 %", "motor_1.R_ref": "+-10 %",
+            "wedge.mu_B": "+-5 %",
+            "caliper.K_cal": "+-10 %",
+            "bearing.C_0": "+-20 %",
+            "heart.g_1": "+-20 %",
+            "heart.g_2": "+-20 %",
+            "motor_1.R_ref": "+-10 %",
             "motor_2.R_ref": "+-10 %",
         },
         "campaign": {
-            "onset": "0.3 s", "spread": "20 ms", "onsets": 4, "healthy": 256,
+            "onset": "0.3 s",
+            "spread": "20 ms",
+            "onsets": 4,
+            "healthy": 256,
             "present": ["caliper.gap-grown", "caliper.pad-lost", "heart.worn"],
             "leave_out": ["theta_?_set.*", "i_?_set.*"],
         },
@@ -25,10 +32,18 @@ CAMPAIGN = DeclaredCampaign(
             "wedge.friction": [0.5, 1.5],
         },
         "criteria": [
-            {"name": "loss of braking", "signal": "M_B", "below_share": "80 %",
-             "lasting": "100 ms"},
-            {"name": "unintended braking", "signal": "M_B", "above_healthy": "60 N*m",
-             "lasting": "50 ms"},
+            {
+                "name": "loss of braking",
+                "signal": "M_B",
+                "below_share": "80 %",
+                "lasting": "100 ms",
+            },
+            {
+                "name": "unintended braking",
+                "signal": "M_B",
+                "above_healthy": "60 N*m",
+                "lasting": "50 ms",
+            },
         ],
     },
-)  # fmt: skip
+)

@@ -30,15 +30,13 @@ BRAKING = Figures(
     peak_normal_force=("N", "Largest normal force."),
     caliper_energy=("J", "Largest energy of the caliper before the demand changes."),
     disc_share=("%", "Work of the disc on the wedge until then, over that energy."),
-    rate_limited=(
-        "%", "Share of the time until the demand changes on the software rate limit."
-    ),
+    rate_limited=("%", "Share of the time until the demand changes on the software rate limit."),
     peak_speed=("rad/s", "Largest speed of motor 1."),
     energy_in=("J", "Energy at the drives' input, standby included."),
     energy_braked=("J", "Energy taken from the disc."),
     energy_left=("J", "Largest residual of the energy balance: the step's error."),
     undefined="the level is never reached in time",
-)  # fmt: skip
+)
 """key figures of :func:`braking`"""
 
 

@@ -175,13 +175,17 @@ def _derated(m: Memory, par: WedgeParameters) -> Memory:
         return m
     most = par.control.position.i_max
     x_1, out_1 = derating.output(
-        derating.State(m.rise_winding_1, m.rise_housing_1), derating.Input(m.i_1_ref, most), T,
+        derating.State(m.rise_winding_1, m.rise_housing_1),
+        derating.Input(m.i_1_ref, most),
+        T,
         control,
-    )  # fmt: skip
+    )
     x_2, out_2 = derating.output(
-        derating.State(m.rise_winding_2, m.rise_housing_2), derating.Input(m.i_2_ref, most), T,
+        derating.State(m.rise_winding_2, m.rise_housing_2),
+        derating.Input(m.i_2_ref, most),
+        T,
         control,
-    )  # fmt: skip
+    )
     return m._replace(
         rise_winding_1=x_1.winding,
         rise_housing_1=x_1.housing,

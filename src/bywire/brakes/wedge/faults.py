@@ -45,10 +45,24 @@ def _shorted(motor: str) -> Any:
 
 
 FAULTS = (
-    *(Fault(f"screw_{number}.jammed", f"screw {number} jams where it is, by damping",
-            _jammed(f"motor_{number}"), WedgeBrake.name, "N*m*s/rad", 1e3)
-      for number in (1, 2)),
-    *(Fault(f"motor_{number}.shorted", f"winding of motor {number} shorted: no torque, but a drag",
-            _shorted(f"motor_{number}"), WedgeBrake.name)
-      for number in (1, 2)),
-)  # fmt: skip
+    *(
+        Fault(
+            f"screw_{number}.jammed",
+            f"screw {number} jams where it is, by damping",
+            _jammed(f"motor_{number}"),
+            WedgeBrake.name,
+            "N*m*s/rad",
+            1e3,
+        )
+        for number in (1, 2)
+    ),
+    *(
+        Fault(
+            f"motor_{number}.shorted",
+            f"winding of motor {number} shorted: no torque, but a drag",
+            _shorted(f"motor_{number}"),
+            WedgeBrake.name,
+        )
+        for number in (1, 2)
+    ),
+)

@@ -46,9 +46,14 @@ class WearParameters(ParameterSet):
 def begin(par: WedgeCornerParameters, wear: WearParameters) -> Values:
     """Return the slow states of the brake with new pads."""
     return {
-        "h_pad": wear.h_new, "clearance": par.caliper.clearance, "K_cal": par.caliper.K_cal,
-        "clicks": 0.0, "counted": 0.0, "wide": 0.0, "work": 0.0,
-    }  # fmt: skip
+        "h_pad": wear.h_new,
+        "clearance": par.caliper.clearance,
+        "K_cal": par.caliper.K_cal,
+        "clicks": 0.0,
+        "counted": 0.0,
+        "wide": 0.0,
+        "work": 0.0,
+    }
 
 
 def follows(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Mapping[str, float]:
@@ -57,9 +62,12 @@ def follows(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Mapp
 
 
 def effects(
-    figures: Mapping[str, Array], stops: Mapping[str, Array], z: Values,
-    par: WedgeCornerParameters, wear: WearParameters,
-) -> Effects:  # fmt: skip
+    figures: Mapping[str, Array],
+    stops: Mapping[str, Array],
+    z: Values,
+    par: WedgeCornerParameters,
+    wear: WearParameters,
+) -> Effects:
     """Return what each stop wears: both pads thin alike, and the clearance grows by both.
 
     Read between stops: by how much the way to contact, as the moment control sees it, is longer
@@ -87,8 +95,9 @@ def between(
     seen = z["clearance"] + readings["beyond"] - law.growth * (T - law.T_cold)
     state, out = wear_adjuster.output(
         wear_adjuster.State(applied=1.0, wide=z["wide"], teeth=z["counted"]),
-        wear_adjuster.Input(gap=seen, T=T, touching=0.0, parked=1.0, wanted=0.0), law,
-    )  # fmt: skip
+        wear_adjuster.Input(gap=seen, T=T, touching=0.0, parked=1.0, wanted=0.0),
+        law,
+    )
     return {
         **z,
         "clearance": z["clearance"] - law.tooth * out.turned,
@@ -156,7 +165,10 @@ WEDGE_PADS = Life(
     figures=("energy_braked", "contact_angle"),
     between=between,
     settings={
-        "options.v_0": "100 km/h", "options.M_brake": "600 N*m", "options.t_hold": "7 s",
-        "options.t_end": "100 ms", "simulation.step": "50 us",
+        "options.v_0": "100 km/h",
+        "options.M_brake": "600 N*m",
+        "options.t_hold": "7 s",
+        "options.t_end": "100 ms",
+        "simulation.step": "50 us",
     },
-)  # fmt: skip
+)

@@ -29,8 +29,11 @@ MECHANICAL = ("theta_1", "omega_1", "theta_2", "omega_2", "x", "v")
 INPUTS = ("i_1_ref", "i_2_ref")
 OUTPUTS = ("F_N", "x", "theta_1", "theta_2", "M_B")
 SMOOTH: dict[str, Any] = {
-    "motor_1.T_cog": 0.0, "motor_2.T_cog": 0.0, "flywheel.runout": 0.0, "flywheel.law": "driven",
-}  # fmt: skip
+    "motor_1.T_cog": 0.0,
+    "motor_2.T_cog": 0.0,
+    "flywheel.runout": 0.0,
+    "flywheel.law": "driven",
+}
 """what a linear model leaves out: torques and travels that alternate within small motions"""
 _FREE = 1e3
 _RECORDING = ("phi", "y_P")  # states that are only shown
@@ -67,10 +70,15 @@ def point(par: Par, F_N: float, speed: float = 0.0) -> Point:
     # Beyond the limit the drives do not answer: the search is for what would be needed.
     free = smooth.replace({"drive.i_max": _FREE * smooth.drive.i_max})
     state, memory = equilibrium(
-        WedgeBrake(), free, state_at(turning * x, smooth), memory_at(turning * x, smooth),
-        given=("x",), inputs=INPUTS, running=("Omega", "phi"),
+        WedgeBrake(),
+        free,
+        state_at(turning * x, smooth),
+        memory_at(turning * x, smooth),
+        given=("x",),
+        inputs=INPUTS,
+        running=("Omega", "phi"),
         tied=("theta_1", "theta_2"),
-    )  # fmt: skip
+    )
     most = max(abs(getattr(memory, name)) for name in INPUTS)
     if most > smooth.drive.i_max:
         raise ParameterError(
@@ -80,7 +88,7 @@ def point(par: Par, F_N: float, speed: float = 0.0) -> Point:
     moving = turning * speed
     state = state._replace(
         omega_1=moving, omega_2=moving, v=moving * roller_screw.slope(smooth.screw)
-    )  # fmt: skip
+    )
     return Point(WedgeBrake(), smooth, state, memory, zeros(Stimulus))
 
 
@@ -126,9 +134,14 @@ def full(par: Par, F_N: float, friction: Friction = "removed", speed: float = 0.
     if cast(Any, at.state).Omega != 0.0 and friction == "stuck":
         kinds["Omega"] = "sliding"
     whole = linearize(
-        at.model, at.par, at.state, at.memory,
-        inputs=INPUTS, outputs=(*OUTPUTS, "y_M"), friction=kinds,
-    )  # fmt: skip
+        at.model,
+        at.par,
+        at.state,
+        at.memory,
+        inputs=INPUTS,
+        outputs=(*OUTPUTS, "y_M"),
+        friction=kinds,
+    )
     return whole.reduced(whole.live)
 
 
@@ -175,19 +188,28 @@ def rigid(mechanical: LinearModel, par: Par) -> LinearModel:
     T[[0, 2], 0] = T[[1, 3], 1] = 1.0 / k
     T[4, 0] = T[5, 1] = 1.0
     masses = [
-        1.0, servo_motor.mass(par.motor_1)[-1], 1.0, servo_motor.mass(par.motor_2)[-1],
-        1.0, par.wedge.M_W,
-    ]  # fmt: skip
+        1.0,
+        servo_motor.mass(par.motor_1)[-1],
+        1.0,
+        servo_motor.mass(par.motor_2)[-1],
+        1.0,
+        par.wedge.M_W,
+    ]
     # Travel and velocity are projected apart: a length has no mass.
     split = np.zeros((2, 6))
     for row, columns in ((0, [0, 2, 4]), (1, [1, 3, 5])):
         split[row, columns] = T[columns, row] * np.array(masses)[columns]
     left = np.linalg.solve(split @ T, split)  # inverse of T weighted by the masses
     return replace(
-        mechanical, name="wedge, rigid",
-        A=left @ mechanical.A @ T, B=left @ mechanical.B, C=mechanical.C @ T,
-        states=("x", "v"), state_units=("m", "m/s"), rate=left @ mechanical.rate,
-    )  # fmt: skip
+        mechanical,
+        name="wedge, rigid",
+        A=left @ mechanical.A @ T,
+        B=left @ mechanical.B,
+        C=mechanical.C @ T,
+        states=("x", "v"),
+        state_units=("m", "m/s"),
+        rate=left @ mechanical.rate,
+    )
 
 
 def rigid_rate(par: Par) -> complex:

@@ -34,10 +34,17 @@ Par = WedgeParameters
 LOSSES = {"E_copper": "copper_loss", "E_damping": "damping_loss"}
 """energies that the motors lose, both together"""
 _SLOW = motor_heat.State._fields
-_SUPPLY = Role("source", "supply", whole="W_electric", rest="E_standby",
-               rest_label="standby of the drives")  # fmt: skip
-_DISC = Role("source", "disc", whole="W_disc", rest="E_pads", rest_label="heat of pads and disc",
-             book="with disc")  # fmt: skip
+_SUPPLY = Role(
+    "source", "supply", whole="W_electric", rest="E_standby", rest_label="standby of the drives"
+)
+_DISC = Role(
+    "source",
+    "disc",
+    whole="W_disc",
+    rest="E_pads",
+    rest_label="heat of pads and disc",
+    book="with disc",
+)
 
 
 class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
@@ -109,16 +116,77 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     E_housing = Shown("J", "heat in the motors' housings", role=motor_heat.HOUSING)
 
     records: ClassVar[tuple[str, ...]] = (
-        "M_set", "M_B", "y_M", "M_meas", "mode", "rate", "sat_rate", "theta_c", "theta_ref",
-        "theta_1_ref", "theta_2_ref", "theta_1", "theta_2", "omega_1", "omega_2", "i_1_ref",
-        "i_2_ref", "i_1", "i_2", "voltage_1", "voltage_2", "x", "v", "f_1", "f_2", "f_12", "F_M",
-        "F_N", "F_end", "T_fr_1", "T_fr_2", "F_fr", "Omega", "phi", "contacts", "stuck", "P_in",
-        "P_meas", "E_source", "E_copper", "E_damping", "E_shaft", "E_wedge", "E_heart",
-        "E_caliper", "E_stop", "E_stored", "U_caliper", "W_supply", "W_electric", "W_disc",
-        "W_runout", "W_adjuster", "W_brake", "t_stuck", "clearance", "taken", "clicks",
-        "teeth", "gap_hat", "adjusting", "T_winding_1", "T_winding_2", "T_housing_1",
-        "T_housing_2", "derated", "E_warming", "E_winding", "E_housing", "E_motor_air",
-    )  # fmt: skip
+        "M_set",
+        "M_B",
+        "y_M",
+        "M_meas",
+        "mode",
+        "rate",
+        "sat_rate",
+        "theta_c",
+        "theta_ref",
+        "theta_1_ref",
+        "theta_2_ref",
+        "theta_1",
+        "theta_2",
+        "omega_1",
+        "omega_2",
+        "i_1_ref",
+        "i_2_ref",
+        "i_1",
+        "i_2",
+        "voltage_1",
+        "voltage_2",
+        "x",
+        "v",
+        "f_1",
+        "f_2",
+        "f_12",
+        "F_M",
+        "F_N",
+        "F_end",
+        "T_fr_1",
+        "T_fr_2",
+        "F_fr",
+        "Omega",
+        "phi",
+        "contacts",
+        "stuck",
+        "P_in",
+        "P_meas",
+        "E_source",
+        "E_copper",
+        "E_damping",
+        "E_shaft",
+        "E_wedge",
+        "E_heart",
+        "E_caliper",
+        "E_stop",
+        "E_stored",
+        "U_caliper",
+        "W_supply",
+        "W_electric",
+        "W_disc",
+        "W_runout",
+        "W_adjuster",
+        "W_brake",
+        "t_stuck",
+        "clearance",
+        "taken",
+        "clicks",
+        "teeth",
+        "gap_hat",
+        "adjusting",
+        "T_winding_1",
+        "T_winding_2",
+        "T_housing_1",
+        "T_housing_2",
+        "derated",
+        "E_warming",
+        "E_winding",
+        "E_housing",
+        "E_motor_air",
+    )
 
     def wire(self, w: Self) -> None:
         """Say what every part feels: forces of the contacts, shafts, wedge, disc, measurements."""

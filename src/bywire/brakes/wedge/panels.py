@@ -9,9 +9,11 @@ from bywire.report.line_role import Role
 from bywire.report.panels import Panel, Panels, Trace
 
 _WINDINGS = Panel(
-    "windings", (Trace("T_winding_1"), Trace("T_winding_2", Role.SECOND)),
-    saturation="derated", saturated="derated",
-)  # fmt: skip
+    "windings",
+    (Trace("T_winding_1"), Trace("T_winding_2", Role.SECOND)),
+    saturation="derated",
+    saturated="derated",
+)
 _MODE = Panel("mode", (Trace("mode"),), levels=("parked", "gap", "moment", "retracting"))
 _ADJUSTER = (
     Panel("gap", (Trace("gap_hat"), Trace("taken", Role.SECOND))),
@@ -51,8 +53,10 @@ CORNER = Panels(
     (
         Panel("speed", (Trace("v_x"), Trace("v_tread", Role.SECOND)), height=1.8),
         Panel(
-            "slip", (Trace("slip"), Trace("slip_hat", Role.SECOND)),
-            saturation="abs", saturated="slip control",
+            "slip",
+            (Trace("slip"), Trace("slip_hat", Role.SECOND)),
+            saturation="abs",
+            saturated="slip control",
         ),
         *BRAKING.panels[:2],
         Panel("normal force", (Trace("F_N"),)),

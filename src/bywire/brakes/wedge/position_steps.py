@@ -55,9 +55,15 @@ class Options(ParameterSet):
 
 
 DEFAULTS = Options(
-    a_small=0.5, a_medium=1.0, a_large=2.0, f_low=12.0, f_high=60.0,
-    duration=0.3, settle=0.01, record=2e-4,
-)  # fmt: skip
+    a_small=0.5,
+    a_medium=1.0,
+    a_large=2.0,
+    f_low=12.0,
+    f_high=60.0,
+    duration=0.3,
+    settle=0.01,
+    record=2e-4,
+)
 
 
 def cases(par: WedgeParameters, options: Options, rig: Mapping[str, Any]) -> tuple[Case, ...]:
@@ -67,12 +73,18 @@ def cases(par: WedgeParameters, options: Options, rig: Mapping[str, Any]) -> tup
     """
     return tuple(
         shaft_case(
-            f"{loop}_{size}", par, _stepped(_amplitude(options, size)), options.duration,
+            f"{loop}_{size}",
+            par,
+            _stepped(_amplitude(options, size)),
+            options.duration,
             {**rig, "rig.mode_1": "position", "control.position.f_n": _frequency(options, loop)},
-            settle=options.settle, keep=options.settle, record=options.record,
+            settle=options.settle,
+            keep=options.settle,
+            record=options.record,
         )
-        for loop in _LOOPS for size in _SIZES
-    )  # fmt: skip
+        for loop in _LOOPS
+        for size in _SIZES
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

@@ -83,15 +83,18 @@ def motion(par: WedgeParameters, F_N: float) -> Motion:
     whole = mechanical(full(par, F_N))
     # Where the force exceeds the preload, one motor stands free: nothing depends on its angle.
     acting = np.abs(whole.A).max(axis=0) > _FREE * np.abs(whole.A).max()
-    bound = whole.reduced([n for n, acts in zip(whole.states, acting, strict=True) if acts],
-                          held=True)  # fmt: skip
+    bound = whole.reduced(
+        [n for n, acts in zip(whole.states, acting, strict=True) if acts], held=True
+    )
     # The one that grows fastest; rounded, so that of a pair the upper one is taken every time.
     slow = max(bound.poles(), key=lambda s: (round(s.real, 9), s.imag))
     locked = whole.reduced(("x", "v"), held=True).poles()
     return Motion(
-        float(slow.real), float(abs(slow.imag)) / (2.0 * math.pi), rigid_rate(par).real,
+        float(slow.real),
+        float(abs(slow.imag)) / (2.0 * math.pi),
+        rigid_rate(par).real,
         float(locked.real.max()),
-    )  # fmt: skip
+    )
 
 
 def neutral(par: WedgeParameters, F_N: float) -> float:

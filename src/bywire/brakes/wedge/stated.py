@@ -17,38 +17,88 @@ def _judged(fact: Fact, allowance: Allowance) -> str:
 
 
 HELD = StatedLevel(
-    "wedge.fig7.held", "moment-pulses", "M_B", facts.HELD.value, "held, Fig. 7",
-    _judged(facts.HELD, FOLLOWED), ("M_high",), FOLLOWED.around(facts.HELD.value),
-)  # fmt: skip
+    "wedge.fig7.held",
+    "moment-pulses",
+    "M_B",
+    facts.HELD.value,
+    "held, Fig. 7",
+    _judged(facts.HELD, FOLLOWED),
+    ("M_high",),
+    FOLLOWED.around(facts.HELD.value),
+)
 PULSED = StatedLevel(
-    "wedge.fig7.pulsed", "moment-pulses", "M_B", facts.PULSED.value, "pulses, Fig. 7",
-    _judged(facts.PULSED, FOLLOWED), ("M_high", "low"), FOLLOWED.around(facts.PULSED.value),
-)  # fmt: skip
+    "wedge.fig7.pulsed",
+    "moment-pulses",
+    "M_B",
+    facts.PULSED.value,
+    "pulses, Fig. 7",
+    _judged(facts.PULSED, FOLLOWED),
+    ("M_high", "low"),
+    FOLLOWED.around(facts.PULSED.value),
+)
 LOWERED = StatedLevel(
-    "wedge.fig8.lowered", "moment-ramp", "M_B", facts.LOWERED.value, "lowered, Fig. 8",
-    _judged(facts.LOWERED, FOLLOWED), ("M_low",), FOLLOWED.around(facts.LOWERED.value),
-)  # fmt: skip
+    "wedge.fig8.lowered",
+    "moment-ramp",
+    "M_B",
+    facts.LOWERED.value,
+    "lowered, Fig. 8",
+    _judged(facts.LOWERED, FOLLOWED),
+    ("M_low",),
+    FOLLOWED.around(facts.LOWERED.value),
+)
 RAMPED = StatedLevel(
-    "wedge.fig8.ramped", "moment-ramp", "M_B", facts.RAMPED.value, "ramp's end, Fig. 8",
-    _judged(facts.RAMPED, FOLLOWED), ("M_high",), FOLLOWED.around(facts.RAMPED.value),
-)  # fmt: skip
+    "wedge.fig8.ramped",
+    "moment-ramp",
+    "M_B",
+    facts.RAMPED.value,
+    "ramp's end, Fig. 8",
+    _judged(facts.RAMPED, FOLLOWED),
+    ("M_high",),
+    FOLLOWED.around(facts.RAMPED.value),
+)
 PULSE = StatedLevel(
-    "wedge.fig9.pulse", "moment-pulse-950", "M_B", facts.PULSE.value, "pulse, Fig. 9",
-    _judged(facts.PULSE, FOLLOWED), ("M_high",), FOLLOWED.around(facts.PULSE.value),
-)  # fmt: skip
+    "wedge.fig9.pulse",
+    "moment-pulse-950",
+    "M_B",
+    facts.PULSE.value,
+    "pulse, Fig. 9",
+    _judged(facts.PULSE, FOLLOWED),
+    ("M_high",),
+    FOLLOWED.around(facts.PULSE.value),
+)
 POWER = StatedLevel(
-    "wedge.fig9.power", "moment-pulse-950", "P_meas", facts.POWER.value, "around this, Fig. 9",
-    facts.POWER.where, ("M_high",),
-)  # fmt: skip
+    "wedge.fig9.power",
+    "moment-pulse-950",
+    "P_meas",
+    facts.POWER.value,
+    "around this, Fig. 9",
+    facts.POWER.where,
+    ("M_high",),
+)
 PEAK_MOMENT = StatedFigure(
-    "wedge.fig9.peak_moment", "moment-pulse-950", "peak_moment", facts.PULSE.value,
-    _judged(facts.PULSE, FOLLOWED), ("M_high",), tolerance=FOLLOWED.around(facts.PULSE.value),
-)  # fmt: skip
+    "wedge.fig9.peak_moment",
+    "moment-pulse-950",
+    "peak_moment",
+    facts.PULSE.value,
+    _judged(facts.PULSE, FOLLOWED),
+    ("M_high",),
+    tolerance=FOLLOWED.around(facts.PULSE.value),
+)
 HOLD_MOMENT = StatedFigure(
-    "wedge.fig7.hold_moment", "moment-pulses", "hold_moment", facts.HELD.value,
-    _judged(facts.HELD, FOLLOWED), ("M_high",), tolerance=FOLLOWED.around(facts.HELD.value),
-)  # fmt: skip
+    "wedge.fig7.hold_moment",
+    "moment-pulses",
+    "hold_moment",
+    facts.HELD.value,
+    _judged(facts.HELD, FOLLOWED),
+    ("M_high",),
+    tolerance=FOLLOWED.around(facts.HELD.value),
+)
 RAMP_ERROR = StatedFigure(
-    "wedge.fig8.ramp_error", "moment-ramp", "ramp_error_mean", facts.FOLLOWED.value,
-    _judged(facts.FOLLOWED, ERROR), ("M_low", "M_high"), tolerance=ERROR.size,
-)  # fmt: skip
+    "wedge.fig8.ramp_error",
+    "moment-ramp",
+    "ramp_error_mean",
+    facts.FOLLOWED.value,
+    _judged(facts.FOLLOWED, ERROR),
+    ("M_low", "M_high"),
+    tolerance=ERROR.size,
+)

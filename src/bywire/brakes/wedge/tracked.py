@@ -24,8 +24,11 @@ def _steady(data: xr.Dataset, force: str, par: WedgeParameters) -> NDArray[np.bo
     top = float(np.nanmax(F))
     lag = 1.0 / (2.0 * np.pi * par.moment_sensor.f_M)
     width = max(round(_SMOOTHED * lag / float(t[1] - t[0])), 1)
-    smooth = np.convolve(np.pad(F, (width // 2, width - 1 - width // 2), mode="edge"),
-                         np.ones(width) / width, mode="valid")  # fmt: skip
+    smooth = np.convolve(
+        np.pad(F, (width // 2, width - 1 - width // 2), mode="edge"),
+        np.ones(width) / width,
+        mode="valid",
+    )
     calm = np.abs(np.gradient(smooth, t)) * lag < _STEADY * top
     return np.asarray((_PRESSED * top < F) & calm & np.isfinite(F))
 
@@ -78,23 +81,35 @@ def _from_travel(data: xr.Dataset, par: WedgeParameters) -> Rows:
 
 RELATIONS: tuple[Relation, ...] = (
     Relation(
-        "pad friction from the normal force", "wedge-brake",
-        ("wedge.mu_B",), ("1",), {"y_M": "N*m", "F_N": "N"}, _from_normal_force,
-        lambda par: np.array([par.wedge.mu_B]), "braking moment from the normal force",
+        "pad friction from the normal force",
+        "wedge-brake",
+        ("wedge.mu_B",),
+        ("1",),
+        {"y_M": "N*m", "F_N": "N"},
+        _from_normal_force,
+        lambda par: np.array([par.wedge.mu_B]),
+        "braking moment from the normal force",
     ),
     Relation(
-        "pad friction from the actuation force", "wedge-brake",
-        ("wedge.mu_B",), ("1",), {"y_M": "N*m", "F_M": "N"}, _from_actuation_force,
+        "pad friction from the actuation force",
+        "wedge-brake",
+        ("wedge.mu_B",),
+        ("1",),
+        {"y_M": "N*m", "F_M": "N"},
+        _from_actuation_force,
         lambda par: np.array([par.wedge.mu_B]),
         "wedge at rest without friction of its own, which biases by up to that friction over the "
         "normal force, one way while applying and the other while releasing",
     ),
     Relation(
-        "clearance from the travel", "wedge-brake",
-        ("caliper.clearance", "1/caliper.K_cal"), ("m", "m/N"),
-        {"x": "m", "F_N": "N"}, _from_travel,
+        "clearance from the travel",
+        "wedge-brake",
+        ("caliper.clearance", "1/caliper.K_cal"),
+        ("m", "m/N"),
+        {"x": "m", "F_N": "N"},
+        _from_travel,
         lambda par: np.array([par.caliper.clearance, 1.0 / par.caliper.K_cal]),
         "caliper as a spring; the disc's run-out counts as noise",
     ),
-)  # fmt: skip
+)
 """relations by preference: the first whose signals are measured is taken"""

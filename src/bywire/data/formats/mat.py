@@ -31,8 +31,12 @@ _REASONS = {
     "function": "it is a function",
 }
 _VALUES = 1 << 22  # that are handed over at a time
-_NUMBERS = {"double", "single", "logical",
-            *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}  # fmt: skip
+_NUMBERS = {
+    "double",
+    "single",
+    "logical",
+    *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
+}
 
 
 class MatSource:
@@ -142,15 +146,27 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
         )
     progress(f"writing {path.name}", 0.0)
     savemat(
-        path, content | texts, appendmat=False, do_compression=True, oned_as="column",
+        path,
+        content | texts,
+        appendmat=False,
+        do_compression=True,
+        oned_as="column",
         long_field_names=True,
-    )  # fmt: skip
+    )
     progress(f"writing {path.name}", 1.0)
 
 
 FORMAT = FileFormat(
-    "mat", "a MAT file of level 5", (".mat",),
-    lambda head: head[:19] == b"MATLAB 5.0 MAT-file" or (head[126:128] in (b"IM", b"MI")
-    and head[:10] != b"MATLAB 7.3"),
-    _open, _write, has_many_axes=True, libraries=("scipy.io.matlab",), counts=("index", 1),
-)  # fmt: skip
+    "mat",
+    "a MAT file of level 5",
+    (".mat",),
+    lambda head: (
+        head[:19] == b"MATLAB 5.0 MAT-file"
+        or (head[126:128] in (b"IM", b"MI") and head[:10] != b"MATLAB 7.3")
+    ),
+    _open,
+    _write,
+    has_many_axes=True,
+    libraries=("scipy.io.matlab",),
+    counts=("index", 1),
+)

@@ -187,8 +187,9 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
     with kept(path) as whole, h5py.File(whole, "w", userblock_size=_USER_BLOCK) as file:
         for k, (name, variable) in enumerate(dataset.variables.items()):
             numbers = np.asarray(variable.values, dtype=np.float64).reshape(1, -1)
-            written = file.create_dataset(str(name), data=numbers, compression="gzip", shuffle=True,
-                                       compression_opts=1)  # fmt: skip
+            written = file.create_dataset(
+                str(name), data=numbers, compression="gzip", shuffle=True, compression_opts=1
+            )
             written.attrs["MATLAB_class"] = np.bytes_("double")
             progress(f"writing {path.name}", (k + 1) / len(dataset.variables))
         for struct, fields in texts.items():
@@ -213,10 +214,16 @@ def _write_text(group: Any, name: str, text: str, codes: NDArray[np.uint16]) -> 
 
 
 FORMAT = FileFormat(
-    "mat73", "an HDF5 file", (".mat", ".h5", ".hdf5"),
+    "mat73",
+    "an HDF5 file",
+    (".mat", ".h5", ".hdf5"),
     lambda head: head[:8] == _HDF5 or head[512:520] == _HDF5,
-    _open, _write, has_many_axes=True, libraries=("h5py",), counts=("index", 1),
-)  # fmt: skip
+    _open,
+    _write,
+    has_many_axes=True,
+    libraries=("h5py",),
+    counts=("index", 1),
+)
 
 
 class FailingStream(io.RawIOBase):

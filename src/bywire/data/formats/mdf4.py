@@ -136,10 +136,14 @@ class Mdf4Source:
         self._records_read = 0
         # Asked for a number of records, the library is slower by a third.
         signals = self._file.select(
-            [(None, group, index) for index in indices], record_offset=begin,
-            record_count=None if self._records is None else size, raw=raw,
-            copy_master=False, ignore_value2text_conversions=True, validate=False,
-        )  # fmt: skip
+            [(None, group, index) for index in indices],
+            record_offset=begin,
+            record_count=None if self._records is None else size,
+            raw=raw,
+            copy_master=False,
+            ignore_value2text_conversions=True,
+            validate=False,
+        )
         if self._records_read != size:
             raise FileError(
                 f"{self._path} is damaged: group {group} has {size} records from {begin} on as it "
@@ -333,12 +337,14 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
             time = np.asarray(dataset[dim].values, dtype=np.float64)
             signals = [
                 asammdf.Signal(
-                    samples=np.asarray(signal.values), timestamps=time, name=str(name),
+                    samples=np.asarray(signal.values),
+                    timestamps=time,
+                    name=str(name),
                     unit=str(signal.attrs.get("units", "1")),
                 )
                 for name, signal in dataset.data_vars.items()
                 if signal.dims[0] == dim
-            ]  # fmt: skip
+            ]
             file.append(signals, comment="bywire")
         progress(f"writing {path.name}", 0.5)
         file.save(path, overwrite=True, compression=0)

@@ -88,7 +88,13 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
 
 
 FORMAT = FileFormat(
-    "netcdf", "a NetCDF file", (".nc", ".nc4", ".cdf"),
-    lambda head: head.startswith(_MAGICS), _open, _write, has_many_axes=True,
-    libraries=("netCDF4",), counts=("index", 0),
-)  # fmt: skip
+    "netcdf",
+    "a NetCDF file",
+    (".nc", ".nc4", ".cdf"),
+    lambda head: head.startswith(_MAGICS),
+    _open,
+    _write,
+    has_many_axes=True,
+    libraries=("netCDF4",),
+    counts=("index", 0),
+)

@@ -35,8 +35,9 @@ class ParquetSource:
     def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
         """Yield the numbers of some columns; null becomes NaN."""
         begin = 0
-        for batch in self._file.iter_batches(batch_size=_ROWS, columns=list(names),
-                                             use_threads=False):  # fmt: skip
+        for batch in self._file.iter_batches(
+            batch_size=_ROWS, columns=list(names), use_threads=False
+        ):
             for name in names:
                 yield name, begin, self._numbers(name, batch.column(name))
             begin += batch.num_rows
@@ -80,9 +81,12 @@ def _open(path: Path, options: ReadOptions) -> Iterator[ParquetSource]:
     import pyarrow.parquet as parquet
 
     with parquet.ParquetFile(
-        path, buffer_size=1 << 20, pre_buffer=False, page_checksum_verification=True,
+        path,
+        buffer_size=1 << 20,
+        pre_buffer=False,
+        page_checksum_verification=True,
         thrift_string_size_limit=_LARGEST_FOOTER,
-    ) as file:  # fmt: skip
+    ) as file:
         yield ParquetSource(path, file)
 
 
@@ -113,8 +117,12 @@ def _notes(attributes: Mapping[str, Any]) -> dict[bytes, bytes]:
 
 
 FORMAT = FileFormat(
-    "parquet", "a Parquet file", (".parquet", ".pq"),
-    lambda head: head[:4] == b"PAR1", _open, _write,
+    "parquet",
+    "a Parquet file",
+    (".parquet", ".pq"),
+    lambda head: head[:4] == b"PAR1",
+    _open,
+    _write,
     # The last is loaded by the first numbers that pyarrow hands over: once, and not for each file.
     libraries=("pyarrow.parquet", "pyarrow.compute", "pandas"),
-)  # fmt: skip
+)

@@ -61,7 +61,7 @@ def a2l(program: Program) -> str:
     return (
         f'ASAP2_VERSION 1 60\n/begin PROJECT {name} "ECU of {_text(program.model.name)}"\n'
         f'  /begin MODULE {name}_ecu ""\n'
-        "    /begin MOD_COMMON \"\"\n      BYTE_ORDER MSB_LAST\n    /end MOD_COMMON\n"
+        '    /begin MOD_COMMON ""\n      BYTE_ORDER MSB_LAST\n    /end MOD_COMMON\n'
         f"    /begin RECORD_LAYOUT RL_VALUE\n      FNC_VALUES 1 {kind} ROW_DIR DIRECT\n"
         f"    /end RECORD_LAYOUT\n{body}\n  /end MODULE\n/end PROJECT\n"
     )

@@ -60,9 +60,14 @@ class Body:
         return name
 
     def write(
-        self, target: str, ctype: str, value: Expr, member: str = "",
-        changes: Iterable[str] = (), is_pointer: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        target: str,
+        ctype: str,
+        value: Expr,
+        member: str = "",
+        changes: Iterable[str] = (),
+        is_pointer: bool = False,
+    ) -> None:
         """Append a statement."""
         self.memory.read(value.uses)
         made = Statement(
@@ -92,8 +97,9 @@ class Body:
 
     def derived(self, value: Expr, hint: str = "") -> Expr:
         """Return a number that parameters alone decide as one that is computed with them."""
-        groups = [n for n, shape in self.fixed.items() if shape is not None
-                  and ("local", n) in value.uses]  # fmt: skip
+        groups = [
+            n for n, shape in self.fixed.items() if shape is not None and ("local", n) in value.uses
+        ]
         is_plain = value.is_path or Expr(value.text.removeprefix("-")).is_path
         if self.structs.precision.name == "single" and not hint:
             # There a sum or a product takes one instruction, as reading it would.
@@ -182,9 +188,10 @@ class Body:
         """Write new values of fields of a variable."""
         struct = self.structs.of_tuple(record.cls)
         kept = {
-            name: v for name, v in items.items()
+            name: v
+            for name, v in items.items()
             if struct.is_memory or self.structs.keeps(struct, name)
-        }  # fmt: skip
+        }
         target = record.expr.text
         # All are computed before the first one is set.
         values = {name: self.rvalue(lifted(v)) for name, v in kept.items()}
@@ -199,9 +206,12 @@ class Body:
             if struct.is_memory:
                 uses |= {("field", struct.name, name)}
             self.write(
-                target, struct.name, replace(value, uses=uses), c_name(name),
+                target,
+                struct.name,
+                replace(value, uses=uses),
+                c_name(name),
                 is_pointer=record.pointer,
-            )  # fmt: skip
+            )
         self.moving.add(target)
 
     def rvalue(self, value: Any) -> Expr:

@@ -56,9 +56,7 @@ class Borders:
         self.unseen: Counter[Place] = Counter()
         self.sides: dict[Place, list[Field]] = {}
 
-    def near(
-        self, rows: Sequence[tuple[Inputs, Any]], wanted: int
-    ) -> Iterator[tuple[Inputs, int]]:
+    def near(self, rows: Sequence[tuple[Inputs, Any]], wanted: int) -> Iterator[tuple[Inputs, int]]:
         """Yield inputs on both sides of borders, and which of the rows they come from.
 
         Parameters
@@ -121,9 +119,7 @@ class Borders:
         self.unseen[law] += int(shown is None)
         return shown is not None or self.unseen[law] <= _UNSEEN
 
-    def _aimed(
-        self, first: tuple[float, Margins], last: tuple[float, Margins]
-    ) -> Iterator[float]:
+    def _aimed(self, first: tuple[float, Margins], last: tuple[float, Margins]) -> Iterator[float]:
         """Yield a value beyond which the rarest comparison turns that the input has a say in."""
         (at, here), (to, there) = first, last
         for place in sorted(here.keys() & there.keys(), key=self._rank):

@@ -37,8 +37,11 @@ from bywire.export.controller.values import (
 
 _LIBRARY = {ops.fabs: "fabs", ops.sqrt: "sqrt", ops.log: "log", ops.power: "pow"}
 _OURS: dict[Any, str] = {
-    ops.floor: "whole", ops.sin: "sine", ops.cos: "cosine", ops.exp: "exponential",
-}  # fmt: skip
+    ops.floor: "whole",
+    ops.sin: "sine",
+    ops.cos: "cosine",
+    ops.exp: "exponential",
+}
 _OURS_IN_DOUBLE: dict[Any, str] = {**_OURS, ops.log: "logarithm", ops.power: "power_of"}
 EXTREMES = {ops.fmin: "smaller", ops.fmax: "larger"}
 """functions of core.ops that stand at the top of the C"""
@@ -138,9 +141,7 @@ def _method(at: Context, node: ast.AST, method: Method, given: list[Any], named:
             return Table(dict(zip(owner.cls._fields, values, strict=True)))
     if isinstance(owner, Table):
         found: dict[str, Callable[[], Any]] = {
-            "items": lambda: Items(
-                tuple(Items((Known(n), v)) for n, v in owner.items.items())
-            ),
+            "items": lambda: Items(tuple(Items((Known(n), v)) for n, v in owner.items.items())),
             "keys": lambda: Items(tuple(map(Known, owner.items))),
             "values": lambda: Items(tuple(owner.items.values())),
         }

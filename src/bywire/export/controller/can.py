@@ -73,12 +73,14 @@ def dbc(program: Program) -> str:
     lines += ["", f'CM_ "ECU of {_text(program.model.name)}: its memory behind a tick";']
     lines += [
         f'CM_ SG_ {number} {each.name} "{_text(each.label)}";'
-        for number, signals in every for each in signals
-    ]  # fmt: skip
+        for number, signals in every
+        for each in signals
+    ]
     lines += [
         f'VAL_ {number} {each.name} {NOT_AVAILABLE} "not available" ;'
-        for number, signals in every for each in signals
-    ]  # fmt: skip
+        for number, signals in every
+        for each in signals
+    ]
     cycle = '"GenMsgCycleTime"'
     lines += [f"BA_DEF_ BO_ {cycle} INT 0 65535;", f"BA_DEF_DEF_ {cycle} 0;"]
     lines += [f"BA_ {cycle} BO_ {number} {CYCLE};" for number, _ in every]
@@ -109,19 +111,30 @@ def can_header(program: Program) -> str:
     """Return ``NAME_can.h``."""
     name, count = program.name, len(messages(program))
     guard = f"{name.upper()}_CAN_H"
-    return "\n\n".join([
-        comment([f"Messages of {name}.dbc: their first identifier and number, and their bytes."]),
-        f"#ifndef {guard}\n#define {guard}",
-        f'#include <stdint.h>\n#include "{name}_ecu.h"',
-        BEGIN_C,
-        f"#define {name.upper()}_CAN_FIRST {FIRST}u\n#define {name.upper()}_CAN_COUNT {count}u",
-        comment(["Fill a message, counted from 0. A value beyond full scale stays at it; one that",
-                 f"is no number, or infinite, becomes the count {NOT_AVAILABLE}: not available."])
-        + f"\nvoid {name}_can_fill(uint32_t message, const {name}_Memory *memory,\n"
-        "        uint8_t data[8]);",
-        END_C,
-        "#endif",
-    ]) + "\n"  # fmt: skip
+    fill = [
+        "Fill a message, counted from 0. A value beyond full scale stays at it; one that",
+        f"is no number, or infinite, becomes the count {NOT_AVAILABLE}: not available.",
+    ]
+    return (
+        "\n\n".join(
+            [
+                comment(
+                    [f"Messages of {name}.dbc: their first identifier and number, and their bytes."]
+                ),
+                f"#ifndef {guard}\n#define {guard}",
+                f'#include <stdint.h>\n#include "{name}_ecu.h"',
+                BEGIN_C,
+                f"#define {name.upper()}_CAN_FIRST {FIRST}u\n"
+                f"#define {name.upper()}_CAN_COUNT {count}u",
+                comment(fill)
+                + f"\nvoid {name}_can_fill(uint32_t message, const {name}_Memory *memory,\n"
+                "        uint8_t data[8]);",
+                END_C,
+                "#endif",
+            ]
+        )
+        + "\n"
+    )
 
 
 def can_source(program: Program) -> str:

@@ -17,9 +17,7 @@ class Functions(Protocol):
         """Return a module's object; a number of its own is called by its name in C."""
         ...
 
-    def call(
-        self, at: Context, node: ast.AST, function: Any, given: list[Any], named: Any
-    ) -> Any:
+    def call(self, at: Context, node: ast.AST, function: Any, given: list[Any], named: Any) -> Any:
         """Return what a function gives."""
         ...
 

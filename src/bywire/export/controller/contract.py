@@ -82,8 +82,7 @@ def checked_inputs(model: Model, structs: Structs, uses: Iterable[Use]) -> list[
     return found
 
 
-def commands(model: Model, renewed: Iterable[str], structs: Structs,
-             shape: Shape) -> list[Command]:  # fmt: skip
+def commands(model: Model, renewed: Iterable[str], structs: Structs, shape: Shape) -> list[Command]:
     """Return the commands among the fields that a task renews, with their limits.
 
     Raises

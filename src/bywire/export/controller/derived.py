@@ -28,13 +28,25 @@ _WORDS = {"+": "plus", "-": "minus", "*": "times", "/": "over"}
 _NAMED = {"6.283185307179586": "two_pi", "3.141592653589793": "pi"}
 _LONG = 40
 _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
-    "sine": ops.sin, "cosine": ops.cos, "exponential": ops.exp, "logarithm": ops.log,
-    "power_of": ops.power, "whole": ops.floor, "larger": ops.fmax, "smaller": ops.fmin,
-    "fabs": ops.fabs, "fabsf": ops.fabs, "sqrt": ops.sqrt, "sqrtf": ops.sqrt,
-}  # fmt: skip
+    "sine": ops.sin,
+    "cosine": ops.cos,
+    "exponential": ops.exp,
+    "logarithm": ops.log,
+    "power_of": ops.power,
+    "whole": ops.floor,
+    "larger": ops.fmax,
+    "smaller": ops.fmin,
+    "fabs": ops.fabs,
+    "fabsf": ops.fabs,
+    "sqrt": ops.sqrt,
+    "sqrtf": ops.sqrt,
+}
 _ARITHMETIC: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
-}  # fmt: skip
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
 
 
 @dataclass(frozen=True)
@@ -167,9 +179,11 @@ def worded(text: str) -> str:
 
 
 def values(
-    derived: Iterable[Derived], par: Any, constants: Mapping[str, float],
+    derived: Iterable[Derived],
+    par: Any,
+    constants: Mapping[str, float],
     number: Callable[[float], Any],
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Return the numbers of a parameter set by their places, as Python computes them."""
     made: dict[str, Any] = {}
     names: dict[str, Any] = {name: number(value) for name, value in constants.items()}

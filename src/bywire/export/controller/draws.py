@@ -68,31 +68,33 @@ class Draw:
         cls: Any = type(values)
         signals = signals_of(cls)
         names = [n for n in sorted(used) if self.rng.random() < 2.0 / max(len(used), 1)]
-        return values._replace(**{
-            n: self.number(self.value(signals[n], [])) for n in names
-        })  # fmt: skip
+        return values._replace(**{n: self.number(self.value(signals[n], [])) for n in names})
 
     def alike(self, values: Any, used: set[str]) -> Any:
         """Return signals of usual size, all of them smaller by about the same factor."""
         cls: Any = type(values)
         factor = float(10.0 ** self.rng.uniform(-2.0, 0.5))
-        return values._replace(**{
-            name: self.number(signal.nominal * factor * self.rng.uniform(0.6, 1.4))
-            for name, signal in signals_of(cls).items() if name in used
-        })  # fmt: skip
+        return values._replace(
+            **{
+                name: self.number(signal.nominal * factor * self.rng.uniform(0.6, 1.4))
+                for name, signal in signals_of(cls).items()
+                if name in used
+            }
+        )
 
     def drift(self, cls: Any, used: set[str]) -> dict[str, float]:
         """Return how far the signals of a NamedTuple move in a tick: some hardly, some at once."""
         return {
             name: signal.nominal * float(10.0 ** self.rng.uniform(*_DRIFTS) * self.rng.normal())
-            for name, signal in signals_of(cls).items() if name in used
-        }  # fmt: skip
+            for name, signal in signals_of(cls).items()
+            if name in used
+        }
 
     def drifted(self, values: Any, drift: Mapping[str, float]) -> Any:
         """Return signals a tick later."""
-        return values._replace(**{
-            name: self.number(getattr(values, name) + step) for name, step in drift.items()
-        })  # fmt: skip
+        return values._replace(
+            **{name: self.number(getattr(values, name) + step) for name, step in drift.items()}
+        )
 
     def parameters(self, par: ParameterSet) -> ParameterSet:
         """Return parameters with all numbers changed, tables by a factor, within their ranges."""

@@ -18,9 +18,7 @@ from bywire.export.controller.contract import LARGEST
 MAGNITUDE = frozenset({"whole", "sine", "cosine"})
 """functions that take a magnitude"""
 _MAGNITUDE = {"double": "fabs", "float": "fabsf"}
-_WHOLE = {
-    "double": ((2.0**31, "int32_t"), (2.0**52, "int64_t")), "single": ((2.0**23, "int32_t"),)
-}  # fmt: skip
+_WHOLE = {"double": ((2.0**31, "int32_t"), (2.0**52, "int64_t")), "single": ((2.0**23, "int32_t"),)}
 """up to which magnitude an integer takes what is not whole; 64 bits take a processor without a unit
 for doubles four times as long as 32"""
 Literal = Callable[[float], str]
@@ -225,8 +223,11 @@ static {real} exponential({real} x)
 
 def _log_words(lit: Literal) -> dict[str, str]:
     names = [f"l{n}" for n in range(3, 22, 2)]
-    return {**dict(zip(names, map(lit, double.LOGARITHM), strict=True)),
-            "ln_2_high": lit(double.LN_2[0]), "ln_2_low": lit(double.LN_2[1])}  # fmt: skip
+    return {
+        **dict(zip(names, map(lit, double.LOGARITHM), strict=True)),
+        "ln_2_high": lit(double.LN_2[0]),
+        "ln_2_low": lit(double.LN_2[1]),
+    }
 
 
 _LOG_PARTS = """/*

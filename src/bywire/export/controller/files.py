@@ -18,9 +18,13 @@ from bywire.export.controller.vectors import Vectors
 
 
 def files(
-    program: Program, memory: Any, cited: Mapping[str, Cited], every: Sequence[Vectors], *,
+    program: Program,
+    memory: Any,
+    cited: Mapping[str, Cited],
+    every: Sequence[Vectors],
+    *,
     bus: bool = False,
-) -> dict[str, str]:  # fmt: skip
+) -> dict[str, str]:
     """Return the text of every file.
 
     Parameters

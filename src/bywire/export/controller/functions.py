@@ -157,8 +157,10 @@ def _several(made: CFunction, body: Body, value: Items | Table, node: ast.AST) -
     parts: list[str] = []
     uses: set[Use] = set()
     for place, leaf in leaves:
-        name = unique(c_name(names.get(place[0], "item") if len(place) == 1 else
-                             "_".join(map(str, place))), types)  # fmt: skip
+        name = unique(
+            c_name(names.get(place[0], "item") if len(place) == 1 else "_".join(map(str, place))),
+            types,
+        )
         types[name] = ctype_of(body.structs, leaf)
         made.members[place] = name
     made.value = value
@@ -184,9 +186,7 @@ def _leaves(value: Any, place: tuple[Any, ...]) -> Iterator[tuple[tuple[Any, ...
     elif isinstance(value, Table):
         for name, each in value.items.items():
             yield from _leaves(each, (*place, name))
-    elif not isinstance(value, (Known, Given)) and not (
-        isinstance(value, Group) and value.origin
-    ):
+    elif not isinstance(value, (Known, Given)) and not (isinstance(value, Group) and value.origin):
         yield place, value
 
 

@@ -11,8 +11,15 @@ from bywire.export.controller.program import Program
 from bywire.export.controller.trespassing import prepared, stepped, trespassing
 from bywire.export.controller.vectors import Vectors
 
-WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wfloat-equal", "-Wshadow",
-            "-Wpedantic")  # fmt: skip
+WARNINGS = (
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wdouble-promotion",
+    "-Wfloat-equal",
+    "-Wshadow",
+    "-Wpedantic",
+)
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 """without -ffast-math and its like, and without fused products: else the last digits differ"""
 SMALL_FLAGS = ("-std=c99", "-Os", "-ffp-contract=off", "-fno-math-errno")
@@ -25,8 +32,10 @@ def vector_header(program: Program, every: Sequence[Vectors]) -> str:
     """Return ``NAME_test_vectors.h``."""
     name, real = program.name, program.precision.real
     guard = f"{name.upper()}_TEST_VECTORS_H"
-    parts = [comment(["What the Python of the laws makes of inputs that reach every limit."]),
-             f"#ifndef {guard}\n#define {guard}"]  # fmt: skip
+    parts = [
+        comment(["What the Python of the laws makes of inputs that reach every limit."]),
+        f"#ifndef {guard}\n#define {guard}",
+    ]
     literal = program.precision.literal
     if program.parameters() and every:
         other = parameter_values(program, "other_parameters", every[0].other, None)
@@ -39,8 +48,9 @@ def vector_header(program: Program, every: Sequence[Vectors]) -> str:
             width = max(rows.shape[1], 1)
             parts.append(
                 f"static const {real} {what}_{task}[VECTORS_{task}][{width}] = {{\n"
-                + "\n".join(lines) + "\n};"
-            )  # fmt: skip
+                + "\n".join(lines)
+                + "\n};"
+            )
         if _reads_parameters(each):
             lines = textwrap.wrap(", ".join(map(str, each.which)), 88)
             body = "\n".join(f"    {line}" for line in lines)
@@ -92,9 +102,7 @@ def _derived(program: Program, every: Sequence[Vectors]) -> list[str]:
     return ["\n".join([*lines, "    return wrong;", "}"])]
 
 
-def comparison(
-    program: Program, every: Sequence[Vectors], what: str, include: str
-) -> list[str]:
+def comparison(program: Program, every: Sequence[Vectors], what: str, include: str) -> list[str]:
     """Return what a harness begins with: a function per task that compares it with its vectors.
 
     Parameters
@@ -148,8 +156,13 @@ static void mix({real} value)
 
 def _compared(program: Program, vectors: Vectors) -> str:
     task = c_name(vectors.step.task.name)
-    lines = [f"static int differing_{task}(void)", "{", "    int wrong = 0;", "",
-             f"    for (int k = 0; k < VECTORS_{task}; ++k) {{"]  # fmt: skip
+    lines = [
+        f"static int differing_{task}(void)",
+        "{",
+        "    int wrong = 0;",
+        "",
+        f"    for (int k = 0; k < VECTORS_{task}; ++k) {{",
+    ]
     lines += [*prepared(program, vectors), f"        {stepped(vectors)}"]
     for at, field in enumerate(vectors.kept):
         place = f"memory.{c_name(field)}"

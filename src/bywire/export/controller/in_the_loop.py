@@ -82,9 +82,11 @@ class SoftwareInTheLoop:
         x, m = (slice(start[k], start[k] + self.layout.length[k]) for k in ("x", "m"))
         tasks = self._tasks(request.parameters)
         aside = replace(
-            schedule, frames=NEVER, record_frames=NEVER,
+            schedule,
+            frames=NEVER,
+            record_frames=NEVER,
             task_frames=tuple(NEVER for _ in schedule.task_frames),
-        )  # fmt: skip
+        )
         row = 0
         for frame in range(begin, end + int(end == schedule.frames)):
             stimulus = request.stimulus[frame // schedule.stimulus_frames]

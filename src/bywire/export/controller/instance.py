@@ -30,8 +30,10 @@ def instance_header(program: Program) -> str:
             f"{comment(['Parameters for the steps, taken over from those.'])}\n"
             f"extern {name}_Parameters {name}_active;",
         ]
-    parts.append(f"{comment(['Set memory and parameters as the bench has them.'])}\n"
-                 f"void {name}_instance_init(void);")  # fmt: skip
+    parts.append(
+        f"{comment(['Set memory and parameters as the bench has them.'])}\n"
+        f"void {name}_instance_init(void);"
+    )
     if program.parameters():
         said = [
             "Take over what was calibrated, and return how many of its numbers are outside their",
@@ -45,17 +47,23 @@ def instance_source(program: Program) -> str:
     """Return ``NAME_instance.c``."""
     name = program.name
     parts = [
-        comment([f"An instance of the ECU of {program.model.name}; leave this file out if memory",
-                 "and parameters have a place of their own in your program."]),
+        comment(
+            [
+                f"An instance of the ECU of {program.model.name}; leave this file out if memory",
+                "and parameters have a place of their own in your program.",
+            ]
+        ),
         f'#include "{name}_instance.h"',
         f"{name}_Memory {name}_memory;",
-    ]  # fmt: skip
+    ]
     init = [f"    {name}_ecu_init(&{name}_memory);"]
     if program.parameters():
         parts[-1] += f"\n{name}_Parameters {name}_calibration;\n{name}_Parameters {name}_active;"
         parts.append(_outside(program))
-        init += [f"    {name}_calibration = {name}_parameters;",
-                 f"    {name}_active = {name}_parameters;"]  # fmt: skip
+        init += [
+            f"    {name}_calibration = {name}_parameters;",
+            f"    {name}_active = {name}_parameters;",
+        ]
     parts.append("\n".join([f"void {name}_instance_init(void)", "{", *init, "}"]))
     if program.parameters():
         derive = f"        {name}_ecu_derive(&{name}_active);\n" if program.derived else ""
@@ -79,10 +87,18 @@ def _outside(program: Program) -> str:
             checks = " && ".join(_within(program, place, leaves[dotted]))
             lines.append(wrapped(f"count += ({checks}) ? 0u : 1u;", "    "))
     said = "Return how many parameters are outside their ranges, or no numbers."
-    return "\n".join([
-        comment([said]), f"static uint32_t outside(const {program.name}_Parameters *par)", "{",
-        "    uint32_t count = 0u;", "", *lines, "    return count;", "}",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            comment([said]),
+            f"static uint32_t outside(const {program.name}_Parameters *par)",
+            "{",
+            "    uint32_t count = 0u;",
+            "",
+            *lines,
+            "    return count;",
+            "}",
+        ]
+    )
 
 
 def _within(program: Program, place: str, leaf: Leaf) -> list[str]:

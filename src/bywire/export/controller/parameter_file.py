@@ -26,8 +26,7 @@ def parameter_file(program: Program, memory: Any, cited: Mapping[str, Cited]) ->
         Values of the parameter set with their provenance, by dotted name.
     """
     name = program.name
-    parts = [comment([f"Values of {program.model.name}, SI units."]),
-             f'#include "{name}_ecu.h"']  # fmt: skip
+    parts = [comment([f"Values of {program.model.name}, SI units."]), f'#include "{name}_ecu.h"']
     if program.parameters():
         parts.append(parameter_values(program, f"{name}_parameters", program.par, cited))
     literal = program.precision.literal
@@ -52,9 +51,14 @@ def parameter_values(
 
 
 def _group(
-    program: Program, shape: Shape, group: Any, prefix: str,
-    cited: Mapping[str, Cited] | None, made: Mapping[str, Any], indent: str,
-) -> list[str]:  # fmt: skip
+    program: Program,
+    shape: Shape,
+    group: Any,
+    prefix: str,
+    cited: Mapping[str, Cited] | None,
+    made: Mapping[str, Any],
+    indent: str,
+) -> list[str]:
     literal = program.precision.literal
     lines: list[str] = []
     for member in program.structs.kept(program.structs.of_group(shape)):

@@ -210,12 +210,16 @@ def program(model: Model, par: ParameterSet, precision: str = "double", name: st
     held: dict[str, Held] | None = None
     for _ in range(_MOST):
         before = len(copied), len(refused), shared
-        made = _translated(model, par, PRECISIONS[precision], short, used, copied, refused, shared,
-                           held)  # fmt: skip
+        made = _translated(
+            model, par, PRECISIONS[precision], short, used, copied, refused, shared, held
+        )
         fields = frozenset(use for use in made.uses if use[0] == "field")
         shown = {each.name for each in made.shown()}
-        shared |= {cls for cls, struct in made.structs.known.items()
-                   if struct.name in shown and isinstance(cls, type)}  # fmt: skip
+        shared |= {
+            cls
+            for cls, struct in made.structs.known.items()
+            if struct.name in shown and isinstance(cls, type)
+        }
         is_settled = fields == used and (len(copied), len(refused), shared) == before
         used = fields
         if held is None:  # only now, so that the translation tells what it cannot translate
@@ -226,14 +230,32 @@ def program(model: Model, par: ParameterSet, precision: str = "double", name: st
 
 
 def _translated(
-    model: Model, par: ParameterSet, precision: Precision, name: str, used: Any,
-    copied: set[Site], refused: set[tuple[str, str]], shared: frozenset[type[Any]],
+    model: Model,
+    par: ParameterSet,
+    precision: Precision,
+    name: str,
+    used: Any,
+    copied: set[Site],
+    refused: set[tuple[str, str]],
+    shared: frozenset[type[Any]],
     held: Mapping[str, Held] | None,
-) -> Program:  # fmt: skip
-    public = {model.Stimulus: f"{name}_Stimulus", model.State: f"{name}_Plant",
-              model.Memory: f"{name}_Memory", type(par): f"{name}_Parameters"}  # fmt: skip
-    structs = Structs(precision, used, public, model.Memory, name, shared,
-                      names=set(public.values()), derivations=Derivations(refused))  # fmt: skip
+) -> Program:
+    public = {
+        model.Stimulus: f"{name}_Stimulus",
+        model.State: f"{name}_Plant",
+        model.Memory: f"{name}_Memory",
+        type(par): f"{name}_Parameters",
+    }
+    structs = Structs(
+        precision,
+        used,
+        public,
+        model.Memory,
+        name,
+        shared,
+        names=set(public.values()),
+        derivations=Derivations(refused),
+    )
     home = type(model).__module__
 
     def is_plant(function: FunctionType, arguments: Mapping[str, Any]) -> bool:
@@ -245,8 +267,7 @@ def _translated(
     made = Translation(structs, is_plant, name, names=set(public.values()), copied=copied)
     steps: list[Step] = []
     for task in model.tasks(par):
-        steps.append(_step(made, model, par, task, name, {each.name for each in steps},
-                           held or {}))  # fmt: skip
+        steps.append(_step(made, model, par, task, name, {each.name for each in steps}, held or {}))
     by_name = {each.name: each for each in made.functions.values()}
     uses: set[Use] = set()
     for k, step in enumerate(steps):
@@ -258,8 +279,18 @@ def _translated(
     uses |= frozenset[Use]().union(*(each.uses for each in derived))
     functions = tuple(each for each in made.functions.values() if each.name in reached)
     constants = {use[1]: use[2] for use in sorted(u for u in uses if u[0] == "constant")}
-    return Program(name, precision, model, par, tuple(steps), functions, structs, constants,
-                   frozenset(uses), derived)  # fmt: skip
+    return Program(
+        name,
+        precision,
+        model,
+        par,
+        tuple(steps),
+        functions,
+        structs,
+        constants,
+        frozenset(uses),
+        derived,
+    )
 
 
 def _needed(uses: frozenset[Use], by_name: Mapping[str, CFunction]) -> set[Use]:
@@ -281,9 +312,14 @@ def _class_of(value: Any) -> Any:
 
 
 def _step(
-    made: Translation, model: Model, par: ParameterSet, task: Task, name: str, taken: set[str],
+    made: Translation,
+    model: Model,
+    par: ParameterSet,
+    task: Task,
+    name: str,
+    taken: set[str],
     held: Mapping[str, Held],
-) -> Step:  # fmt: skip
+) -> Step:
     """Return the step of a task: its tick, called on what stands behind pointers."""
     structs = made.structs
     step = unique(f"{name}_ecu_step_{c_name(task.name)}", taken)
@@ -323,5 +359,12 @@ def _step(
         arguments.append((f"const {structs.of_group(shape_of(par)).name} *par", "par"))
     read = frozenset[str]().union(*(each.read for each in held.values()))
     kept = read | {each.field for each in limited}
-    return Step(task, step, tuple(arguments), tuple(statements), result, tuple(limited),
-                kept=tuple(n for n in renewed if n in kept))  # fmt: skip
+    return Step(
+        task,
+        step,
+        tuple(arguments),
+        tuple(statements),
+        result,
+        tuple(limited),
+        kept=tuple(n for n in renewed if n in kept),
+    )

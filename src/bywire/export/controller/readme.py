@@ -18,9 +18,7 @@ def readme(program: Program, files: Iterable[str], count: int) -> str:
     size = 4 if program.precision.name == "single" else 8
     memory = sum(max(m.length, 1) for m in program.members(program.model.Memory))
     values = sum(max(m.length, 1) for _, m in program.parameters())
-    tasks = [
-        f"    {step.name}: every {step.task.period:.9g} s" for step in program.steps
-    ]
+    tasks = [f"    {step.name}: every {step.task.period:.9g} s" for step in program.steps]
     said = [
         f"The ECU of {program.model.name} in C99, {program.precision.name} precision: it was "
         "translated from the Python of the laws, and is what the bench runs, operation by "
@@ -44,10 +42,14 @@ def readme(program: Program, files: Iterable[str], count: int) -> str:
         _exactness(program, real),
         "Files: " + ", ".join(files) + ".",
     ]
-    return "\n\n".join(
-        each if each.startswith("    ") else textwrap.fill(each, 88, break_on_hyphens=False)
-        for each in said if each
-    ) + "\n"  # fmt: skip
+    return (
+        "\n\n".join(
+            each if each.startswith("    ") else textwrap.fill(each, 88, break_on_hyphens=False)
+            for each in said
+            if each
+        )
+        + "\n"
+    )
 
 
 def _contract(program: Program) -> list[str]:
@@ -105,9 +107,11 @@ def _inputs(program: Program) -> list[CheckedInput]:
 def _range(each: CheckedInput) -> str:
     if not math.isfinite(each.high):
         return f"at least {each.low:g}"
-    return f"at most {each.high:g}" if not math.isfinite(each.low) else (
-        f"from {each.low:g} to {each.high:g}"
-    )  # fmt: skip
+    return (
+        f"at most {each.high:g}"
+        if not math.isfinite(each.low)
+        else (f"from {each.low:g} to {each.high:g}")
+    )
 
 
 def _instance(program: Program) -> list[str]:

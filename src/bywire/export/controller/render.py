@@ -26,8 +26,12 @@ def header(program: Program) -> str:
         text = f"Once every {step.task.period:.9g} s: task {step.task.name}. Sets {step.status}."
         prototypes += ["", comment([text]), wrapped(f"{_signature_of(step)};")]
     parts = [
-        comment([f"The ECU of {program.model.name}, {program.precision.name} precision.",
-                 "Written by bywire; a change belongs into the Python of the law."]),
+        comment(
+            [
+                f"The ECU of {program.model.name}, {program.precision.name} precision.",
+                "Written by bywire; a change belongs into the Python of the law.",
+            ]
+        ),
         f"#ifndef {name.upper()}_ECU_H\n#define {name.upper()}_ECU_H",
         "#include <stdint.h>",
         _statuses(program),
@@ -37,7 +41,7 @@ def header(program: Program) -> str:
         comment(["Set the memory with which the bench begins."]) + "\n" + "\n".join(prototypes),
         END_C,
         "#endif",
-    ]  # fmt: skip
+    ]
     return "\n\n".join(parts) + "\n"
 
 
@@ -56,19 +60,25 @@ def _data(program: Program) -> list[str]:
     name = program.name
     data = []
     if program.parameters():
-        data.append(comment(["Parameters of the bench."])
-                    + f"\nextern const {name}_Parameters {name}_parameters;")  # fmt: skip
-    data.append(comment(["Memory with which it begins."])
-                + f"\nextern const {name}_Memory {name}_initial_memory;")  # fmt: skip
+        data.append(
+            comment(["Parameters of the bench."])
+            + f"\nextern const {name}_Parameters {name}_parameters;"
+        )
+    data.append(
+        comment(["Memory with which it begins."])
+        + f"\nextern const {name}_Memory {name}_initial_memory;"
+    )
     return data
 
 
 def operations(program: Program) -> str:
     """Return ``NAME_ops.h``: elementary functions as Python has them, and constants."""
     name, real = program.name, program.precision.real
-    parts = [comment(["Elementary functions, with the meaning that they have in Python."]),
-             f"#ifndef {name.upper()}_OPS_H\n#define {name.upper()}_OPS_H",
-             "#include <stdbool.h>\n#include <stdint.h>\n#include <string.h>"]  # fmt: skip
+    parts = [
+        comment(["Elementary functions, with the meaning that they have in Python."]),
+        f"#ifndef {name.upper()}_OPS_H\n#define {name.upper()}_OPS_H",
+        "#include <stdbool.h>\n#include <stdint.h>\n#include <string.h>",
+    ]
     ours = {use[1] for use in program.uses if use[0] == "own"}
     named = ["math"] if program.libraries else []
     parts[-1] += "".join(f"\n#include <{each}.h>" for each in named)
@@ -110,8 +120,12 @@ def io_header(program: Program) -> str:
     name = program.name
     functions = program.plant_functions
     parts = [
-        comment(["The plant's side of the ticks: converters, sensors, limits of the power stage.",
-                 "On a target the hardware, or its drivers, take the place of these functions."]),
+        comment(
+            [
+                "The plant's side of the ticks: converters, sensors, limits of the power stage.",
+                "On a target the hardware, or its drivers, take the place of these functions.",
+            ]
+        ),
         f"#ifndef {name.upper()}_IO_H\n#define {name.upper()}_IO_H",
         f'#include <stdbool.h>\n#include "{name}_ecu.h"',
         BEGIN_C,
@@ -119,15 +133,17 @@ def io_header(program: Program) -> str:
         *(wrapped(f"{signature(each)};") for each in functions),
         END_C,
         "#endif",
-    ]  # fmt: skip
+    ]
     return "\n\n".join(parts) + "\n"
 
 
 def io_source(program: Program) -> str:
     """Return ``NAME_io.c``."""
     name = program.name
-    parts = [comment(["The plant's side of the ticks."]),
-             f'#include "{name}_io.h"\n#include "{name}_ops.h"']  # fmt: skip
+    parts = [
+        comment(["The plant's side of the ticks."]),
+        f'#include "{name}_io.h"\n#include "{name}_ops.h"',
+    ]
     return "\n\n".join([*parts, *(_function(program, f) for f in program.plant_functions)]) + "\n"
 
 
@@ -142,8 +158,9 @@ def source(program: Program) -> str:
     includes = [f'#include "{name}_ecu.h"', f'#include "{name}_io.h"', f'#include "{name}_ops.h"']
     if not program.plant_functions:
         includes.pop(1)
-    init = (f"void {name}_ecu_init({name}_Memory *memory)\n{{\n"
-            f"    *memory = {name}_initial_memory;\n}}")  # fmt: skip
+    init = (
+        f"void {name}_ecu_init({name}_Memory *memory)\n{{\n    *memory = {name}_initial_memory;\n}}"
+    )
     parts = [
         comment([f"The ECU of {program.model.name}: its laws, and its tasks."]),
         "\n".join(includes),
@@ -245,8 +262,12 @@ def _step(program: Program, step: Step) -> str:
     body = _statements(step.statements, set())
     if step.result is not None:
         body.append(wrapped(f"*memory = {step.result.text};", "    "))
-    of_inputs = [f"    memory->{c_name(each.field)} = smaller(memory->{c_name(each.field)}, "
-                 f"{each.limit.text});" for each in step.commands if each.is_input]  # fmt: skip
+    of_inputs = [
+        f"    memory->{c_name(each.field)} = smaller(memory->{c_name(each.field)}, "
+        f"{each.limit.text});"
+        for each in step.commands
+        if each.is_input
+    ]
     if step.kept:
         numbers = _all([f"is_usual(memory->{c_name(each)})" for each in step.kept], "            ")
         body += [
@@ -267,14 +288,26 @@ def _step(program: Program, step: Step) -> str:
             "    }",
         ]
     limited = [
-        wrapped(f"memory->{c_name(each.field)} = within(memory->{c_name(each.field)}, "
-                f"{each.limit.text});", "    ")
-        for each in step.commands if not each.is_input
-    ]  # fmt: skip
-    return "\n".join([
-        wrapped(_signature_of(step)), "{", f"    uint32_t status = {begin};", "", *body, *limited,
-        f"    memory->{step.status} = status;", "}",
-    ])  # fmt: skip
+        wrapped(
+            f"memory->{c_name(each.field)} = within(memory->{c_name(each.field)}, "
+            f"{each.limit.text});",
+            "    ",
+        )
+        for each in step.commands
+        if not each.is_input
+    ]
+    return "\n".join(
+        [
+            wrapped(_signature_of(step)),
+            "{",
+            f"    uint32_t status = {begin};",
+            "",
+            *body,
+            *limited,
+            f"    memory->{step.status} = status;",
+            "}",
+        ]
+    )
 
 
 def _all(checks: list[str], indent: str) -> str:

@@ -86,8 +86,9 @@ class Structs:
         if cls not in self.known:
             hints = typing.get_type_hints(cls, include_extras=True)
             members = {name: self._signal(name, hints.get(name)) for name in cls._fields}
-            self.known[cls] = Struct(self._name(cls), members, _doc(cls), cls in self.public,
-                                     cls is self.memory)
+            self.known[cls] = Struct(
+                self._name(cls), members, _doc(cls), cls in self.public, cls is self.memory
+            )
         return self.known[cls]
 
     def is_memory(self, value: Any) -> bool:

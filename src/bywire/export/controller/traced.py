@@ -66,8 +66,20 @@ def _computing(name: str) -> Callable[..., Any]:
 
 for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
     setattr(Traced, f"__{_name}__", _comparing(f"__{_name}__"))
-for _name in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv", "neg", "pos",
-              "abs", "pow"):  # fmt: skip
+for _name in (
+    "add",
+    "radd",
+    "sub",
+    "rsub",
+    "mul",
+    "rmul",
+    "truediv",
+    "rtruediv",
+    "neg",
+    "pos",
+    "abs",
+    "pow",
+):
     setattr(Traced, f"__{_name}__", _computing(f"__{_name}__"))
 
 

@@ -70,9 +70,7 @@ class Translation:
                 return Known(value, called)
         return Known(value)
 
-    def call(
-        self, at: Context, node: ast.AST, function: Any, given: list[Any], named: Any
-    ) -> Any:
+    def call(self, at: Context, node: ast.AST, function: Any, given: list[Any], named: Any) -> Any:
         """Return what a function gives, called in C where it is not known at export."""
         function = inspect.unwrap(function)
         if not isinstance(function, types.FunctionType):
@@ -164,9 +162,12 @@ class Translation:
         return self.functions[key]
 
     def _translated(
-        self, function: types.FunctionType, arguments: Mapping[str, Any], closure: dict[str, Any],
+        self,
+        function: types.FunctionType,
+        arguments: Mapping[str, Any],
+        closure: dict[str, Any],
         steady: tuple[bool, ...],
-    ) -> CFunction:  # fmt: skip
+    ) -> CFunction:
         node = node_of(function)
         short = "tick" if isinstance(node, ast.Lambda) else node.name
         module = function.__module__
@@ -223,9 +224,12 @@ class Translation:
 
 
 def _rooted(
-    at: Context, node: ast.AST, value: Any, arguments: Mapping[str, Any],
+    at: Context,
+    node: ast.AST,
+    value: Any,
+    arguments: Mapping[str, Any],
     memories: Mapping[str, Record],
-) -> Any:  # fmt: skip
+) -> Any:
     """Return a function's result in its caller's words: what it was given is the caller's."""
     value = lifted(value)
     if isinstance(value, Given):
@@ -246,5 +250,3 @@ def _rooted(
     if isinstance(value, Array):
         raise at.refuse(node, "a law returns numbers, not a table of parameters")
     return value
-
-

@@ -30,9 +30,7 @@ def prepared(program: Program, vectors: Vectors) -> list[str]:
     types = {"x": f"{name}_Plant", "u": f"{name}_Stimulus", "memory": f"{name}_Memory"}
     wanted = [short for _, short in vectors.step.arguments]
     # A structure of which a task reads nothing is given its zeros.
-    lines = [
-        f"{types[kind]} {kind} = {{0}};" for kind in ("x", "u", "memory") if kind in wanted
-    ]
+    lines = [f"{types[kind]} {kind} = {{0}};" for kind in ("x", "u", "memory") if kind in wanted]
     for at, (kind, field) in enumerate(vectors.names):
         if kind in wanted:
             lines.append(f"{kind}.{c_name(field)} = given_{task}[k][{at}];")
@@ -101,8 +99,13 @@ def _refused(program: Program, each: CheckedInput) -> list[str]:
     """Return values that a step has to refuse."""
     real, literal = program.precision.real, program.precision.literal
     kind = np.float32 if real == "float" else np.float64
-    values = [f"({real})NAN", f"({real})INFINITY", f"-({real})INFINITY", literal(LARGEST),
-              literal(-LARGEST)]  # fmt: skip
+    values = [
+        f"({real})NAN",
+        f"({real})INFINITY",
+        f"-({real})INFINITY",
+        literal(LARGEST),
+        literal(-LARGEST),
+    ]
     for end, away in ((each.low, -math.inf), (each.high, math.inf)):
         if math.isfinite(end):
             beyond = float(np.nextafter(kind(end), kind(away)))
@@ -125,8 +128,10 @@ def _refusing(program: Program, vectors: Vectors) -> list[str]:
     status, refused = f"memory.{step.status}", f"{name.upper()}_STATUS_INPUT"
     lines = ["", f"    for (int k = 0; k < VECTORS_{task}; k += 1 + VECTORS_{task} / {_BASES}) {{"]
     lines += [*prepared(program, vectors), f"        {stepped(vectors)}"]
-    lines += [f"        wrong += ({status} == 0u) ? 0 : 1;",
-              f"        const {name}_Memory before = memory;"]  # fmt: skip
+    lines += [
+        f"        wrong += ({status} == 0u) ? 0 : 1;",
+        f"        const {name}_Memory before = memory;",
+    ]
     for each in step.inputs:
         place = f"{each.kind}.{c_name(each.field)}"
         values = _refused(program, each)
@@ -156,13 +161,17 @@ def _wild(program: Program, vectors: Vectors) -> list[str]:
     lines = ["", f"    for (int k = 0; k < {_WILD}; ++k) {{"]
     lines += [f"        {name}_{kinds[each]} {each} = {{0}};" for each in held]
     if "par" in short:
-        lines += [f"        {name}_Parameters wild = {name}_parameters;",
-                  f"        const {name}_Parameters *par = &wild;"]  # fmt: skip
+        lines += [
+            f"        {name}_Parameters wild = {name}_parameters;",
+            f"        const {name}_Parameters *par = &wild;",
+        ]
     for each in held:
         for member in program.members(types[each]):
             if each != "memory":
-                lines.append(f"        if (draw() % 8u == 0u) {{ {each}.{c_name(member.name)} = "
-                             "draw_real(); }")  # fmt: skip
+                lines.append(
+                    f"        if (draw() % 8u == 0u) {{ {each}.{c_name(member.name)} = "
+                    "draw_real(); }"
+                )
             else:
                 lines.append(f"        {each}.{c_name(member.name)} = draw_real();")
     if "par" in short:

@@ -93,9 +93,7 @@ def vectors(program: Program, memory: Any, count: int, seed: int = 0) -> list[Ve
     return [_packed(program, step, rows[step.task.name], other) for step in program.steps]
 
 
-def _filled(
-    rows: dict[str, list[_Row]], drawn: Iterator[tuple[str, _Row]], count: int
-) -> None:
+def _filled(rows: dict[str, list[_Row]], drawn: Iterator[tuple[str, _Row]], count: int) -> None:
     """Let every task have so many rows."""
     while any(len(each) < count for each in rows.values()):
         name, row = next(drawn, ("", None))
@@ -106,9 +104,13 @@ def _filled(
 
 
 def _drawn(
-    program: Program, memory: Any, draw: Draw, sets: Sequence[ParameterSet],
-    used: Mapping[Any, set[str]], count: int,
-) -> Iterator[tuple[str, _Row]]:  # fmt: skip
+    program: Program,
+    memory: Any,
+    draw: Draw,
+    sets: Sequence[ParameterSet],
+    used: Mapping[Any, set[str]],
+    count: int,
+) -> Iterator[tuple[str, _Row]]:
     """Yield tasks and what they make of random inputs and, in turns, of trajectories."""
     model, number = program.model, draw.number
     start = type(memory)(*map(number, memory))
@@ -154,9 +156,13 @@ def _at_rest(
 
 
 def _at_borders(
-    step: Step, rows: list[_Row], used: list[set[str]], sets: list[ParameterSet], count: int,
+    step: Step,
+    rows: list[_Row],
+    used: list[set[str]],
+    sets: list[ParameterSet],
+    count: int,
     draw: Draw,
-) -> Iterator[_Row]:  # fmt: skip
+) -> Iterator[_Row]:
     """Yield vectors next to borders of comparisons, that Python computes."""
     given = 0
     plain = [each.with_leaves({n: float(v) for n, v in each.leaves().items()}) for each in sets]
@@ -174,10 +180,12 @@ def _at_borders(
 def _inside(values: Any, number: Callable[[float], Any]) -> Any:
     """Return signals within their admissible ranges, which a step asks for."""
     cls: Any = type(values)
-    return values._replace(**{
-        name: number(min(max(getattr(values, name), low), high))
-        for name, (low, high) in ranges_of(cls).items()
-    })  # fmt: skip
+    return values._replace(
+        **{
+            name: number(min(max(getattr(values, name), low), high))
+            for name, (low, high) in ranges_of(cls).items()
+        }
+    )
 
 
 def _is_accepted(values: Any) -> bool:
@@ -221,6 +229,12 @@ def _packed(program: Program, step: Step, rows: list[_Row], other: ParameterSet)
     given = [[float(getattr(row[at[kind]], name)) for kind, name in columns] for row in rows]
     after = [[float(getattr(row[3], name)) for name in kept] for row in rows]
     shape, width = len(rows), len(kept)
-    return Vectors(step, np.array(given).reshape(shape, len(columns)),
-                   np.array(after).reshape(shape, width), tuple(columns), kept,
-                   tuple(row[4] for row in rows), other)  # fmt: skip
+    return Vectors(
+        step,
+        np.array(given).reshape(shape, len(columns)),
+        np.array(after).reshape(shape, width),
+        tuple(columns),
+        kept,
+        tuple(row[4] for row in rows),
+        other,
+    )

@@ -72,9 +72,9 @@ class Unit:
         head = {
             "modelName": f"{bench.name or bench.experiment}, {self.faces.part}",
             "description": f"{self.made.run.model.name} of the bench "
-                           f"{bench.name or bench.experiment}: {bench.summary()}",
+            f"{bench.name or bench.experiment}: {bench.summary()}",
             "generationTool": f"bywire {__version__}",
-        }  # fmt: skip
+        }
         arguments = (self.made, self.faces, self.identifier, self.token, head)
         compiled_files = (KERNEL, self.functions)
         if self.version == 2:

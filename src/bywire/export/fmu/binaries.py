@@ -140,9 +140,7 @@ def _call(compiler: Compiler, cross: tuple[str, ...], arguments: list[str]) -> N
     except subprocess.TimeoutExpired:
         raise CompilerError(f"{compiler.label} took longer than {TIMEOUT:g} s for an FMU") from None
     except OSError as error:
-        raise CompilerError(
-            f"{compiler.label} did not run ({error.strerror or error})"
-        ) from None
+        raise CompilerError(f"{compiler.label} did not run ({error.strerror or error})") from None
     if done.returncode != 0:
         message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
         raise CompilerError(f"{compiler.label} refused the sources of an FMU:\n{message}")

@@ -12,9 +12,10 @@ from bywire.export.interface import Interface, Kind
 from bywire.export.variables import Variable, finite_range
 
 _ABLE = {
-    "canNotUseMemoryManagementFunctions": "true", "canGetAndSetFMUstate": "true",
+    "canNotUseMemoryManagementFunctions": "true",
+    "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
-}  # fmt: skip
+}
 _OFFERED: dict[Kind, tuple[str, dict[str, str]]] = {
     "co-simulation": ("CoSimulation", {"canHandleVariableCommunicationStepSize": "true"}),
     "model-exchange": ("ModelExchange", {"completedIntegratorStepNotNeeded": "true"}),
@@ -22,9 +23,13 @@ _OFFERED: dict[Kind, tuple[str, dict[str, str]]] = {
 
 
 def description_2(
-    made: Exported, faces: Interface, identifier: str, token: str, head: dict[str, str],
+    made: Exported,
+    faces: Interface,
+    identifier: str,
+    token: str,
+    head: dict[str, str],
     sources: Sequence[str],
-) -> Element:  # fmt: skip
+) -> Element:
     """Return the model description.
 
     Parameters
@@ -39,10 +44,16 @@ def description_2(
         Files to compile.
     """
     frame = repr(made.schedule.frame)
-    root = Element("fmiModelDescription", {
-        "fmiVersion": "2.0", "guid": token, "variableNamingConvention": "structured",
-        "numberOfEventIndicators": str(len(faces.at("indicator"))), **head,
-    })  # fmt: skip
+    root = Element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": "2.0",
+            "guid": token,
+            "variableNamingConvention": "structured",
+            "numberOfEventIndicators": str(len(faces.at("indicator"))),
+            **head,
+        },
+    )
     offers, able = _OFFERED[faces.kind]
     offered = SubElement(root, offers, {"modelIdentifier": identifier, **_ABLE, **able})
     files = SubElement(offered, "SourceFiles")
@@ -52,8 +63,9 @@ def description_2(
     categories = SubElement(root, "LogCategories")
     for name in ("logStatusWarning", "logStatusError"):
         SubElement(categories, "Category", name=name)
-    SubElement(root, "DefaultExperiment", startTime="0.0", stopTime=repr(made.run.duration),
-               stepSize=frame)  # fmt: skip
+    SubElement(
+        root, "DefaultExperiment", startTime="0.0", stopTime=repr(made.run.duration), stepSize=frame
+    )
     variables = SubElement(root, "ModelVariables")
     for reference, each in enumerate(faces.variables):
         variables.append(_scalar(reference, each, states_of_rates(faces).get(reference)))
@@ -79,10 +91,16 @@ def states_of_rates(faces: Interface) -> dict[int, int]:
 
 
 def _scalar(reference: int, each: Variable, state: int | None) -> Element:
-    scalar = Element("ScalarVariable", {
-        "name": each.name, "valueReference": str(reference), "causality": each.causality,
-        "variability": variability(each), **({"description": each.label} if each.label else {}),
-    })  # fmt: skip
+    scalar = Element(
+        "ScalarVariable",
+        {
+            "name": each.name,
+            "valueReference": str(reference),
+            "causality": each.causality,
+            "variability": variability(each),
+            **({"description": each.label} if each.label else {}),
+        },
+    )
     if each.causality == "parameter":
         scalar.set("initial", "exact")
     elif each.causality != "input":
@@ -110,6 +128,9 @@ def real_attributes(each: Variable) -> dict[str, str]:
         made |= {} if low is None else {"min": repr(low)}
         made |= {} if high is None else {"max": repr(high)}
     else:
-        made |= {name: repr(end) for name, end in zip(("min", "max"), each.ends, strict=True)
-                 if math.isfinite(end)}  # fmt: skip
+        made |= {
+            name: repr(end)
+            for name, end in zip(("min", "max"), each.ends, strict=True)
+            if math.isfinite(end)
+        }
     return made if each.start is None else made | {"start": repr(each.start)}

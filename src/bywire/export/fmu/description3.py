@@ -16,51 +16,79 @@ def description_3(
 ) -> Element:
     """Return the model description; arguments as those of `description_2`."""
     schedule = made.schedule
-    root = Element("fmiModelDescription", {
-        "fmiVersion": "3.0", "instantiationToken": token,
-        "variableNamingConvention": "structured", **head,
-    })  # fmt: skip
+    root = Element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": "3.0",
+            "instantiationToken": token,
+            "variableNamingConvention": "structured",
+            **head,
+        },
+    )
     offered = {
-        "modelIdentifier": identifier, "canGetAndSetFMUState": "true",
+        "modelIdentifier": identifier,
+        "canGetAndSetFMUState": "true",
         "canSerializeFMUState": "true",
-    }  # fmt: skip
+    }
     if faces.kind == "model-exchange":
         SubElement(root, "ModelExchange", offered)
     else:
-        SubElement(root, "CoSimulation", {
-            **offered, "canHandleVariableCommunicationStepSize": "true", "hasEventMode": "true",
-            "canReturnEarlyAfterIntermediateUpdate": "false",
-            "fixedInternalStepSize": repr(schedule.frame),
-        })  # fmt: skip
+        SubElement(
+            root,
+            "CoSimulation",
+            {
+                **offered,
+                "canHandleVariableCommunicationStepSize": "true",
+                "hasEventMode": "true",
+                "canReturnEarlyAfterIntermediateUpdate": "false",
+                "fixedInternalStepSize": repr(schedule.frame),
+            },
+        )
     root.append(unit_definitions(each.unit for each in faces.variables))
     categories = SubElement(root, "LogCategories")
     for name in ("logStatusWarning", "logStatusError"):
         SubElement(categories, "Category", name=name)
-    SubElement(root, "DefaultExperiment", startTime="0.0", stopTime=repr(made.run.duration),
-               stepSize=repr(schedule.frame))  # fmt: skip
+    SubElement(
+        root,
+        "DefaultExperiment",
+        startTime="0.0",
+        stopTime=repr(made.run.duration),
+        stepSize=repr(schedule.frame),
+    )
     variables = SubElement(root, "ModelVariables")
     rates = states_of_rates(faces)
     for nodes in tables(faces):
         variables.append(_float(nodes, rates.get(nodes[0][0])))
     count = len(faces.variables)
-    SubElement(variables, "Float64", name="time", valueReference=str(count),
-               causality="independent", variability="continuous",
-               description="time since the beginning of the run [s]")  # fmt: skip
+    SubElement(
+        variables,
+        "Float64",
+        name="time",
+        valueReference=str(count),
+        causality="independent",
+        variability="continuous",
+        description="time since the beginning of the run [s]",
+    )
     if faces.part != "plant":
         for k, task in enumerate(made.run.model.tasks(made.run.par)):
             SubElement(
-                variables, "Clock", name=f"clock.{task.name}", valueReference=str(count + 1 + k),
-                causality="input", intervalVariability="constant",
+                variables,
+                "Clock",
+                name=f"clock.{task.name}",
+                valueReference=str(count + 1 + k),
+                causality="input",
+                intervalVariability="constant",
                 intervalDecimal=repr(schedule.task_frames[k] * schedule.frame),
                 description=f"ticks of the task {task.name}",
-            )  # fmt: skip
+            )
     structure = SubElement(root, "ModelStructure")
     results = [k for k, each in enumerate(faces.variables) if each.causality == "output"]
     sections = {
-        "Output": results, "ContinuousStateDerivative": list(rates),
+        "Output": results,
+        "ContinuousStateDerivative": list(rates),
         "InitialUnknown": sorted({*results, *rates, *rates.values()}),
         "EventIndicator": list(faces.at("indicator").values()),
-    }  # fmt: skip
+    }
     for section, references in sections.items():
         for reference in references:
             SubElement(structure, section, valueReference=str(reference))
@@ -70,11 +98,17 @@ def description_3(
 def _float(nodes: list[Numbered], state: int | None) -> Element:
     reference, first = nodes[0]
     name = first.name.partition("[")[0]
-    made = Element("Float64", {
-        "name": name, "valueReference": str(reference), "causality": first.causality,
-        "variability": variability(first), **real_attributes(first),
-        **({"description": first.label} if first.label else {}),
-    })  # fmt: skip
+    made = Element(
+        "Float64",
+        {
+            "name": name,
+            "valueReference": str(reference),
+            "causality": first.causality,
+            "variability": variability(first),
+            **real_attributes(first),
+            **({"description": first.label} if first.label else {}),
+        },
+    )
     if state is not None:
         made.set("derivative", str(state))
     if first.causality == "parameter":

@@ -12,13 +12,13 @@ from bywire.export.interface import Interface
 
 _STEPS = {
     2: "A step first does the ticks of the ECU that are due at its beginning, with the inputs as "
-       "they were set, then the substeps. Between steps a client gets the state right before the "
-       "ticks that are due then (left limits): what the ECU holds is that of its last tick.",
+    "they were set, then the substeps. Between steps a client gets the state right before the "
+    "ticks that are due then (left limits): what the ECU holds is that of its last tick.",
     3: "Without event mode, a step first does the ticks of the ECU that are due at its beginning, "
-       "with the inputs as they were set, then the substeps; between steps a client gets the state "
-       "right before the ticks that are due then. With event mode, ticks are done there, when "
-       "their clocks tick, and results after them are those that a bench records.",
-}  # fmt: skip
+    "with the inputs as they were set, then the substeps; between steps a client gets the state "
+    "right before the ticks that are due then. With event mode, ticks are done there, when "
+    "their clocks tick, and results after them are those that a bench records.",
+}
 _EXCHANGED = (
     "A client's solver integrates the states. Bodies with dry friction are stuck or slide, states "
     "with limits are free or at them, contacts press or are open: these modes (mode.*) change in "
@@ -46,14 +46,20 @@ def documentation(made: Exported, faces: Interface, begins_anywhere: bool, versi
         ("Experiment", f"{bench.experiment}, run {made.case.label!r}: {bench.summary()}"),
         ("Parameter set", bench.parameters),
         ("Time 0", f"{shown(made.case.settle, 's')} before time zero of the bench's recording"),
-        *(() if is_exchanged else (
-            ("Internal step", f"{shown(schedule.step, 's')}, fixed"),
-            ("Communication step", f"whole multiples of {shown(schedule.frame, 's')}; others are "
-                                   "refused"),
-            ("Tasks", tasks),
-        )),
+        *(
+            ()
+            if is_exchanged
+            else (
+                ("Internal step", f"{shown(schedule.step, 's')}, fixed"),
+                (
+                    "Communication step",
+                    f"whole multiples of {shown(schedule.frame, 's')}; others are refused",
+                ),
+                ("Tasks", tasks),
+            )
+        ),
         ("Structure", ", ".join(f"{k} = {v}" for k, v in par.choices().items())),
-    ]  # fmt: skip
+    ]
     texts = [
         _EXCHANGED if is_exchanged else _STEPS[version],
         f"{begins} Values that are no numbers or out of their range are refused, and those before "
@@ -63,10 +69,17 @@ def documentation(made: Exported, faces: Interface, begins_anywhere: bool, versi
         "validity are not in this unit.",
     ]
     rows = [
-        (v.name, v.causality, v.unit, "" if v.start is None else f"{v.start:.6g}",
-         "" if v.leaf is None else v.leaf.range_text, v.label)
-        for v in faces.variables if v.causality != "local" or is_exchanged
-    ]  # fmt: skip
+        (
+            v.name,
+            v.causality,
+            v.unit,
+            "" if v.start is None else f"{v.start:.6g}",
+            "" if v.leaf is None else v.leaf.range_text,
+            v.label,
+        )
+        for v in faces.variables
+        if v.causality != "local" or is_exchanged
+    ]
     heading = ("name", "what", "unit", "start", "range", "meaning")
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>

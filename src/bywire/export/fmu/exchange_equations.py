@@ -40,9 +40,13 @@ class Equations:
     def _added(self, function: object, kinds: str) -> list[list[Node]]:
         n = self.made.program.sizes
         lengths = {
-            "p": n.parameters, "x": n.x, "m": n.memory, "c": self.continuous.contacts,
-            "r": len(self.continuous.modal), "q": n.flow,
-        }  # fmt: skip
+            "p": n.parameters,
+            "x": n.x,
+            "m": n.memory,
+            "c": self.continuous.contacts,
+            "r": len(self.continuous.modal),
+            "q": n.flow,
+        }
         leaves = [[self.graph.leaf(kind, k) for k in range(lengths[kind])] for kind in kinds]
         return self.graph.add_function(function, leaves)
 
@@ -91,13 +95,21 @@ class Equations:
         }
         outputs = ", ".join(f"double *{name}" for name in names)
         held = "const double *m, const double *closed"
-        return SCALAR + "\n".join((
-            self._function("bw_closing", "double *closed",
-                           {f"closed[{k}]": node for k, node in enumerate(self.closing)}),
-            self._function("bw_equations", f"{held}, {outputs}", results),
-            self._function("bw_output", f"{held}, const double *reaction, double *row",
-                           {f"row[{k}]": self.output[k] for k in self.shown}),
-        ))  # fmt: skip
+        return SCALAR + "\n".join(
+            (
+                self._function(
+                    "bw_closing",
+                    "double *closed",
+                    {f"closed[{k}]": node for k, node in enumerate(self.closing)},
+                ),
+                self._function("bw_equations", f"{held}, {outputs}", results),
+                self._function(
+                    "bw_output",
+                    f"{held}, const double *reaction, double *row",
+                    {f"row[{k}]": self.output[k] for k in self.shown},
+                ),
+            )
+        )
 
     def _function(self, name: str, arguments: str, results: dict[str, Node]) -> str:
         graph = self.graph

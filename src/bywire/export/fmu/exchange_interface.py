@@ -53,11 +53,12 @@ def _state_names(equations: Equations, shown: list[int]) -> list[str]:
     recorded = list(made.program.outputs)
     taken = set(made.run.model.Memory._fields)
     taken |= {
-        recorded[k] for k in shown
+        recorded[k]
+        for k in shown
         if recorded[k] in made.run.model.State._fields
         and equations.output[k]
         != equations.graph.leaf("x", made.run.model.State._fields.index(recorded[k]))
-    }  # fmt: skip
+    }
     return [f"state.{name}" if name in taken else name for name in made.run.model.State._fields]
 
 
@@ -85,8 +86,12 @@ def _modes(equations: Equations) -> Iterator[Variable]:
     at = 0
     for name in continuous.modal:
         yield _indicator(at, f"{name}.motion", known[name], "until it turns, or meets its limit")
-        yield _indicator(at + 1, f"{name}.hold", Signal("1", known[name].label),
-                         "what more would hold it where it is stuck")
+        yield _indicator(
+            at + 1,
+            f"{name}.hold",
+            Signal("1", known[name].label),
+            "what more would hold it where it is stuck",
+        )
         at += 2
     for k in range(continuous.contacts):
         label = "how far it is pressed, or open"

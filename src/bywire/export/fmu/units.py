@@ -28,4 +28,3 @@ def unit_definitions(units: Iterable[str]) -> Element:
             factor = 1.0 / convert(1.0, display, unit)
             SubElement(shown, "DisplayUnit", name=display, factor=repr(factor))
     return made
-

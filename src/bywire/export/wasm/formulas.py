@@ -20,10 +20,36 @@ from bywire.simulation.graph import Graph
 from bywire.simulation.operation import Node
 
 OPERATIONS = (
-    "add", "sub", "mul", "neg", "inv", "fabs", "sqrt", "floor", "ceil", "copysign", "fmax", "fmin",
-    "lt", "le", "eq", "ne", "not", "and", "or", "if_else_zero", "select",
-    "exp", "log", "sin", "cos", "pow", "tan", "atan", "tanh",
-)  # fmt: skip
+    "add",
+    "sub",
+    "mul",
+    "neg",
+    "inv",
+    "fabs",
+    "sqrt",
+    "floor",
+    "ceil",
+    "copysign",
+    "fmax",
+    "fmin",
+    "lt",
+    "le",
+    "eq",
+    "ne",
+    "not",
+    "and",
+    "or",
+    "if_else_zero",
+    "select",
+    "exp",
+    "log",
+    "sin",
+    "cos",
+    "pow",
+    "tan",
+    "atan",
+    "tanh",
+)
 """In the order of their numbers in the table; the loader has the same."""
 
 _NEAR = 64  # named values back that a byte of an operand reaches; 0 is none, above it are others
@@ -123,8 +149,12 @@ def table(formulas: Sequence[Formula], places: Places) -> bytes:
     for value, count in uses.items():
         if value not in made.names and count > 1:
             made.add(graphs[value], value[1])
-    numbers = [len(inputs), len(constants), len(formulas),
-               *_steps([places[v[1], v[2]] for v in inputs])]  # fmt: skip
+    numbers = [
+        len(inputs),
+        len(constants),
+        len(formulas),
+        *_steps([places[v[1], v[2]] for v in inputs]),
+    ]
     for formula in formulas:
         numbers += [formula.again, len(formula.results)]
         numbers += _steps([made.names[_value(formula.graph, n)] for _, n in formula.results])
@@ -158,9 +188,7 @@ def _steps(numbers: Sequence[int]) -> list[int]:
     return [(b - a) & 0xFFFF for a, b in zip([0, *numbers], numbers, strict=False)]
 
 
-def _packed(
-    made: _Table, leaves: int, numbers: list[int], constants: Sequence[float]
-) -> bytes:
+def _packed(made: _Table, leaves: int, numbers: list[int], constants: Sequence[float]) -> bytes:
     """Return lengths and planes: bytes that are alike stand together."""
     kinds = [kind for kind, _ in Counter(made.tokens).most_common()]
     count = max(len(made.tokens), len(made.operands), len(numbers) + len(made.operands))
@@ -178,11 +206,21 @@ def _packed(
         operands.append(count - name if _is_near(name, count, leaves) else code.get(name, 0))
         if not operands[-1]:
             escaped.append(name)
-    numbers = [*numbers, len(kinds), *(_number(kind) for kind in kinds), len(often),
-               *_steps(often), *escaped]  # fmt: skip
-    planes = [bytes(kinds.index(token) for token in made.tokens), bytes(operands),
-              bytes(n & 0xFF for n in numbers), bytes(n >> 8 for n in numbers),
-              struct.pack(f"<{len(constants)}d", *constants)]  # fmt: skip
+    numbers = [
+        *numbers,
+        len(kinds),
+        *(_number(kind) for kind in kinds),
+        len(often),
+        *_steps(often),
+        *escaped,
+    ]
+    planes = [
+        bytes(kinds.index(token) for token in made.tokens),
+        bytes(operands),
+        bytes(n & 0xFF for n in numbers),
+        bytes(n >> 8 for n in numbers),
+        struct.pack(f"<{len(constants)}d", *constants),
+    ]
     return struct.pack("<3H", *(len(each) for each in planes[:3])) + b"".join(planes)
 
 

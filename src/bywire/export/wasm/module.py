@@ -29,10 +29,20 @@ from bywire.simulation.run import sampled_stimulus
 HERE = Path(__file__).parent
 _LOADER = ("formulas.mjs", "loader.mjs")
 _FLAGS = (
-    "-target", "wasm32-freestanding", "-mbulk-memory", "-Os", "-std=c11", "-nostdlib",
-    "-fno-builtin", "-fno-slp-vectorize", "-fno-unroll-loops", *KERNEL_MATH,
-    "-Wl,--no-entry", "-Wl,--import-table", "-s",
-)  # fmt: skip
+    "-target",
+    "wasm32-freestanding",
+    "-mbulk-memory",
+    "-Os",
+    "-std=c11",
+    "-nostdlib",
+    "-fno-builtin",
+    "-fno-slp-vectorize",
+    "-fno-unroll-loops",
+    *KERNEL_MATH,
+    "-Wl,--no-entry",
+    "-Wl,--import-table",
+    "-s",
+)
 
 
 def module_files(
@@ -105,22 +115,35 @@ def _description(
     parameters = []
     for each in parameter_variables(made, frozenset(range(count)), frozenset()):
         low, high = (None, None) if each.leaf is None else finite_range(each.leaf)
-        parameters.append({
-            "name": each.name, "unit": each.unit, "start": each.start, "low": low, "high": high,
-            "range": "" if each.leaf is None else each.leaf.range_text, "meaning": each.label,
-            "used": each.name in used,
-        })  # fmt: skip
+        parameters.append(
+            {
+                "name": each.name,
+                "unit": each.unit,
+                "start": each.start,
+                "low": low,
+                "high": high,
+                "range": "" if each.leaf is None else each.leaf.range_text,
+                "meaning": each.label,
+                "used": each.name in used,
+            }
+        )
     return {
-        "name": name, "model": made.run.model.name, "duration": made.run.duration,
-        "settle": made.case.settle, "step": schedule.step, "frame": schedule.frame,
-        "recordFrames": schedule.record_frames, "stimulusFrames": schedule.stimulus_frames,
-        "stateLength": made.layout.total, "unsettledAt": made.layout.start["counters"],
+        "name": name,
+        "model": made.run.model.name,
+        "duration": made.run.duration,
+        "settle": made.case.settle,
+        "step": schedule.step,
+        "frame": schedule.frame,
+        "recordFrames": schedule.record_frames,
+        "stimulusFrames": schedule.stimulus_frames,
+        "stateLength": made.layout.total,
+        "unsettledAt": made.layout.start["counters"],
         "beginsAtRest": begins_anywhere,
         "choices": {k: v for k, v in par.choices().items() if isinstance(v, (str, int))},
         "parameters": parameters,
         "stimulus": _stimuli(made),
         "signals": [_signal(k, s) for k, s in made.program.outputs.items()],
-    }  # fmt: skip
+    }
 
 
 def _stimuli(made: Exported) -> list[dict[str, Any]]:

@@ -36,12 +36,20 @@ def run_formulas(made: Exported) -> RunFormulas:
     results, exact = rare_results(stages.fast), rare_results(stages.exact)
     products = stages.quadrature.products
     blocks = {
-        **lengths, "m": len(stages.ticks[0]), "counters": COUNTERS,
-        "p": made.program.sizes.parameters, "h": 1, "u": leaf_count(stages, "u"),
-        "w": stages.rows, "force": stages.rows, "failed": 1,
-        "posed": len(stages.posed), "o": len(results), "out": len(stages.output),
+        **lengths,
+        "m": len(stages.ticks[0]),
+        "counters": COUNTERS,
+        "p": made.program.sizes.parameters,
+        "h": 1,
+        "u": leaf_count(stages, "u"),
+        "w": stages.rows,
+        "force": stages.rows,
+        "failed": 1,
+        "posed": len(stages.posed),
+        "o": len(results),
+        "out": len(stages.output),
         "s": len(products),
-    }  # fmt: skip
+    }
     at, total = {}, 0
     for kind, length in blocks.items():
         at[kind] = total
@@ -53,9 +61,11 @@ def run_formulas(made: Exported) -> RunFormulas:
 
     skipped = unread(stages)
     again = [
-        (at[kind] + k, node) for kind in ("x", "d", "r")
-        for k, node in enumerate(stages.fast[kind]) if f"{kind}{k}" not in skipped
-    ]  # fmt: skip
+        (at[kind] + k, node)
+        for kind in ("x", "d", "r")
+        for k, node in enumerate(stages.fast[kind])
+        if f"{kind}{k}" not in skipped
+    ]
     start = start_nodes(made)
     others = [
         Formula(graph, [(0, stages.fast["flag"][0]), *again, *placed("s", products)], len(again)),
@@ -65,13 +75,25 @@ def run_formulas(made: Exported) -> RunFormulas:
         Formula(graph, placed("q", _integrals(stages))),
         Formula(graph, placed("out", stages.output)),
         Formula(start.graph, list(start.targets.items())) if start else Formula(Graph(), []),
-        *(Formula(graph, [each for k, each in enumerate(placed("m", roots))
-                          if each[1] != graph.leaf("m", k)]) for roots in stages.ticks),
-    ]  # fmt: skip
+        *(
+            Formula(
+                graph,
+                [
+                    each
+                    for k, each in enumerate(placed("m", roots))
+                    if each[1] != graph.leaf("m", k)
+                ],
+            )
+            for roots in stages.ticks
+        ),
+    ]
     kept = _kept(stages, [n for each in others if each.graph is graph for _, n in each.results])
     first = Formula(graph, [(total + k, node) for k, node in enumerate(kept)])
-    used = {f.graph.nodes[n].op for f in (first, *others) for n in
-            needed(f.graph, [n for _, n in f.results], lambda _: False)}  # fmt: skip
+    used = {
+        f.graph.nodes[n].op
+        for f in (first, *others)
+        for n in needed(f.graph, [n for _, n in f.results], lambda _: False)
+    }
     used = {"pow" if op == "constpow" else op for op in used}
     header = _header(made, at, total + len(kept), used)
     return RunFormulas(table([first, *others], leaves), header)
@@ -97,9 +119,10 @@ def _kept(stages: Stages, roots: Sequence[Node]) -> list[Node]:
     readers = [node for node in order if level[node] or graph.is_boolean(node)]
     read = [*roots, *(a for node in readers for a in graph.arguments(node))]
     return [
-        node for node in dict.fromkeys(read)
+        node
+        for node in dict.fromkeys(read)
         if not level[node] and not graph.is_boolean(node) and graph.arguments(node)
-    ]  # fmt: skip
+    ]
 
 
 def _header(made: Exported, at: dict[str, int], total: int, used: set[str]) -> str:

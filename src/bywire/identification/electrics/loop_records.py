@@ -100,14 +100,10 @@ def require_steps(data: xr.Dataset, name: str, answer: str, label: str) -> None:
         )
     together = float(np.corrcoef(demand, current)[0, 1]) if np.ptp(current) > 0.0 else 0.0
     if together < _AGAINST:
-        raise wrong_sign(
-            f"{answer} of record {label or '1'}", name, f"correlation {together:.2f}"
-        )
+        raise wrong_sign(f"{answer} of record {label or '1'}", name, f"correlation {together:.2f}")
 
 
-def identified_loop(
-    trials: Sequence[Trial], par: ParameterSet, names: Sequence[str]
-) -> Identified:
+def identified_loop(trials: Sequence[Trial], par: ParameterSet, names: Sequence[str]) -> Identified:
     """Return a closed loop's parameters from its runs.
 
     Parameters
@@ -126,9 +122,11 @@ def identified_loop(
     """
     fit = estimate(output_error(trials, parameters_of(par, names)))
     return Identified(
-        estimates={"current loop": fit}, parameters=believable(fit),
-        checks=checks_of(trials, fit), curves=tuple(as_curve(t, fit) for t in trials),
-    )  # fmt: skip
+        estimates={"current loop": fit},
+        parameters=believable(fit),
+        checks=checks_of(trials, fit),
+        curves=tuple(as_curve(t, fit) for t in trials),
+    )
 
 
 def believable(fit: Estimate) -> dict[str, float]:
@@ -146,14 +144,27 @@ def checks_of(trials: Sequence[Trial], fit: Estimate) -> tuple[Check, ...]:
     vague = fit.vague()
     said = "; ".join(f"{label} {reason}" for label, reason in vague.items())
     return (
-        Check("variance_explained", explained(trials, fit), limit=_EXPLAINED, at_least=True,
-              note="share of the current's variance that the model predicts: do demand and "
-              "current belong together?"),
-        Check("residual_over_noise", fit.rms, limit=_MISFIT,
-              note="1 where nothing but the sensor's noise is left"),
-        Check("parameters_without_meaning", float(len(vague)), limit=0.0,
-              note=said or "none at its bound, none with a 95 % interval wider than +-100 %"),
-    )  # fmt: skip
+        Check(
+            "variance_explained",
+            explained(trials, fit),
+            limit=_EXPLAINED,
+            at_least=True,
+            note="share of the current's variance that the model predicts: do demand and "
+            "current belong together?",
+        ),
+        Check(
+            "residual_over_noise",
+            fit.rms,
+            limit=_MISFIT,
+            note="1 where nothing but the sensor's noise is left",
+        ),
+        Check(
+            "parameters_without_meaning",
+            float(len(vague)),
+            limit=0.0,
+            note=said or "none at its bound, none with a 95 % interval wider than +-100 %",
+        ),
+    )
 
 
 def as_curve(trial: Trial, fit: Estimate) -> Curve:
@@ -167,10 +178,12 @@ def as_curve(trial: Trial, fit: Estimate) -> Curve:
     computed = simulate(moved_run(trial.run, shared), (signal,))
     attrs = {"units": "A", "long_name": "current"}
     data = xr.Dataset(
-        {"measured": ("time", trial.measured[signal], attrs),
-         "modeled": ("time", np.where(trial.rows(signal), computed[signal], np.nan), attrs)},
+        {
+            "measured": ("time", trial.measured[signal], attrs),
+            "modeled": ("time", np.where(trial.rows(signal), computed[signal], np.nan), attrs),
+        },
         {"time": ("time", computed.time, {"units": "s", "long_name": "time"})},
-    )  # fmt: skip
+    )
     name = f"current-{trial.label}" if trial.label else "current"
     return Curve(name, "Current: measured, and modeled where it counts.", data, "time")
 

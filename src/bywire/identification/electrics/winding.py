@@ -83,9 +83,13 @@ class Winding(Driven):
 
 
 def winding_trial(
-    motor: dc_motor.Parameters, data: xr.Dataset, names: Mapping[str, str], f_aa: float,
-    sigma: float, label: str = "",
-) -> Trial:  # fmt: skip
+    motor: dc_motor.Parameters,
+    data: xr.Dataset,
+    names: Mapping[str, str],
+    f_aa: float,
+    sigma: float,
+    label: str = "",
+) -> Trial:
     """Return a record beside the winding.
 
     Parameters
@@ -123,8 +127,14 @@ def winding_trial(
         return np.column_stack((v[index], speed(at + 0.5 * step)))
 
     run = Run(
-        Winding(), Parameters(motor=motor, f_aa=f_aa, T=step), Currents(float(i[0]), float(i[0])),
-        zeros(Inputs), stimulus, (t.size - 1) * T, step, T,
-    )  # fmt: skip
+        Winding(),
+        Parameters(motor=motor, f_aa=f_aa, T=step),
+        Currents(float(i[0]), float(i[0])),
+        zeros(Inputs),
+        stimulus,
+        (t.size - 1) * T,
+        step,
+        T,
+    )
     forgotten = _SETTLED / (2.0 * np.pi * f_aa)
     return Trial(run, {"i_meas": i}, {"i_meas": sigma}, label, t >= forgotten)

@@ -101,10 +101,15 @@ class BenchFit:
             unknowns, self.question.ranges, effort.starts, effort.spread, effort.seed
         )
         led = search(
-            problem, starts, options.loss, effort.progress, effort.store, effort.threads,
+            problem,
+            starts,
+            options.loss,
+            effort.progress,
+            effort.store,
+            effort.threads,
             # A loss that redescends has far minima wherever the record is missed altogether.
             partial(_nearer, problem) if options.loss == "cauchy" else None,
-        )  # fmt: skip
+        )
         fit = estimate(problem, options.loss, led.best.values)
         reached = _reached(led, fit)
         shown = [
@@ -114,15 +119,18 @@ class BenchFit:
         held = self._held_out(bench, fit, options)
         uneven = any(resampled(record) for record in records.values())
         checks = checks_of(trials, fit, options, uneven)
-        doubtful = {} if fit.is_exact else overestimated(
-            list(records.values()), trials, fit.residuals, self.question.noise
-        )  # fmt: skip
+        doubtful = (
+            {}
+            if fit.is_exact
+            else overestimated(list(records.values()), trials, fit.residuals, self.question.noise)
+        )
         return Identified(
             estimates={"output error": fit},
             parameters=believable(fit),
             figures=figures_of(shown, trials),
             checks=(
-                *checks, *noise_check(doubtful, self.question.noise),
+                *checks,
+                *noise_check(doubtful, self.question.noise),
                 *starts_check(reached, effort.starts),
                 *(() if held is None else validation_of(held, options)),
             ),
@@ -131,25 +139,34 @@ class BenchFit:
                 *(() if held is None else curves_of(held, "validation")),
             ),
             notes=(
-                *_said(records, options, coarse=not checks[0].holds), *_smoothed(bench),
+                *_said(records, options, coarse=not checks[0].holds),
+                *_smoothed(bench),
                 f"{reached} of {effort.starts} starts reached the minimum",
             ),
-        )  # fmt: skip
+        )
 
     def moved(self, par: ParameterSet) -> Bench:
         """Return the bench with other values of what is unknown."""
         leaves, known = par.leaves(), self.bench.par.leaves()
         return self.bench.with_overrides(
-            {n: leaves[n] for n in filter(is_parameter, self.question.ranges)
-             if leaves.get(n) != known.get(n)}
-        )  # fmt: skip
+            {
+                n: leaves[n]
+                for n in filter(is_parameter, self.question.ranges)
+                if leaves.get(n) != known.get(n)
+            }
+        )
 
     def record(self, bench: Bench, data: xr.Dataset, options: Options) -> MeasuredRun:
         """Return a record with the run that stands beside it."""
         return measured_run(
-            bench, data, self.question.inputs or None, list(self.question.noise),
-            self.question.case, settle=not self.question.states, between=options.between,
-        )  # fmt: skip
+            bench,
+            data,
+            self.question.inputs or None,
+            list(self.question.noise),
+            self.question.case,
+            settle=not self.question.states,
+            between=options.between,
+        )
 
     def trial(self, measured: MeasuredRun, label: str) -> Trial:
         """Return a record beside its run; while the run settles nothing is compared."""
@@ -161,7 +178,8 @@ class BenchFit:
             {name: np.concatenate((before, row)) for name, row in values.items()},
             {name: output_noise(measured, name, self.question.noise[name]) for name in values},
             label,
-            start=None if measured.bench.definition.preview
+            start=None
+            if measured.bench.definition.preview
             else partial(_begun, measured.bench, measured.case),
         )
 
@@ -173,8 +191,9 @@ class BenchFit:
             value = float(measured.bench.options[name])
             if trial.start is not None and value > _AT_REST * trial.noise[signal]:
                 unit = fields[name].unit.symbol
-                unknowns.append(Unknown(f"start.{name}", value, 0.0, scale=value, unit=unit,
-                                     trial=trial.label))  # fmt: skip
+                unknowns.append(
+                    Unknown(f"start.{name}", value, 0.0, scale=value, unit=unit, trial=trial.label)
+                )
         return (*unknowns, *initial_states(trial, self.question.states))
 
     def _held_out(self, bench: Bench, fit: Estimate, options: Options) -> Prediction | None:
@@ -226,15 +245,17 @@ def exact_laws(cls: type[ParameterSet]) -> dict[str, str]:
 def _smoothed(bench: Bench) -> tuple[str, ...]:
     known, exact = bench.par.choices(), exact_laws(type(bench.par))
     changed = [name for name, law in exact.items() if known.get(name, law) != law]
-    return tuple(f"{name} = {exact[name]} in the fit: rounding has no derivative"
-                 for name in changed)  # fmt: skip
+    return tuple(
+        f"{name} = {exact[name]} in the fit: rounding has no derivative" for name in changed
+    )
 
 
 def _said(records: Mapping[str, MeasuredRun], options: Options, coarse: bool) -> list[str]:
     """Return what the user should know of the records, and of coarse inputs where asked."""
     said = [
         f"{label}: {note}" if label else note
-        for label, record in records.items() for note in record.notes
+        for label, record in records.items()
+        for note in record.notes
     ]
     measured = next(iter(records.values()))
     said.append("driven by " + ", ".join(f"{name} = {v}" for name, v in measured.driven.items()))

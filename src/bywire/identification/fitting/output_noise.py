@@ -79,9 +79,11 @@ def resampled(measured: MeasuredRun) -> bool:
 
 
 def overestimated(
-    records: Sequence[MeasuredRun], trials: Sequence[Trial], residuals: Array,
+    records: Sequence[MeasuredRun],
+    trials: Sequence[Trial],
+    residuals: Array,
     given: Mapping[str, str],
-) -> dict[str, str]:  # fmt: skip
+) -> dict[str, str]:
     """Return the outputs whose noise is not told by their record, with the reason.
 
     Any model passes beside a noise that is too large.

@@ -100,10 +100,16 @@ class Question:
     def given(self) -> tuple[str, ...]:
         """What was given, as options of the command."""
         options = {
-            "--bench": self.bench is not None, "--input": self.inputs, "--output": self.outputs,
-            "--unknown": self.unknowns, "--prior": self.priors, "--estimate-start": self.states,
-            "--case": self.case, "--holdout": self.holdout is not None, "--loss": self.loss,
-        }  # fmt: skip
+            "--bench": self.bench is not None,
+            "--input": self.inputs,
+            "--output": self.outputs,
+            "--unknown": self.unknowns,
+            "--prior": self.priors,
+            "--estimate-start": self.states,
+            "--case": self.case,
+            "--holdout": self.holdout is not None,
+            "--loss": self.loss,
+        }
         return tuple(name for name, value in options.items() if value)
 
 

@@ -58,16 +58,16 @@ def unknowns_of(case: Case, known: ParameterSet, question: Question) -> tuple[Un
     leaves = leaf_fields(type(known))
     return tuple(
         _with_texts(
-            _bare(name, case, known, question.noise), text, question.priors.get(name, ""),
+            _bare(name, case, known, question.noise),
+            text,
+            question.priors.get(name, ""),
             leaves.get(name),
         )
         for name, text in question.ranges.items()
-    )  # fmt: skip
+    )
 
 
-def _bare(
-    name: str, case: Case, known: ParameterSet, outputs: Iterable[str]
-) -> Unknown:
+def _bare(name: str, case: Case, known: ParameterSet, outputs: Iterable[str]) -> Unknown:
     """Return an unknown without range and prior."""
     if name.startswith(_STIMULUS):
         stimuli = signals_of(case.model.Stimulus)
@@ -153,7 +153,7 @@ def _pair(
     return (
         number(first, unknown.unit, what, unknown.scale),
         number(second, _second_unit(unknown, kind), what, unknown.scale),
-    )  # fmt: skip
+    )
 
 
 def _second_unit(unknown: Unknown, kind: str) -> str:

@@ -59,9 +59,11 @@ def compared(measured: MeasuredRun, trial: Trial, fit: Estimate) -> Prediction:
     modeled, _ = computed(trial, fit, measured.compared)
     return Prediction(
         trial.label,
-        {name: beside(measured.data, name, modeled[name][measured.settled:])
-         for name in measured.compared},
-    )  # fmt: skip
+        {
+            name: beside(measured.data, name, modeled[name][measured.settled :])
+            for name in measured.compared
+        },
+    )
 
 
 def checks_of(
@@ -89,23 +91,39 @@ def checks_of(
     counted = ~far if robust else np.ones_like(far)
     left = math.sqrt(float(np.mean(fit.residuals[counted] ** 2)))
     return (
-        Check("residual_over_noise", left, limit=options.most_residual,
-              note="1 where nothing but the sensors' noise is left"
-              + _few(fit.residuals, far, robust) + (_BETWEEN if resampled else ""),
-              next_step=_missing(fit)),
+        Check(
+            "residual_over_noise",
+            left,
+            limit=options.most_residual,
+            note="1 where nothing but the sensors' noise is left"
+            + _few(fit.residuals, far, robust)
+            + (_BETWEEN if resampled else ""),
+            next_step=_missing(fit),
+        ),
         *((_outliers(far, options),) if robust else ()),
-        Check("variance_explained", explained(trials, fit, counted), limit=_EXPLAINED,
-              at_least=True,
-              note="share of the outputs' variance, over their noise, that the model predicts",
-              next_step="check that --input is what drove the record, its unit and its sign; "
-              "'bywire replay' draws both"),
-        Check("parameters_without_meaning", float(len(vague)), limit=0.0,
-              note=said or "none at its bound, none with a 95 % interval wider than +-100 %",
-              next_step="leave these --unknown out, give a --prior, or record a motion that they "
-              "change"),
-        Check("not_told", float(len(untold)),
-              note=", ".join(untold) or "the data tells all that was asked for"),
-    )  # fmt: skip
+        Check(
+            "variance_explained",
+            explained(trials, fit, counted),
+            limit=_EXPLAINED,
+            at_least=True,
+            note="share of the outputs' variance, over their noise, that the model predicts",
+            next_step="check that --input is what drove the record, its unit and its sign; "
+            "'bywire replay' draws both",
+        ),
+        Check(
+            "parameters_without_meaning",
+            float(len(vague)),
+            limit=0.0,
+            note=said or "none at its bound, none with a 95 % interval wider than +-100 %",
+            next_step="leave these --unknown out, give a --prior, or record a motion that they "
+            "change",
+        ),
+        Check(
+            "not_told",
+            float(len(untold)),
+            note=", ".join(untold) or "the data tells all that was asked for",
+        ),
+    )
 
 
 def _missing(fit: Estimate) -> str:
@@ -132,11 +150,13 @@ def _few(r: Array, far: NDArray[np.bool_], robust: bool) -> str:
 
 def _outliers(far: NDArray[np.bool_], options: Options) -> Check:
     return Check(
-        "outliers", float(far.mean()), limit=options.most_outliers,
+        "outliers",
+        float(far.mean()),
+        limit=options.most_outliers,
         note=f"{far.sum()} of {far.size} residuals stand out by {FAR:g} times the noise or more: "
         "beyond the limit they are the model's",
         next_step="look where they stand: a stretch of them is a motion that the model lacks",
-    )  # fmt: skip
+    )
 
 
 def noise_check(doubtful: Mapping[str, str], given: Mapping[str, str]) -> tuple[Check, ...]:
@@ -152,8 +172,15 @@ def noise_check(doubtful: Mapping[str, str], given: Mapping[str, str]) -> tuple[
     if all(given.values()):
         return ()
     note = "; ".join(doubtful.values()) or "what scatters in the record is noise"
-    return (Check("noise_not_told", float(len(doubtful)), limit=0.0, note=note,
-                  next_step="record it at rest, and give its standard deviation"),)  # fmt: skip
+    return (
+        Check(
+            "noise_not_told",
+            float(len(doubtful)),
+            limit=0.0,
+            note=note,
+            next_step="record it at rest, and give its standard deviation",
+        ),
+    )
 
 
 def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
@@ -162,10 +189,20 @@ def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
         return ()
     note = "starts that met the lowest minimum"
     if reached < _MET:
-        note += ": there may be a lower one; take more --starts, narrower ranges (--unknown " \
-                "NAME=LOW..HIGH), or fewer unknowns"
-    return (Check("starts_at_minimum", float(reached), limit=_MET, at_least=True, note=note,
-                  next_step="take --starts 16, or a range for each --unknown"),)  # fmt: skip
+        note += (
+            ": there may be a lower one; take more --starts, narrower ranges (--unknown "
+            "NAME=LOW..HIGH), or fewer unknowns"
+        )
+    return (
+        Check(
+            "starts_at_minimum",
+            float(reached),
+            limit=_MET,
+            at_least=True,
+            note=note,
+            next_step="take --starts 16, or a range for each --unknown",
+        ),
+    )
 
 
 def _of_bench(fit: Estimate, label: str) -> bool:
@@ -192,13 +229,20 @@ def validation_of(held: Prediction, options: Options) -> tuple[Check, ...]:
         vaf = figures["vaf"] / 100.0
         still = "" if math.isfinite(vaf) else "; the measured signal does not move"
         checks += [
-            Check(f"validation.{name}.vaf", vaf, limit=options.least_vaf, at_least=True,
-                  note=f"variance accounted for in the record that was not fitted{still}",
-                  next_step="fit a record that covers what the held-out one does, or fewer "
-                  "unknowns"),
-            Check(f"validation.{name}.nrmse", figures["nrmse"] / 100.0,
-                  note="root mean square of the error there, over the range"),
-        ]  # fmt: skip
+            Check(
+                f"validation.{name}.vaf",
+                vaf,
+                limit=options.least_vaf,
+                at_least=True,
+                note=f"variance accounted for in the record that was not fitted{still}",
+                next_step="fit a record that covers what the held-out one does, or fewer unknowns",
+            ),
+            Check(
+                f"validation.{name}.nrmse",
+                figures["nrmse"] / 100.0,
+                note="root mean square of the error there, over the range",
+            ),
+        ]
     return tuple(checks)
 
 

@@ -49,9 +49,15 @@ class Options(ParameterSet):
     """Which laws, and which samples."""
 
     law: Literal[
-        "choose", "coulomb", "viscous", "asymmetric", "pressure", "stribeck",
-        "stribeck-asymmetric", "stribeck-pressure",
-    ]  # fmt: skip
+        "choose",
+        "coulomb",
+        "viscous",
+        "asymmetric",
+        "pressure",
+        "stribeck",
+        "stribeck-asymmetric",
+        "stribeck-pressure",
+    ]
     """one of the laws, or all compared on data held out"""
     slowest: Share
     """of the fastest speed: slower samples stick or turn round, and are left out"""
@@ -99,28 +105,40 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     best = choice.chosen
     law = find_law(best.candidate.name)
     unit = str(whole["friction"].attrs.get("units", "1"))
-    values = [best.estimate[u.label] if u.label in best.estimate.names else u.start
-              for u in law.unknowns(whole)]  # fmt: skip
+    values = [
+        best.estimate[u.label] if u.label in best.estimate.names else u.start
+        for u in law.unknowns(whole)
+    ]
     predicted, _ = law.predict(whole, np.array(values))
     return Identified(
         estimates={law.name: best.estimate},
         parameters={},
         figures=_figures(choice, unit),
         checks=(
-            Check("misfit_over_friction", _misfit(whole, predicted), limit=_MISFIT,
-                  note="what is left on average at a speed or a pressure, over the friction",
-                  next_step="see in the curve where it is left: at low speed, record slower "
-                  "strokes; over pressure, give p as well; if it differs from record to record, "
-                  "identify them one by one"),
-            Check("validation_over_training", best.validation_error / best.training_error,
-                  limit=1.5, note="error on data held out over that on data fitted",
-                  next_step="measure more records, or the same speeds and pressures in each"),
+            Check(
+                "misfit_over_friction",
+                _misfit(whole, predicted),
+                limit=_MISFIT,
+                note="what is left on average at a speed or a pressure, over the friction",
+                next_step="see in the curve where it is left: at low speed, record slower "
+                "strokes; over pressure, give p as well; if it differs from record to record, "
+                "identify them one by one",
+            ),
+            Check(
+                "validation_over_training",
+                best.validation_error / best.training_error,
+                limit=1.5,
+                note="error on data held out over that on data fitted",
+                next_step="measure more records, or the same speeds and pressures in each",
+            ),
             _driving(best.estimate),
         ),
         curves=(_curve(records, whole, predicted),),
-        notes=(f"held out: {choice.held_out}; chosen is the simplest law within a standard error "
-               "of the best",),
-    )  # fmt: skip
+        notes=(
+            f"held out: {choice.held_out}; chosen is the simplest law within a standard error "
+            "of the best",
+        ),
+    )
 
 
 def _driving(fit: Estimate) -> Check:
@@ -130,11 +148,13 @@ def _driving(fit: Estimate) -> Check:
     unit = {u.label: u.unit for u in fit.unknowns}
     said = "; ".join(f"{n} = {shown(float(f'{fit[n]:.3g}'), unit[n])} drives" for n in below)
     return Check(
-        "terms_that_drive", float(len(below)), limit=0.0,
+        "terms_that_drive",
+        float(len(below)),
+        limit=0.0,
         note=said or "no part of the law has a sign that friction cannot have",
         next_step="check the signs of friction and speed, and whether speeds and pressures "
         "spread widely enough to tell the parts of the law apart",
-    )  # fmt: skip
+    )
 
 
 def _figures(choice: Choice, unit: str) -> dict[str, tuple[float, str]]:
@@ -160,8 +180,11 @@ def _misfit(whole: xr.Dataset, predicted: Array) -> float:
         means = []
         for way in (v > 0, v < 0):
             order = np.flatnonzero(way)[np.argsort(key[way], kind="stable")]
-            means += [float(np.mean((F - predicted)[part]))
-                      for part in np.array_split(order, _BINS) if part.size]  # fmt: skip
+            means += [
+                float(np.mean((F - predicted)[part]))
+                for part in np.array_split(order, _BINS)
+                if part.size
+            ]
         errors.append(float(np.sqrt(np.mean(np.square(means)))))
     return max(errors) / float(np.sqrt(np.mean(F**2)))
 
@@ -172,12 +195,14 @@ def _curve(records: Mapping[str, xr.Dataset], whole: xr.Dataset, predicted: Arra
         "friction",
         "Friction while it slides, record after record: measured, and of the chosen law.",
         xr.Dataset(
-            {"measured": ("time", whole["friction"].values, attrs),
-             "modeled": ("time", predicted, attrs)},
+            {
+                "measured": ("time", whole["friction"].values, attrs),
+                "modeled": ("time", predicted, attrs),
+            },
             after_one_another({name: record["time"].values for name, record in records.items()}),
         ),
         "time",
-    )  # fmt: skip
+    )
 
 
 def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
@@ -191,10 +216,13 @@ def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
         dry = np.where(v > 0, truth.F_p, truth.F_n) + truth.f * p
         F = np.sign(v) * dry * fall + truth.d * v + truth.noise * random.standard_normal(t.size)
         records[f"level_{k}"] = xr.Dataset(
-            {"friction": ("time", F, {"units": "N"}), "speed": ("time", v, {"units": "m/s"}),
-             "pressure": ("time", np.full(t.size, p), {"units": "Pa"})},
+            {
+                "friction": ("time", F, {"units": "N"}),
+                "speed": ("time", v, {"units": "m/s"}),
+                "pressure": ("time", np.full(t.size, p), {"units": "Pa"}),
+            },
             {"time": ("time", t, {"units": "s"})},
-        )  # fmt: skip
+        )
     return joined(records)
 
 
@@ -213,8 +241,13 @@ METHOD = Method(
     signals={"friction": "", "speed": ""},
     options=Options,
     defaults=Options(
-        law="choose", slowest=0.02, pressures=(5e5, 15e5, 25e5, 35e5), v_max=0.1, f_motion=0.5,
-        duration=8.0, interval=0.01,
+        law="choose",
+        slowest=0.02,
+        pressures=(5e5, 15e5, 25e5, 35e5),
+        v_max=0.1,
+        f_motion=0.5,
+        duration=8.0,
+        interval=0.01,
         truth=Truth(F_p=20.0, F_n=20.0, f=2e-5, d=60.0, k=1.6, v_s=0.01, noise=1.0),
     ),
     identify=identify,
@@ -226,7 +259,9 @@ METHOD = Method(
     truth=known_values,
     further={
         "F_c": ("", "Coulomb friction, or F_p forward and F_n backward"),
-        "f": ("", "friction over pressure"), "d": ("", "viscous friction"),
-        "k": ("1", "breakaway over Coulomb friction"), "v_s": ("", "Stribeck velocity"),
+        "f": ("", "friction over pressure"),
+        "d": ("", "viscous friction"),
+        "k": ("1", "breakaway over Coulomb friction"),
+        "v_s": ("", "Stribeck velocity"),
     },
-)  # fmt: skip
+)

@@ -60,7 +60,8 @@ def simulated(bench: Bench, question: Question, options: Options, seed: int) -> 
     for name, text in question.noise.items():
         values = computed[name][kept]
         sigma = (
-            noise_given(name, text, known[name].unit) if text
+            noise_given(name, text, known[name].unit)
+            if text
             else options.noise * float(np.ptp(values))
         )
         noisy = values + random.normal(0.0, sigma, values.size)

@@ -132,22 +132,36 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
             "pressure_between_directions": (pressure_between(groups), "Pa"),
         },
         checks=(
-            Check("misfit_over_friction", sigma / friction, limit=_MISFIT,
-                  note="what the line leaves of the mean forces, over the mean friction",
-                  next_step=_NEXT),
-            Check("stroke_scatter", float(np.sqrt(np.mean([g.scatter**2 for g in groups]))), "N",
-                  note="from stroke to stroke"),
+            Check(
+                "misfit_over_friction",
+                sigma / friction,
+                limit=_MISFIT,
+                note="what the line leaves of the mean forces, over the mean friction",
+                next_step=_NEXT,
+            ),
+            Check(
+                "stroke_scatter",
+                float(np.sqrt(np.mean([g.scatter**2 for g in groups]))),
+                "N",
+                note="from stroke to stroke",
+            ),
             *_bore_check(fit["A"], options.bore),
         ),
-        curves=(friction_line(fit, groups), sliding_force(records, fit, *how),
-                force_over_travel(records, fit, *how)),
-        notes=(f"{sum(len(g.strokes) for g in groups)} strokes in {len(groups)} groups of record "
-               "and direction",
-               "loop half widths leave out that the pressure differs between the directions",
-               *(f"{label} {reason}" for label, reason in fit.vague().items()),
-               *drifting(groups, fit["A"]), *misfits(groups, W, F),
-               *(() if options.bore else (_UNCHECKED,))),
-    )  # fmt: skip
+        curves=(
+            friction_line(fit, groups),
+            sliding_force(records, fit, *how),
+            force_over_travel(records, fit, *how),
+        ),
+        notes=(
+            f"{sum(len(g.strokes) for g in groups)} strokes in {len(groups)} groups of record "
+            "and direction",
+            "loop half widths leave out that the pressure differs between the directions",
+            *(f"{label} {reason}" for label, reason in fit.vague().items()),
+            *drifting(groups, fit["A"]),
+            *misfits(groups, W, F),
+            *(() if options.bore else (_UNCHECKED,)),
+        ),
+    )
 
 
 _NEXT = (
@@ -163,11 +177,16 @@ def _bore_check(area: float, bore: float) -> tuple[Check, ...]:
     if not bore:
         return ()
     known = 0.25 * math.pi * bore**2
-    return (Check("area_off_bore", abs(area / known - 1.0), limit=_OFF_BORE,
-                  note=f"{1e6 * area:.5g} mm^2 found, the bore has {1e6 * known:.5g} mm^2: "
-                  "beyond the limit a unit of pressure or force is wrong",
-                  next_step="check both units in the file (--output 'p=COLUMN [bar]'), and the "
-                  "bore"),)  # fmt: skip
+    return (
+        Check(
+            "area_off_bore",
+            abs(area / known - 1.0),
+            limit=_OFF_BORE,
+            note=f"{1e6 * area:.5g} mm^2 found, the bore has {1e6 * known:.5g} mm^2: "
+            "beyond the limit a unit of pressure or force is wrong",
+            next_step="check both units in the file (--output 'p=COLUMN [bar]'), and the bore",
+        ),
+    )
 
 
 def _unknown(name: str, start: float, F: Array, p: Array) -> Unknown:
@@ -199,10 +218,13 @@ def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
         F = truth.A * p + s * (truth.F_0 + truth.f * p) + scatter + each
         F = F + truth.sigma_F * random.standard_normal(t.size)
         records[f"level_{k}"] = xr.Dataset(
-            {"x": ("time", x, {"units": "m"}), "p": ("time", p, {"units": "Pa"}),
-             "F": ("time", F, {"units": "N"})},
+            {
+                "x": ("time", x, {"units": "m"}),
+                "p": ("time", p, {"units": "Pa"}),
+                "F": ("time", F, {"units": "N"}),
+            },
             {"time": ("time", t, {"units": "s"})},
-        )  # fmt: skip
+        )
     return joined(records)
 
 
@@ -220,8 +242,14 @@ METHOD = Method(
     signals={"F": "N", "x": "m", "p": "Pa"},
     options=Options,
     defaults=Options(
-        x_low=5e-3, x_high=30e-3, slowest=5e-3, cutoff=5.0, bore=0.0, zero="known",
-        pressures=(1e5, 3e5, 5e5, 7e5), interval=0.01,
+        x_low=5e-3,
+        x_high=30e-3,
+        slowest=5e-3,
+        cutoff=5.0,
+        bore=0.0,
+        zero="known",
+        pressures=(1e5, 3e5, 5e5, 7e5),
+        interval=0.01,
         truth=Truth(A=4.9e-4, F_0=4.0, f=8e-6, sigma_group=0.3, sigma_stroke=0.1, sigma_F=0.05),
     ),
     identify=identify,
@@ -232,8 +260,9 @@ METHOD = Method(
     gaps=True,
     truth=known,
     further={
-        "A": ("m**2", "area"), "F_0": ("N", "friction without pressure"),
+        "A": ("m**2", "area"),
+        "F_0": ("N", "friction without pressure"),
         "f": ("N/Pa", "friction over pressure"),
         "F_off": ("N", "zero of the force sensor, with zero=free"),
     },
-)  # fmt: skip
+)

@@ -85,13 +85,19 @@ def replay(
         except NO_ESTIMATE as error:
             failures[factor] = error
     return Replayed(
-        _driving(measured), _beside_all(measured, modeled), measured.run,
-        (*measured.notes, *missed_samples(measured.data, measured.compared),
-         *energy_doubts_of(measured.run, modeled),
-         *filter(None, [unestimated(failures) if failures and not others else
-                        abandoned(failures)])),
+        _driving(measured),
+        _beside_all(measured, modeled),
+        measured.run,
+        (
+            *measured.notes,
+            *missed_samples(measured.data, measured.compared),
+            *energy_doubts_of(measured.run, modeled),
+            *filter(
+                None, [unestimated(failures) if failures and not others else abandoned(failures)]
+            ),
+        ),
         others,
-    )  # fmt: skip
+    )
 
 
 def _beside_all(measured: MeasuredRun, modeled: Trajectory) -> dict[str, xr.Dataset]:
@@ -105,12 +111,15 @@ def _driving(measured: MeasuredRun) -> xr.Dataset:
     signals = signals_of(measured.case.model.Stimulus)
     return xr.Dataset(
         {
-            name: ("time", measured.data[signal].values,
-                   {"units": signals[name].unit, "long_name": signals[name].label})
+            name: (
+                "time",
+                measured.data[signal].values,
+                {"units": signals[name].unit, "long_name": signals[name].label},
+            )
             for name, signal in measured.driven.items()
         },
         {"time": measured.data["time"]},
-    )  # fmt: skip
+    )
 
 
 def beside(data: xr.Dataset, name: str, modeled: Array) -> xr.Dataset:

@@ -72,8 +72,9 @@ def missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
     return [
         f"{name} misses {count} of {total} samples ({100.0 * count / total:.2g} %), where nothing "
         "is compared"
-        for name, count in counts.items() if count
-    ]  # fmt: skip
+        for name, count in counts.items()
+        if count
+    ]
 
 
 def require_measured(data: xr.Dataset, name: str, signal: Signal) -> None:

@@ -85,15 +85,24 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
     still = "the measured signal does not move"
     return (
         Kpi("rmse", rmse, unit, "Root mean square of modeled less measured."),
-        Kpi("nrmse", 100.0 * rmse / span if span else math.nan, "%",
-            "That over the measured range of the whole record.", "" if span else still),
-        Kpi("vaf", 100.0 * (1.0 - float(np.var(error)) / variance) if variance else math.nan, "%",
+        Kpi(
+            "nrmse",
+            100.0 * rmse / span if span else math.nan,
+            "%",
+            "That over the measured range of the whole record.",
+            "" if span else still,
+        ),
+        Kpi(
+            "vaf",
+            100.0 * (1.0 - float(np.var(error)) / variance) if variance else math.nan,
+            "%",
             "Variance accounted for: 1 less that of the error over that of the measurement.",
-            "" if variance else still),
+            "" if variance else still,
+        ),
         Kpi("max_error", float(np.abs(error).max()), unit, "Largest magnitude of the error."),
         Kpi("bias", float(error.mean()), unit, "Mean of modeled less measured."),
         Kpi("lag", lag, "s", "By how much the model is later, by correlation.", lag_note),
-    )  # fmt: skip
+    )
 
 
 def _require_within(time: Array, segment: Segment) -> None:

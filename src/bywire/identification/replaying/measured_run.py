@@ -126,9 +126,16 @@ def measured_run(
             )
     run = _run(bench, chosen, data, driven, between)
     return MeasuredRun(
-        bench, chosen, data, driven, tuple(compared), run, round(chosen.settle / run.record),
-        begun_at, (*notes, *said, *passed),
-    )  # fmt: skip
+        bench,
+        chosen,
+        data,
+        driven,
+        tuple(compared),
+        run,
+        round(chosen.settle / run.record),
+        begun_at,
+        (*notes, *said, *passed),
+    )
 
 
 def case_of(bench: Bench, label: str) -> Case:
@@ -229,6 +236,13 @@ def _run(
 
     duration = case.settle + (data.sizes["time"] - 1) * interval
     return Run(
-        case.model, case.par, case.state, case.memory, stimulus, duration, bench.step, interval,
+        case.model,
+        case.par,
+        case.state,
+        case.memory,
+        stimulus,
+        duration,
+        bench.step,
+        interval,
         changes_of(case, case.settle - begin),
-    )  # fmt: skip
+    )

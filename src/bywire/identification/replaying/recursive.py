@@ -223,9 +223,11 @@ def likeliest(
     grid = [(loss(np.array([a, b])), a, b) for a in (-2.0, 0.0) for b in (-8.0, -5.0, -2.0)]
     _, a, b = min(grid)
     ended = optimize.minimize(
-        loss, np.array([a, b]), method="Nelder-Mead",
+        loss,
+        np.array([a, b]),
+        method="Nelder-Mead",
         options={"xatol": 0.02, "fatol": 1e-3, "maxiter": 80},
-    )  # fmt: skip
+    )
     return walk(ended.x)
 
 

@@ -133,7 +133,7 @@ def _from(content: Mapping[str, Any], tolerances: Mapping[str, str]) -> list[Seg
         ends = []
         for key in ("start", "stop"):
             if key not in entry:
-                raise ParameterError(f"segments.{name}.{key} is missing: write {key} = \"1 s\"")
+                raise ParameterError(f'segments.{name}.{key} is missing: write {key} = "1 s"')
             ends.append(parse(entry[key], "s", f"segments.{name}.{key}"))
         if not ends[0] < ends[1]:
             raise ParameterError(f"segments.{name}: start must lie before stop")

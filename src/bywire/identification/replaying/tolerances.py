@@ -132,8 +132,9 @@ def _limit(key: str, text: str, unit: str) -> tuple[str, float, str]:
     sign, limit = match[1], match[2]
     written = f"{sign} {limit}"
     if unit == "%" and not limit.endswith("%"):  # 5 would be a share of 500 %
-        raise UnitError(f"tolerance '{key} {written}' needs percent: write for instance "
-                        f"'{example}'")  # fmt: skip
+        raise UnitError(
+            f"tolerance '{key} {written}' needs percent: write for instance '{example}'"
+        )
     try:
         bound = number(limit, "1" if unit == "%" else unit, key)
     except UnitError:

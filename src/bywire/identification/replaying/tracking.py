@@ -85,9 +85,12 @@ def track(name: str, data: xr.Dataset, par: Any, block: float | None = None) -> 
     tracked = kalman(rows.regressors, rows.targets, step, walk, start, deviation)
     times = data["time"].values[0] + (np.arange(used.size) + 0.5) * step
     return Track(
-        relation, _dataset(relation, times, tracked, used), walk.drift, walk.noise,
+        relation,
+        _dataset(relation, times, tracked, used),
+        walk.drift,
+        walk.noise,
         tracked.consistency(),
-    )  # fmt: skip
+    )
 
 
 def _turn(data: xr.Dataset) -> float:
@@ -136,6 +139,9 @@ def _dataset(
             "high": (axes, tracked.values + reach),
             "used": ("time", used),
         },
-        {"time": ("time", times, {"units": "s"}), "parameter": list(relation.names),
-         "unit": ("parameter", list(relation.units))},
-    )  # fmt: skip
+        {
+            "time": ("time", times, {"units": "s"}),
+            "parameter": list(relation.names),
+            "unit": ("parameter", list(relation.units)),
+        },
+    )

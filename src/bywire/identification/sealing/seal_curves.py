@@ -32,13 +32,16 @@ def friction_line(fit: Estimate, groups: Sequence[Group]) -> Curve:
         "friction",
         "Friction over pressure with its 95 % band; points: each record, each direction.",
         xr.Dataset(
-            {"value": ("p", value, attrs), "low": ("p", value - reach, attrs),
-             "high": ("p", value + reach, attrs),
-             "measured": ("p", np.array([seen.get(float(v), np.nan) for v in p]), attrs)},
+            {
+                "value": ("p", value, attrs),
+                "low": ("p", value - reach, attrs),
+                "high": ("p", value + reach, attrs),
+                "measured": ("p", np.array([seen.get(float(v), np.nan) for v in p]), attrs),
+            },
             {"p": ("p", p, {"units": "Pa", "long_name": "pressure"})},
         ),
         "p",
-    )  # fmt: skip
+    )
 
 
 def sliding_force(
@@ -56,8 +59,9 @@ def sliding_force(
     return Curve(
         "strokes",
         "Force while the piston slides, record after record: measured, and of the model.",
-        _beside(pairs, after_one_another(times)), "time",
-    )  # fmt: skip
+        _beside(pairs, after_one_another(times)),
+        "time",
+    )
 
 
 def force_over_travel(
@@ -74,8 +78,9 @@ def force_over_travel(
     return Curve(
         "loops",
         "Force over travel while the piston slides: the height of a loop is twice the friction.",
-        _beside(pairs, axis, "x"), "x",
-    )  # fmt: skip
+        _beside(pairs, axis, "x"),
+        "x",
+    )
 
 
 def _sliding(
@@ -95,6 +100,4 @@ def _sliding(
 def _beside(pairs: Sequence[tuple[Array, Array]], axis: Any, dim: str = "time") -> xr.Dataset:
     attrs = {"units": "N", "long_name": "force"}
     measured, modeled = (np.concatenate(columns) for columns in zip(*pairs, strict=True))
-    return xr.Dataset(
-        {"measured": (dim, measured, attrs), "modeled": (dim, modeled, attrs)}, axis
-    )
+    return xr.Dataset({"measured": (dim, measured, attrs), "modeled": (dim, modeled, attrs)}, axis)

@@ -137,10 +137,13 @@ def grouped(
     strokes = find_strokes(x, v, *stretch, slowest)
     groups = []
     for direction in (1, -1):
-        means = np.array([
-            (time[s.rows].mean(), np.nanmean(p[s.rows]), np.nanmean(F[s.rows]))
-            for s in strokes if s.direction == direction and np.isfinite(F[s.rows]).any()
-        ])  # fmt: skip
+        means = np.array(
+            [
+                (time[s.rows].mean(), np.nanmean(p[s.rows]), np.nanmean(F[s.rows]))
+                for s in strokes
+                if s.direction == direction and np.isfinite(F[s.rows]).any()
+            ]
+        )
         if means.size:
             scatter = float(means[:, 2].std(ddof=1)) if len(means) > 1 else 0.0
             _, p_mean, F_mean = means.mean(axis=0).tolist()
@@ -195,8 +198,7 @@ def require_signs(A: float, friction: float) -> None:
 
 def half_widths(groups: Sequence[Group]) -> tuple[Array, Array]:
     """Return mean pressure and half the loop's height of neighboring groups up and down."""
-    pairs = [(a, b) for a, b in pairwise(groups)
-             if a.direction == 1 and b.direction == -1]  # fmt: skip
+    pairs = [(a, b) for a, b in pairwise(groups) if a.direction == 1 and b.direction == -1]
     p = np.array([0.5 * (a.p + b.p) for a, b in pairs])
     return p, np.array([0.5 * (a.F - b.F) for a, b in pairs])
 

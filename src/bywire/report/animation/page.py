@@ -31,11 +31,16 @@ def scene_page(scene: Scene, title: str, summary: str) -> str:
     page = Template(folder.joinpath("player.html").read_text())
     return page.substitute(
         policy=f"default-src 'none'; script-src {admitted(script)}; style-src {admitted(style)}",
-        title=escape(title), summary=escape(summary), style=style, script=script,
-        width=f"{scene.width:g}", height=f"{scene.height:g}", drawing=scene.drawing,
+        title=escape(title),
+        summary=escape(summary),
+        style=style,
+        script=script,
+        width=f"{scene.width:g}",
+        height=f"{scene.height:g}",
+        drawing=scene.drawing,
         data=json.dumps(_numbers(scene), separators=(",", ":")).replace("<", "\\u003c"),
         last=str(scene.time.size - 1),
-    )  # fmt: skip
+    )
 
 
 def _numbers(scene: Scene) -> dict[str, object]:
@@ -44,10 +49,15 @@ def _numbers(scene: Scene) -> dict[str, object]:
         for part, move in scene.moves.items()
     }
     dials = [
-        {"label": dial.label, "unit": dial.unit, "full": dial.full, "color": dial.color,
-         "values": _plain(dial.values)}
+        {
+            "label": dial.label,
+            "unit": dial.unit,
+            "full": dial.full,
+            "color": dial.color,
+            "values": _plain(dial.values),
+        }
         for dial in scene.dials
-    ]  # fmt: skip
+    ]
     return {"time": _plain(scene.time), "moves": moves, "dials": dials}
 
 

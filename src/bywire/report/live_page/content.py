@@ -78,8 +78,13 @@ _UNITS = (
     ("A*s", (0, 0, 1, 1, 0, 0), "C"),
 )
 """units of which a field takes products; `bywire.core.units` says which of them it reads"""
-_SIZES = {"deg": math.pi / 180, "°": math.pi / 180, "rev": 2 * math.pi, "rpm": math.pi / 30,
-          "psi": 6894.757293168361}  # fmt: skip
+_SIZES = {
+    "deg": math.pi / 180,
+    "°": math.pi / 180,
+    "rev": 2 * math.pi,
+    "rpm": math.pi / 30,
+    "psi": 6894.757293168361,
+}
 """sizes to the last digit, of which a quantity that is read has 15"""
 _SHIFTED = {
     **dict.fromkeys(("degC", "°C"), (1.0, 273.15)),
@@ -89,9 +94,11 @@ _SHIFTED = {
 
 
 def page_text(
-    made: Exported, panels: Sequence[tuple[Panel, Sequence[Trace]]], result: Result,
+    made: Exported,
+    panels: Sequence[tuple[Panel, Sequence[Trace]]],
+    result: Result,
     chosen: Sequence[str],
-) -> str:  # fmt: skip
+) -> str:
     """Return the page of a run.
 
     Parameters
@@ -134,17 +141,25 @@ def page_text(
     # The kernel stands first: among text, what a server compresses takes 1.5 kB more for it.
     return Template(_text("page.html")).substitute(
         kernel=_block("kernel", _packed(module[f"{_NAME}.wasm"])),
-        policy=policy, title=escape(name), summary=escape(_summary(made)),
+        policy=policy,
+        title=escape(name),
+        summary=escape(_summary(made)),
         changes=_changes(made.bench),
-        style=style, library=library, script=script, footer=escape(_footer(made)),
+        style=style,
+        library=library,
+        script=script,
+        footer=escape(_footer(made)),
         data="\n".join(_block(key, value) for key, value in blocks.items()),
-    )  # fmt: skip
+    )
 
 
 def _data(
-    made: Exported, description: dict[str, Any],
-    panels: Sequence[tuple[Panel, Sequence[Trace]]], result: Result, chosen: Sequence[str],
-) -> dict[str, Any]:  # fmt: skip
+    made: Exported,
+    description: dict[str, Any],
+    panels: Sequence[tuple[Panel, Sequence[Trace]]],
+    result: Result,
+    chosen: Sequence[str],
+) -> dict[str, Any]:
     bench, recording = made.bench, result.recordings[made.case.label]
     cited = PARAMETER_SETS.find(bench.parameters).values
     origins = {row.name: row for row in parameter_rows(bench.par, cited)}
@@ -193,11 +208,16 @@ def _family(name: str, setting: Any) -> dict[str, Any]:
     how = family.in_c
     assert how is not None
     return {
-        "name": name, "entry": entry_of(name), "figures": list(family.measures),
+        "name": name,
+        "entry": entry_of(name),
+        "figures": list(family.measures),
         "signals": [getattr(setting, field) for field in how.signals],
-        "setting": np.nan_to_num(how.packed(setting, 1)).tolist(), "room": how.room,
-        "reasons": ["", *how.reasons], "open": list(how.open), "failures": ["", *how.failures],
-    }  # fmt: skip
+        "setting": np.nan_to_num(how.packed(setting, 1)).tolist(),
+        "room": how.room,
+        "reasons": ["", *how.reasons],
+        "open": list(how.open),
+        "failures": ["", *how.failures],
+    }
 
 
 def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str, Any] | None:
@@ -207,28 +227,42 @@ def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str
         return None
     limits = {
         kpi.name: limit_of(kpi.name, bench.requirements[kpi.name], kpi.unit)
-        for kpi in result.kpis if kpi.name in bench.requirements
-    }  # fmt: skip
+        for kpi in result.kpis
+        if kpi.name in bench.requirements
+    }
     units = {kpi.name: kpi.unit for kpi in result.kpis}
     stated = {
         name: {"text": stated_figure(each, units[name]), "where": each.where}
-        for name, each in stated_figures(bench).items() if name in units
-    }  # fmt: skip
+        for name, each in stated_figures(bench).items()
+        if name in units
+    }
     figures = [
-        {"name": kpi.name, "unit": unit_text(display_unit(kpi.unit)), **_shown(kpi.unit),
-         "definition": kpi.definition, "text": bench.requirements.get(kpi.name, ""),
-         "limit": dict(zip(("compare", "bound"), limits[kpi.name], strict=True))
-         if kpi.name in limits else None, "stated": stated.get(kpi.name)}
+        {
+            "name": kpi.name,
+            "unit": unit_text(display_unit(kpi.unit)),
+            **_shown(kpi.unit),
+            "definition": kpi.definition,
+            "text": bench.requirements.get(kpi.name, ""),
+            "limit": dict(zip(("compare", "bound"), limits[kpi.name], strict=True))
+            if kpi.name in limits
+            else None,
+            "stated": stated.get(kpi.name),
+        }
         for kpi in result.kpis
-    ]  # fmt: skip
-    return {"families": [_family(name, each) for name, each in settings.items()],
-            "figures": figures, "followed": list(followed)}  # fmt: skip
+    ]
+    return {
+        "families": [_family(name, each) for name, each in settings.items()],
+        "figures": figures,
+        "followed": list(followed),
+    }
 
 
 def _panels(
-    panels: Sequence[tuple[Panel, Sequence[Trace]]], recording: xr.Dataset, used: set[str],
+    panels: Sequence[tuple[Panel, Sequence[Trace]]],
+    recording: xr.Dataset,
+    used: set[str],
     stated: Sequence[StatedLevel | StatedRange],
-) -> list[dict[str, Any]]:  # fmt: skip
+) -> list[dict[str, Any]]:
     """Return the panels, what a source states of a signal in the first one that shows it."""
     shown, left = [], list(stated)
     for panel, traces in panels:
@@ -236,10 +270,14 @@ def _panels(
         here = [each for each in left if each.signal in names]
         left = [each for each in left if each not in here]
         levels = [
-            {"label": f"stated: {each.label}", "low": each.low, "high": each.high,
-             "levels": each.levels}
+            {
+                "label": f"stated: {each.label}",
+                "low": each.low,
+                "high": each.high,
+                "levels": each.levels,
+            }
             for each in here
-        ]  # fmt: skip
+        ]
         shown.append({**_panel(panel, traces, recording, used), "stated": levels})
     return shown
 
@@ -249,15 +287,22 @@ def _panel(
 ) -> dict[str, Any]:
     unit = str(recording[traces[0].variable].attrs.get("units", "1"))
     return {
-        "quantity": panel.quantity, "unit": unit_text(display_unit(unit)), **_shown(unit),
-        "height": panel.height, "levels": list(panel.levels), "saturation": panel.saturation,
+        "quantity": panel.quantity,
+        "unit": unit_text(display_unit(unit)),
+        **_shown(unit),
+        "height": panel.height,
+        "levels": list(panel.levels),
+        "saturation": panel.saturation,
         "limit": panel.limit if panel.limit in used else None,
         "traces": [
-            {"name": trace.variable, "role": trace.role.value,
-             "label": str(recording[trace.variable].attrs.get("long_name", trace.variable))}
+            {
+                "name": trace.variable,
+                "role": trace.role.value,
+                "label": str(recording[trace.variable].attrs.get("long_name", trace.variable)),
+            }
             for trace in traces
         ],
-    }  # fmt: skip
+    }
 
 
 def _shown(symbol: str) -> Mapping[str, float]:
@@ -283,9 +328,10 @@ def _known_units() -> list[tuple[str, float, tuple[int, ...]]]:
 def _read_as(symbol: str) -> dict[str, Any]:
     """Return how a field of an SI unit reads others: temperatures, and whether radians matter."""
     shifted = {
-        unit: scale for unit, scale in _SHIFTED.items()
+        unit: scale
+        for unit, scale in _SHIFTED.items()
         if symbol == "K" and _value(f"0 {unit}", symbol) is not None
-    }  # fmt: skip
+    }
     known = "" if symbol == "1" else f"*{symbol.replace('delta_degC', 'K')}"
     is_turning = _value(f"1 rad{known}", symbol) is None
     return ({"shifted": shifted} if shifted else {}) | ({"turns": True} if is_turning else {})

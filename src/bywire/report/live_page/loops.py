@@ -14,10 +14,10 @@ def loops_of(made: Exported) -> list[LoopSource]:
     """Return the loops of a bench in C; those whose point cannot follow parameters are left out."""
     par = made.run.par
     shown = [
-        loop for loop in LOOPS.all().values()
-        if loop.proof == made.bench.experiment
-        and made.bench.definition.assembly == loop.assembly
-    ]  # fmt: skip
+        loop
+        for loop in LOOPS.all().values()
+        if loop.proof == made.bench.experiment and made.bench.definition.assembly == loop.assembly
+    ]
     sources = [loop_source(loop, par) for loop in shown]
     return [source for source in sources if source is not None]
 
@@ -29,9 +29,18 @@ def told(source: LoopSource) -> dict[str, Any]:
     names = source.states if is_state else source.memory
     point = f"{loop.at.name} {amount(loop.at.default, loop.at.unit)}"
     return {
-        "name": loop.name, "summary": loop.summary, "point": point, "cutName": loop.cut,
-        "entry": source.entry, "size": source.size, "contacts": source.contacts,
-        "states": len(source.states), "held": len(source.memory), "every": list(source.every),
-        "frame": source.frame, "from": loop.band[0], "isAnalog": loop.analog,
+        "name": loop.name,
+        "summary": loop.summary,
+        "point": point,
+        "cutName": loop.cut,
+        "entry": source.entry,
+        "size": source.size,
+        "contacts": source.contacts,
+        "states": len(source.states),
+        "held": len(source.memory),
+        "every": list(source.every),
+        "frame": source.frame,
+        "from": loop.band[0],
+        "isAnalog": loop.analog,
         "cut": {"isState": is_state, "at": names.index(loop.cut)},
-    }  # fmt: skip
+    }

@@ -55,9 +55,12 @@ def first_sliders(bench: Bench, names: Sequence[str]) -> list[str]:
     changed = [name for name in bench.overrides if name in names]
     assembly = bench.definition.assembly
     declared = [
-        name for choice in SLIDERS.all().values() if assembly in choice.assemblies
-        for name in choice.parameters if name in names
-    ]  # fmt: skip
+        name
+        for choice in SLIDERS.all().values()
+        if assembly in choice.assemblies
+        for name in choice.parameters
+        if name in names
+    ]
     return changed or declared or list(_part_by_part(names))[:_COUNT]
 
 

@@ -143,9 +143,7 @@ def _sides(node: Node, network: Network, layers: Layers) -> tuple[tuple[str, ...
     return tuple(left), tuple(right)
 
 
-def _size(
-    node: Node, network: Network, left: tuple[str, ...], right: tuple[str, ...]
-) -> Point:
+def _size(node: Node, network: Network, left: tuple[str, ...], right: tuple[str, ...]) -> Point:
     if node.kind == "wire":
         return _LETTER * len(node.name) + 18.0, _PILL
     title = max(_LETTER * len(node.name), _SMALL * len(network.labels[node])) + 20.0
@@ -155,9 +153,11 @@ def _size(
 
 
 def _curve(
-    connection: Connection, boxes: dict[Node, Box], layers: Layers,
+    connection: Connection,
+    boxes: dict[Node, Box],
+    layers: Layers,
     columns: list[tuple[float, float]],
-) -> tuple[Point, ...]:  # fmt: skip
+) -> tuple[Point, ...]:
     """Return the points of a connection: curved between layers, straight across them."""
     source, target = connection.source, connection.target
     forward = layers.layer[source] < layers.layer[target]
@@ -198,8 +198,10 @@ def _connection(connection: Connection, points: tuple[Point, ...]) -> str:
             path += f"H{end[0]:.1f}"
             continue
         bend = sign * max(14.0, 0.5 * abs(end[0] - start[0]))
-        path += (f"C{start[0] + bend:.1f} {start[1]:.1f} {end[0] - bend:.1f} {end[1]:.1f} "
-                 f"{end[0]:.1f} {end[1]:.1f}")  # fmt: skip
+        path += (
+            f"C{start[0] + bend:.1f} {start[1]:.1f} {end[0] - bend:.1f} {end[1]:.1f} "
+            f"{end[0]:.1f} {end[1]:.1f}"
+        )
     tip = f"M{x:.1f} {y:.1f}l{-sign * _TIP:.1f} -3.2v6.4z"
     said = f"{connection.source.name} to {connection.target.name}"
     said += f", {connection.port}" if connection.port else ""

@@ -132,9 +132,7 @@ def _flow(nodes: Sequence[K], edges: Sequence[tuple[K, K]], first: Sequence[K]) 
     return order
 
 
-def _neighbours(
-    segments: Iterable[tuple[Hashable, Hashable]]
-) -> dict[Hashable, list[Hashable]]:
+def _neighbours(segments: Iterable[tuple[Hashable, Hashable]]) -> dict[Hashable, list[Hashable]]:
     beside: dict[Hashable, list[Hashable]] = {}
     for a, b in segments:
         beside.setdefault(a, []).append(b)

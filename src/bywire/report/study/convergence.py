@@ -39,17 +39,22 @@ def convergence(
     for axes, (text, each) in zip(panels, shares.items(), strict=True):
         drawn = [s for s in each if s.cases >= min(first, each[-1].cases // 2)]
         count = [share.cases for share in drawn]
-        entries["estimate"], = axes.plot(count, [100.0 * s.value for s in drawn],
-                                         color=style.BLUE)  # fmt: skip
+        (entries["estimate"],) = axes.plot(
+            count, [100.0 * s.value for s in drawn], color=style.BLUE
+        )
         entries["interval"] = axes.fill_between(
-            count, [100.0 * s.low for s in drawn], [100.0 * s.high for s in drawn],
+            count,
+            [100.0 * s.low for s in drawn],
+            [100.0 * s.high for s in drawn],
             color=style.SHADE,
-        )  # fmt: skip
+        )
         if (probability := wanted[text]) is not None:
             entries["wanted"] = axes.axhline(
-                100.0 * probability, color=look.color, linestyle=look.linestyle,
+                100.0 * probability,
+                color=look.color,
+                linestyle=look.linestyle,
                 linewidth=look.linewidth,
-            )  # fmt: skip
+            )
         bottom = 100.0 * _lowest(drawn, probability)
         margin = 0.05 * (100.0 - bottom)
         axes.set_ylim(bottom - margin, 100.0 + margin)

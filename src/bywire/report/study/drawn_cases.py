@@ -45,15 +45,21 @@ class DrawnCases:
         if all(drawn == count for drawn, count, _ in kinds):
             return ""
         said = " and ".join(
-            f"{drawn} of {count} cases that {text}" if drawn < count
+            f"{drawn} of {count} cases that {text}"
+            if drawn < count
             else f"all that {text} ({count})"
-            for drawn, count, text in kinds if count
-        )  # fmt: skip
+            for drawn, count, text in kinds
+            if count
+        )
         return f"Drawn are {said}."
 
 
-def drawn_cases(met: NDArray[np.bool_], most_met: int, most_missed: int | None = None,
-                known: NDArray[np.bool_] | None = None) -> DrawnCases:  # fmt: skip
+def drawn_cases(
+    met: NDArray[np.bool_],
+    most_met: int,
+    most_missed: int | None = None,
+    known: NDArray[np.bool_] | None = None,
+) -> DrawnCases:
     """Return which cases are drawn, evenly out of all where they are too many to be told apart.
 
     Parameters

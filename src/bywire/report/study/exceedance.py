@@ -42,21 +42,26 @@ class Curve:
 
 def exceedance(curves: Sequence[Curve]) -> Figure:
     """Draw every curve over a logarithmic probability, a panel with an abscissa of its own each."""
-    figure, panels = style.new_figure(
-        0.5 + 2.0 * len(curves), [1.0] * len(curves), is_shared=False
-    )
+    figure, panels = style.new_figure(0.5 + 2.0 * len(curves), [1.0] * len(curves), is_shared=False)
     look = style.STROKES[Role.LIMIT]
     for axes, each in zip(panels, curves, strict=True):
         known = each.probability > 0.0
         scale = scale_of(np.append(each.values[known], each.limit), each.unit)
         values, limit = scale(each.values[known]), scale(each.limit)
-        axes.fill_between(values, each.low[known], each.high[known], color=style.SHADE,
-                          label="interval")  # fmt: skip
+        axes.fill_between(
+            values, each.low[known], each.high[known], color=style.SHADE, label="interval"
+        )
         axes.plot(values, each.probability[known], color=style.BLUE, label="estimate")
-        axes.axvline(limit, color=look.color, linestyle=look.linestyle,
-                     linewidth=look.linewidth, label="limit, admitted")  # fmt: skip
-        axes.axhline(each.admitted, color=look.color, linestyle=look.linestyle,
-                     linewidth=look.linewidth)  # fmt: skip
+        axes.axvline(
+            limit,
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            label="limit, admitted",
+        )
+        axes.axhline(
+            each.admitted, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth
+        )
         axes.set_yscale("log")
         axes.set_ylabel("probability [-]")
         axes.set_ylim(top=2.0, bottom=0.3 * float(np.min(each.probability[known], initial=0.1)))

@@ -87,8 +87,9 @@ def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
                 name_beyond(axes, text, far, look.color)
                 continue
             has_limit |= look is bound
-            axes.axvline(scale(at), color=look.color, linestyle=look.linestyle,
-                         linewidth=look.linewidth)  # fmt: skip
+            axes.axvline(
+                scale(at), color=look.color, linestyle=look.linestyle, linewidth=look.linewidth
+            )
         style.few_ticks(axes, 3)
         few_labels(axes.xaxis, _ROOM)
         axes.set_xlabel(scale.label(name.replace("_", " ")))

@@ -36,10 +36,14 @@ def influence_bars(influences: Mapping[str, Sequence[Driving]]) -> Figure:
         axes.set_title(style.plain(name.replace("_", " ")), fontsize=style.TEXT_SIZE, loc="left")
     panels[-1].set_xlabel(f"rank correlation{', or correlation ratio' * has_choices} [-]")
     if has_choices:
-        legend_outside(figure, [
-            Patch(color=style.BLUE, label="rank correlation"),
-            Patch(color=style.ORANGE, label="correlation ratio of a choice"),
-        ], "right")  # fmt: skip
+        legend_outside(
+            figure,
+            [
+                Patch(color=style.BLUE, label="rank correlation"),
+                Patch(color=style.ORANGE, label="correlation ratio of a choice"),
+            ],
+            "right",
+        )
     return figure
 
 
@@ -51,10 +55,17 @@ def _draw(axes: Axes, each: Sequence[Driving]) -> None:
         else:
             value, color = i.correlation, style.BLUE
             ends = np.array([[value - i.low], [i.high - value]])
-        axes.barh(place, value, xerr=ends, color=color if i.is_distinct else style.PALE, height=0.7,
-                  error_kw={"elinewidth": 0.9, "capsize": 2.0, "ecolor": style.BLACK})  # fmt: skip
-    names = [style.plain(i.quantity, 40) + " (choice)" * isinstance(i, ChoiceInfluence)
-             for i in each]  # fmt: skip
+        axes.barh(
+            place,
+            value,
+            xerr=ends,
+            color=color if i.is_distinct else style.PALE,
+            height=0.7,
+            error_kw={"elinewidth": 0.9, "capsize": 2.0, "ecolor": style.BLACK},
+        )
+    names = [
+        style.plain(i.quantity, 40) + " (choice)" * isinstance(i, ChoiceInfluence) for i in each
+    ]
     axes.set_yticks(places, names)
     axes.axvline(0.0, color=style.GRAY, linewidth=0.8)
     axes.set_xlim(-1.05, 1.05)

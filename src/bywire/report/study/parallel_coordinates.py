@@ -41,18 +41,25 @@ def parallel_coordinates(
     axes_of = [each for each in axes_of if np.isfinite(each.values).any()]
     figure, (axes,) = style.new_figure(3.4)
     ends = [(float(np.nanmin(a.shown)), float(np.nanmax(a.shown))) for a in axes_of]
-    scaled = np.array([
-        (a.shown - low) / (high - low or 1.0) for a, (low, high) in zip(axes_of, ends, strict=True)
-    ])  # fmt: skip
+    scaled = np.array(
+        [
+            (a.shown - low) / (high - low or 1.0)
+            for a, (low, high) in zip(axes_of, ends, strict=True)
+        ]
+    )
     is_lacking = ~np.isfinite(scaled)
     scaled[is_lacking] = _NONE
     places = np.arange(len(axes_of))
     entries: list[Artist] = []
     for rows, color, opacity, text in (
         (cases.met, style.BLUE, 0.25, "meets all requirements"),
-        (cases.missed, style.VERMILLION, 0.3 if cases.missed.size > _MANY else 0.7,
-         "misses a requirement"),
-    ):  # fmt: skip
+        (
+            cases.missed,
+            style.VERMILLION,
+            0.3 if cases.missed.size > _MANY else 0.7,
+            "misses a requirement",
+        ),
+    ):
         if rows.size:
             _draw_lines(axes, scaled[:, rows], color, opacity)
             entries.append(Line2D([], [], color=color, label=text))
@@ -61,21 +68,32 @@ def parallel_coordinates(
         axes.plot([place, place], [0.0, 1.0], color=style.GRAY, linewidth=0.8)
         _write_values(axes, place, each, (low, high))
         if is_lacking[place].any():
-            axes.text(place, _NONE + 0.02, "none", ha="center", va="bottom", fontsize=7.0,
-                      bbox=_BOX)  # fmt: skip
+            axes.text(
+                place, _NONE + 0.02, "none", ha="center", va="bottom", fontsize=7.0, bbox=_BOX
+            )
         if each.name not in limits:
             continue
         limit = each.scale(limits[each.name])
         if low <= limit <= high:
             is_inside = True
-            axes.plot(place + np.array([-0.12, 0.12]), 2 * [(limit - low) / (high - low or 1.0)],
-                      color=style.BLACK, linewidth=1.8, zorder=4.0)  # fmt: skip
+            axes.plot(
+                place + np.array([-0.12, 0.12]),
+                2 * [(limit - low) / (high - low or 1.0)],
+                color=style.BLACK,
+                linewidth=1.8,
+                zorder=4.0,
+            )
         else:
             is_above = limit > high
-            axes.text(place, 1.11 if is_above else -0.11,
-                      f"limit {limit:.4g} {'↑' if is_above else '↓'}", ha="center",
-                      va="bottom" if is_above else "top", fontsize=7.0,
-                      bbox=_BOX)  # fmt: skip
+            axes.text(
+                place,
+                1.11 if is_above else -0.11,
+                f"limit {limit:.4g} {'↑' if is_above else '↓'}",
+                ha="center",
+                va="bottom" if is_above else "top",
+                fontsize=7.0,
+                bbox=_BOX,
+            )
     if is_inside:
         entries.append(Line2D([], [], color=style.BLACK, linewidth=1.8, label="limit"))
     labels = [a.entitled("\n") for a in axes_of]
@@ -100,14 +118,29 @@ def _write_values(axes: Axes, place: int, shown: CaseAxis, ends: tuple[float, fl
         if value == low:
             axes.text(place, -0.03, text, ha="center", va="top", fontsize=7.0, bbox=_BOX)
         if low < value < high:
-            axes.text(place, (value - low) / (high - low), text, ha="center", va="center",
-                      fontsize=7.0, bbox=_BOX, zorder=4.5)  # fmt: skip
+            axes.text(
+                place,
+                (value - low) / (high - low),
+                text,
+                ha="center",
+                va="center",
+                fontsize=7.0,
+                bbox=_BOX,
+                zorder=4.5,
+            )
 
 
 def _draw_lines(axes: Axes, ordinates: Array, color: str, opacity: float) -> None:
     """Draw a line for each column, all as one artist: an artist each takes three times as long."""
     lines = np.stack(np.broadcast_arrays(np.arange(len(ordinates)), ordinates.T), axis=-1)
-    axes.add_collection(LineCollection(
-        list(lines), colors=color, alpha=opacity, linewidths=0.6, capstyle="projecting",
-        joinstyle="round", zorder=2.0,
-    ))  # fmt: skip
+    axes.add_collection(
+        LineCollection(
+            list(lines),
+            colors=color,
+            alpha=opacity,
+            linewidths=0.6,
+            capstyle="projecting",
+            joinstyle="round",
+            zorder=2.0,
+        )
+    )

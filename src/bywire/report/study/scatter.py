@@ -43,20 +43,44 @@ def scatter(
     far = beyond(scale(limit), values[np.isfinite(values)])
     for axes, driver in zip(panels, drivers, strict=True):
         style.dress(axes)
-        axes.plot(driver.apart[good], values[good], color=style.BLUE, marker=".",
-                  markersize=2.5 if many else 4.0, markeredgewidth=0.0, linestyle="none",
-                  alpha=0.5 if many else 0.7, rasterized=True)  # fmt: skip
-        axes.plot(driver.apart[bad], values[bad], color=look.color, marker="x",
-                  markersize=2.5 if many_bad else 4.5, linestyle="none",
-                  markeredgewidth=0.6 if many_bad else 1.0,
-                  alpha=0.4 if many_bad else 1.0, rasterized=many_bad)  # fmt: skip
+        axes.plot(
+            driver.apart[good],
+            values[good],
+            color=style.BLUE,
+            marker=".",
+            markersize=2.5 if many else 4.0,
+            markeredgewidth=0.0,
+            linestyle="none",
+            alpha=0.5 if many else 0.7,
+            rasterized=True,
+        )
+        axes.plot(
+            driver.apart[bad],
+            values[bad],
+            color=look.color,
+            marker="x",
+            markersize=2.5 if many_bad else 4.5,
+            linestyle="none",
+            markeredgewidth=0.6 if many_bad else 1.0,
+            alpha=0.4 if many_bad else 1.0,
+            rasterized=many_bad,
+        )
         if cases.lacking.size:
-            axes.plot(driver.apart[cases.lacking], np.full(cases.lacking.size, _EDGE), "v",
-                      color=look.color, markersize=3.5, markeredgewidth=0.0, clip_on=False,
-                      alpha=0.6, transform=axes.get_xaxis_transform())  # fmt: skip
+            axes.plot(
+                driver.apart[cases.lacking],
+                np.full(cases.lacking.size, _EDGE),
+                "v",
+                color=look.color,
+                markersize=3.5,
+                markeredgewidth=0.0,
+                clip_on=False,
+                alpha=0.6,
+                transform=axes.get_xaxis_transform(),
+            )
         if not far:
-            axes.axhline(scale(limit), color=look.color, linestyle=look.linestyle,
-                         linewidth=look.linewidth)  # fmt: skip
+            axes.axhline(
+                scale(limit), color=look.color, linestyle=look.linestyle, linewidth=look.linewidth
+            )
         driver.write_at(axes.xaxis, (style.WIDTH - 1.0) / len(drivers) - 0.2)
         axes.set_xlabel(driver.entitled())
     first = panels[0]
@@ -69,19 +93,44 @@ def scatter(
         text = limit_text(limit, figure_of.unit, size_of(figure_of.values))
         first.set_ylim(low - (far < 0) * room, high + (far > 0) * room)
         first.text(
-            0.02, 0.98 if far > 0 else 0.02,
+            0.02,
+            0.98 if far > 0 else 0.02,
             f"{text} {'↑' if far > 0 else '↓'}",
-            transform=first.transAxes, va="top" if far > 0 else "bottom", color=look.color,
+            transform=first.transAxes,
+            va="top" if far > 0 else "bottom",
+            color=look.color,
             fontsize=style.TEXT_SIZE,
-        )  # fmt: skip
+        )
     entries = [
-        (good.size, Line2D([], [], color=style.BLUE, marker=".", linestyle="none",
-                           label="meets the limit")),
-        (bad.size, Line2D([], [], color=look.color, marker="x", markersize=4.5, linestyle="none",
-                          label="misses the limit")),
-        (cases.lacking.size, Line2D([], [], color=look.color, marker="v", markersize=3.5,
-                                    linestyle="none", label="has no figure: misses it")),
+        (
+            good.size,
+            Line2D([], [], color=style.BLUE, marker=".", linestyle="none", label="meets the limit"),
+        ),
+        (
+            bad.size,
+            Line2D(
+                [],
+                [],
+                color=look.color,
+                marker="x",
+                markersize=4.5,
+                linestyle="none",
+                label="misses the limit",
+            ),
+        ),
+        (
+            cases.lacking.size,
+            Line2D(
+                [],
+                [],
+                color=look.color,
+                marker="v",
+                markersize=3.5,
+                linestyle="none",
+                label="has no figure: misses it",
+            ),
+        ),
         (not far, Line2D([], [], color=look.color, linestyle=":", label="limit")),
-    ]  # fmt: skip
+    ]
     legend_outside(figure, [handle for is_drawn, handle in entries if is_drawn])
     return figure

@@ -61,24 +61,34 @@ def sensitivity_bars(
 def _draw(axes: Axes, drivers: Drivers, factor: float) -> None:
     """Draw two bars a quantity: what it is ranked by above, the other index below."""
     places = np.arange(len(drivers))[::-1]
-    upper = factor * np.array([[e.strength.value, e.strength.low, e.strength.high]
-                               for e in drivers])  # fmt: skip
-    lower = factor * np.array([
-        [e.first.value, e.first.low, e.first.high] if isinstance(e, VarianceShares)
-        else [e.sigma] * 3  # sigma has no interval
-        for e in drivers
-    ])  # fmt: skip
+    upper = factor * np.array(
+        [[e.strength.value, e.strength.low, e.strength.high] for e in drivers]
+    )
+    lower = factor * np.array(
+        [
+            [e.first.value, e.first.low, e.first.high]
+            if isinstance(e, VarianceShares)
+            else [e.sigma] * 3  # sigma has no interval
+            for e in drivers
+        ]
+    )
     strong = [e.strength.low > 0.0 for e in drivers]
-    first = [e.first.low > 0.0 if isinstance(e, VarianceShares) else e.strength.low > 0.0
-             for e in drivers]  # fmt: skip
+    first = [
+        e.first.low > 0.0 if isinstance(e, VarianceShares) else e.strength.low > 0.0
+        for e in drivers
+    ]
     for values, shift, color, is_distinct in (
-        (upper, 0.5, style.BLUE, strong), (lower, -0.5, style.ORANGE, first)
-    ):  # fmt: skip
+        (upper, 0.5, style.BLUE, strong),
+        (lower, -0.5, style.ORANGE, first),
+    ):
         axes.barh(
-            places + shift * _THICK, values[:, 0], height=_THICK, xerr=_reach(values),
+            places + shift * _THICK,
+            values[:, 0],
+            height=_THICK,
+            xerr=_reach(values),
             color=[color if distinct else style.PALE for distinct in is_distinct],
             error_kw={"elinewidth": 0.9, "capsize": 2.0, "ecolor": style.BLACK},
-        )  # fmt: skip
+        )
     axes.set_yticks(places, [style.plain(e.quantity, 40) for e in drivers])
     axes.axvline(0.0, color=style.GRAY, linewidth=0.8)
 

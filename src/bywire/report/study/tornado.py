@@ -35,9 +35,10 @@ _EDGE, _MARK = 0.99, 5.0  # where levels without the figure are marked, and how 
 
 
 def tornado(
-    effects: Mapping[str, Sequence[Effect]], units: Mapping[str, str],
+    effects: Mapping[str, Sequence[Effect]],
+    units: Mapping[str, str],
     limits: Mapping[str, float],
-) -> Figure:  # fmt: skip
+) -> Figure:
     """Draw the swings of every key figure around what the bench itself gives.
 
     Choices are neither below nor above: their bars are gray, with the names of the farthest ones at
@@ -77,16 +78,28 @@ def tornado(
     units_shown = [effect.unit for each in shown.values() for effect in each]
     handles: list[Artist] = []
     if any(units_shown):
-        handles += [Patch(color=style.BLUE, label="quantity below the bench's"),
-                    Patch(color=style.ORANGE, label="above")]  # fmt: skip
+        handles += [
+            Patch(color=style.BLUE, label="quantity below the bench's"),
+            Patch(color=style.ORANGE, label="above"),
+        ]
     if not all(units_shown):
         handles.append(Patch(color=style.GRAY, alpha=_PALE, label="choice"))
     if any(effect.lacking for each in shown.values() for effect in each):
-        handles.append(Line2D([], [], color=style.ORANGE, marker=">", linestyle="",
-                              markersize=_MARK, label="not defined at a level"))  # fmt: skip
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color=style.ORANGE,
+                marker=">",
+                linestyle="",
+                markersize=_MARK,
+                label="not defined at a level",
+            )
+        )
     if has_limit:
-        handles.append(Line2D([], [], color=style.BLACK, linewidth=1.0, linestyle=":",
-                              label="limit"))  # fmt: skip
+        handles.append(
+            Line2D([], [], color=style.BLACK, linewidth=1.0, linestyle=":", label="limit")
+        )
     legend_outside(figure, handles, "right")
     return figure
 
@@ -107,11 +120,16 @@ def _draw(axes: Axes, effects: Sequence[Effect], scale: Scale) -> None:
         ends = scale(np.array([effect.least, effect.largest]))
         axes.plot(ends, [place, place], color=style.BLACK, linewidth=0.6)  # between levels, too
         if effect.lacking:
-            axes.plot(_EDGE, place, ">", color=style.ORANGE, markersize=_MARK, clip_on=False,
-                      transform=axes.get_yaxis_transform())  # fmt: skip
-    axes.set_yticks(
-        range(len(effects))[::-1], [style.plain(each.quantity, 40) for each in effects]
-    )
+            axes.plot(
+                _EDGE,
+                place,
+                ">",
+                color=style.ORANGE,
+                markersize=_MARK,
+                clip_on=False,
+                transform=axes.get_yaxis_transform(),
+            )
+    axes.set_yticks(range(len(effects))[::-1], [style.plain(each.quantity, 40) for each in effects])
     axes.axvline(middle, color=style.GRAY, linewidth=0.8)
 
 
@@ -120,15 +138,22 @@ def _draw_choice(axes: Axes, place: int, effect: Effect, scale: Scale) -> None:
     middle = scale(effect.nominal)
     if not np.isfinite(effect.figures).any():
         return
-    for end, side in ((np.nanargmin(effect.figures), "right"),
-                      (np.nanargmax(effect.figures), "left")):  # fmt: skip
+    for end, side in (
+        (np.nanargmin(effect.figures), "right"),
+        (np.nanargmax(effect.figures), "left"),
+    ):
         at = scale(float(effect.figures[end]))
         axes.barh(place, at - middle, left=middle, height=0.7, color=style.GRAY, alpha=_PALE)
         if effect.swing:
             axes.annotate(
-                _name(effect, int(end)), (at, place), (-4.0 if side == "right" else 4.0, 0.0),
-                textcoords="offset points", ha=side, va="center", fontsize=_NAME_SIZE,
-            )  # fmt: skip
+                _name(effect, int(end)),
+                (at, place),
+                (-4.0 if side == "right" else 4.0, 0.0),
+                textcoords="offset points",
+                ha=side,
+                va="center",
+                fontsize=_NAME_SIZE,
+            )
 
 
 def _name(effect: Effect, level: int) -> str:

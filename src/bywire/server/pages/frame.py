@@ -84,9 +84,12 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def form(
-    task: Task, there: Contents, given: Mapping[str, str], open_fields: int = 3,
+    task: Task,
+    there: Contents,
+    given: Mapping[str, str],
+    open_fields: int = 3,
     chosen: Mapping[str, str] = MappingProxyType({}),
-) -> str:  # fmt: skip
+) -> str:
     """Return the form of a task.
 
     Parameters
@@ -108,8 +111,9 @@ def form(
     )
     shown = [
         row(task, field, there, chosen.get(field.name, ""))
-        for field in task.fields if field.name not in given
-    ]  # fmt: skip
+        for field in task.fields
+        if field.name not in given
+    ]
     first, others = "\n".join(shown[:open_fields]), "\n".join(shown[open_fields:])
     folded = f"<details>\n<summary>More</summary>\n{others}\n</details>\n" if others else ""
     # The script makes the button work: pressed before it is there, it would send to nowhere.

@@ -12,9 +12,7 @@ from bywire.server.task_registry import tasks
 _SHOWN = 200  # reports, and measurements
 
 
-def index_page(
-    folder: str, there: Contents, experiments: Mapping[str, str], largest: int
-) -> str:
+def index_page(folder: str, there: Contents, experiments: Mapping[str, str], largest: int) -> str:
     """Return the start page.
 
     Parameters
@@ -32,26 +30,36 @@ def index_page(
     studies = [[link("/study", name, of=name), text(what)] for name, what in there.studies.items()]
     reports = [[link(f"/file/{name}", name)] for name in there.reports[:_SHOWN]]
     others = [[link("/bench", name, of=name), text(what)] for name, what in experiments.items()]
-    campaigns = [[link("/task/faults", name, campaign=name), text(what)]
-                 for name, what in there.campaigns.items()]  # fmt: skip
-    lives = [[link("/task/life", name, life=name), text(what)]
-             for name, what in there.lives.items()]  # fmt: skip
-    tools = [[link(f"/task/{each.name}", each.title), text(each.summary)]
-             for each in tasks().values() if each.summary]  # fmt: skip
+    campaigns = [
+        [link("/task/faults", name, campaign=name), text(what)]
+        for name, what in there.campaigns.items()
+    ]
+    lives = [
+        [link("/task/life", name, life=name), text(what)] for name, what in there.lives.items()
+    ]
+    tools = [
+        [link(f"/task/{each.name}", each.title), text(each.summary)]
+        for each in tasks().values()
+        if each.summary
+    ]
     body = [
         section("Benches", "benches", _listed(["file", "experiment"], benches, "bench files")),
         section("Studies", "studies", _listed(["file", "bench"], studies, "study files")),
-        *([section("Fault campaigns", "campaigns", table(["file", "bench"], campaigns))]
-          if campaigns else []),
+        *(
+            [section("Fault campaigns", "campaigns", table(["file", "bench"], campaigns))]
+            if campaigns
+            else []
+        ),
         *([section("Lives", "lives", table(["file", "life"], lives))] if lives else []),
         section("Further work", "tools", table(["task", "what it gives"], tools)),
         section("Reports", "reports", _listed(["page"], reports, "reports")),
         section(
-            "Experiments", "experiments",
+            "Experiments",
+            "experiments",
             "<details>\n<summary>with their defaults, without a bench file</summary>\n"
             f"{table(['experiment', 'what it is'], others)}\n</details>",
         ),
-    ]  # fmt: skip
+    ]
     if not there.is_whole:
         body.insert(0, "<p>The folder has more files than are listed: serve a smaller one.</p>")
     return frame(folder, "Benches, studies and results of this folder", body, largest=largest)

@@ -15,5 +15,6 @@ def task_page(task: Task, there: Contents, chosen: Mapping[str, str], largest: i
     ``chosen`` has values of fields, with which the form begins.
     """
     inner = form(task, there, {}, open_fields=4, chosen=chosen)
-    return frame(task.title, task.summary, [section("What is asked", task.name, inner)],
-                 largest=largest)  # fmt: skip
+    return frame(
+        task.title, task.summary, [section("What is asked", task.name, inner)], largest=largest
+    )

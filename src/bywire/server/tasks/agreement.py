@@ -25,20 +25,28 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     from bywire.api.agreement import agreement
 
     return agreement(
-        asked["loop"], asked["parameters"], asked["at"], asked["set"],
-        frequencies=asked["frequencies"], amplitudes=asked["amplitudes"], progress=progress,
+        asked["loop"],
+        asked["parameters"],
+        asked["at"],
+        asked["set"],
+        frequencies=asked["frequencies"],
+        amplitudes=asked["amplitudes"],
+        progress=progress,
         side=asked["side"],
-    )  # fmt: skip
+    )
 
 
 TASK = Task(
-    "agreement", "Nonlinearity of a loop", "Measure",
+    "agreement",
+    "Nonlinearity of a loop",
+    "Measure",
     (
         *of_loops(),
         frequencies(),
         Field("amplitudes", "Amplitudes", hint=texts.AGREEMENT_AMPLITUDES, fits=_fit),
         side(),
     ),
-    _compute, subject="loop",
+    _compute,
+    subject="loop",
     summary="What makes a loop nonlinear, cause by cause",
-)  # fmt: skip
+)

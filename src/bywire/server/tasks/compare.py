@@ -49,21 +49,34 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     from bywire.api.compare import compare
 
     return compare(
-        *asked["runs"], overrides=asked["set"], is_full=asked["full"], progress=progress,
+        *asked["runs"],
+        overrides=asked["set"],
+        is_full=asked["full"],
+        progress=progress,
         estimate_error=asked["error_estimate"],
-    )  # fmt: skip
+    )
 
 
 TASK = Task(
-    "compare", "Compare runs", "Compare",
+    "compare",
+    "Compare runs",
+    "Compare",
     (
-        Field("runs", "Runs", "things", texts.COMPARE_RUNS,
-              names("experiments", "generic_experiments"), _offered, is_required=True,
-              fits=lambda asked, place: _fit({**asked, "set": {}}, place)),
+        Field(
+            "runs",
+            "Runs",
+            "things",
+            texts.COMPARE_RUNS,
+            names("experiments", "generic_experiments"),
+            _offered,
+            is_required=True,
+            fits=lambda asked, place: _fit({**asked, "set": {}}, place),
+        ),
         bench_changes(_fit),
         Field("full", "Show what is the same, too", "flag", texts.COMPARE_FULL),
         error_estimate(),
     ),
-    _compute, subject="runs",
+    _compute,
+    subject="runs",
     summary="Settings and key figures that differ, verdicts, curves on top of each other",
-)  # fmt: skip
+)

@@ -18,14 +18,24 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     from bywire.api.design import design
 
     return design(
-        asked["loop"], asked["parameters"], asked["at"], asked["set"], require=asked["require"],
-        over=asked["over"], amplitudes=asked["amplitudes"], schedule=asked["schedule"],
-        linear_only=asked["linear_only"], progress=progress, side=asked["side"],
-    )  # fmt: skip
+        asked["loop"],
+        asked["parameters"],
+        asked["at"],
+        asked["set"],
+        require=asked["require"],
+        over=asked["over"],
+        amplitudes=asked["amplitudes"],
+        schedule=asked["schedule"],
+        linear_only=asked["linear_only"],
+        progress=progress,
+        side=asked["side"],
+    )
 
 
 TASK = Task(
-    "design", "Design a loop", "Design",
+    "design",
+    "Design a loop",
+    "Design",
     (
         loop(),
         Field("require", "Requirements", "lines", texts.DESIGN_REQUIRE),
@@ -38,6 +48,7 @@ TASK = Task(
         changes(lambda asked, _: case_of({**asked, "at": ""})),
         side(),
     ),
-    _compute, subject="loop",
+    _compute,
+    subject="loop",
     summary="Gains of a control loop from requirements",
-)  # fmt: skip
+)

@@ -24,9 +24,7 @@ def _plan(asked: Mapping[str, Any], place: Place) -> CampaignPlan:
     return read_campaign(path_of(asked["campaign"], place), changes_of(asked, place))
 
 
-def _begun(
-    asked: Mapping[str, Any], place: Place, folders: Sequence[Path]
-) -> Path | None:
+def _begun(asked: Mapping[str, Any], place: Place, folders: Sequence[Path]) -> Path | None:
     from bywire.campaigns.store import CampaignStore
 
     plan = _plan(asked, place)
@@ -40,13 +38,24 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
 
 
 TASK = Task(
-    "faults", "Fault campaign", "Run, or go on",
+    "faults",
+    "Fault campaign",
+    "Run, or go on",
     (
-        Field("campaign", "Campaign", "thing", texts.CAMPAIGN, names("campaigns"),
-              lambda there: list(there.campaigns), is_required=True,
-              fits=lambda asked, place: _plan({**asked, "set": {}}, place)),
+        Field(
+            "campaign",
+            "Campaign",
+            "thing",
+            texts.CAMPAIGN,
+            names("campaigns"),
+            lambda there: list(there.campaigns),
+            is_required=True,
+            fits=lambda asked, place: _plan({**asked, "set": {}}, place),
+        ),
         bench_changes(_plan),
     ),
-    _compute, subject="campaign", begun=_begun,
+    _compute,
+    subject="campaign",
+    begun=_begun,
     summary="What every fault of a brake does in a maneuver, when it is seen, what is covered",
-)  # fmt: skip
+)

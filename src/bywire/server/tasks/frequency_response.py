@@ -32,25 +32,40 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     from bywire.api.frequency_response import frequency_response
 
     return frequency_response(
-        asked["loop"], asked["parameters"], asked["at"], asked["set"],
-        frequencies=asked["frequencies"], amplitudes=asked["amplitudes"],
-        excitation=asked["excitation"] or "sine", over=asked["over"], progress=progress,
-        estimate_error=asked["error_estimate"], side=asked["side"],
-    )  # fmt: skip
+        asked["loop"],
+        asked["parameters"],
+        asked["at"],
+        asked["set"],
+        frequencies=asked["frequencies"],
+        amplitudes=asked["amplitudes"],
+        excitation=asked["excitation"] or "sine",
+        over=asked["over"],
+        progress=progress,
+        estimate_error=asked["error_estimate"],
+        side=asked["side"],
+    )
 
 
 TASK = Task(
-    "frequency-response", "Frequency response", "Measure",
+    "frequency-response",
+    "Frequency response",
+    "Measure",
     (
         *of_loops(),
         frequencies(),
         Field("amplitudes", "Amplitudes", hint=texts.AMPLITUDES, fits=_fit),
-        Field("excitation", "Excitation", "choice", texts.EXCITATION,
-              lambda: ("sine", "multisine", "chirp")),
+        Field(
+            "excitation",
+            "Excitation",
+            "choice",
+            texts.EXCITATION,
+            lambda: ("sine", "multisine", "chirp"),
+        ),
         over(texts.BANDWIDTH_OVER),
         error_estimate(),
         side(),
     ),
-    _compute, subject="loop",
+    _compute,
+    subject="loop",
     summary="A closed loop's response by amplitude: friction, limits and sampling included",
-)  # fmt: skip
+)

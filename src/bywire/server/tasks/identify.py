@@ -19,19 +19,37 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     from bywire.identification.fitting.question import Question
 
     question = Question(
-        asked["bench"] or None, asked["inputs"], asked["outputs"], asked["unknowns"],
-        asked["priors"], asked["states"], asked["case"], asked["holdout"] or None, asked["loss"],
-    )  # fmt: skip
+        asked["bench"] or None,
+        asked["inputs"],
+        asked["outputs"],
+        asked["unknowns"],
+        asked["priors"],
+        asked["states"],
+        asked["case"],
+        asked["holdout"] or None,
+        asked["loss"],
+    )
     return identify(
-        asked["method"], asked["measurements"], asked["parameters"], asked["set"],
-        question=question, mapping=asked["mapping"] or None, time=asked["time"],
-        options=asked["options"], starts=asked["starts"], seed=asked["seed"],
-        synthetic=asked["synthetic"], folder=out, progress=progress,
-    )  # fmt: skip
+        asked["method"],
+        asked["measurements"],
+        asked["parameters"],
+        asked["set"],
+        question=question,
+        mapping=asked["mapping"] or None,
+        time=asked["time"],
+        options=asked["options"],
+        starts=asked["starts"],
+        seed=asked["seed"],
+        synthetic=asked["synthetic"],
+        folder=out,
+        progress=progress,
+    )
 
 
 TASK = Task(
-    "identify", "Identify parameters", "Identify",
+    "identify",
+    "Identify parameters",
+    "Identify",
     (
         Field("method", "Method", "choice", texts.METHOD, names("methods"), is_required=True),
         Field("measurements", "Measurements", "files", texts.MEASUREMENTS),
@@ -45,8 +63,9 @@ TASK = Task(
         Field("priors", "Known before", "pairs", texts.PRIOR),
         Field("states", "Unknown initial values", "lines", texts.START),
         Field("holdout", "Measurement for validation", "file", texts.HOLDOUT),
-        Field("loss", "Loss", "choice", texts.LOSS,
-              lambda: ("linear", "soft_l1", "huber", "cauchy")),
+        Field(
+            "loss", "Loss", "choice", texts.LOSS, lambda: ("linear", "soft_l1", "huber", "cauchy")
+        ),
         case(),
         Field("options", "Options of the method", "changes", texts.METHOD_OPTION),
         Field("starts", "Starts of the search", "whole", texts.STARTS, default=16, least=1),
@@ -54,6 +73,7 @@ TASK = Task(
         parameters(),
         changes(),
     ),
-    _compute, subject="method",
+    _compute,
+    subject="method",
     summary="Parameters with their confidence from measured experiments, or a simulated one",
-)  # fmt: skip
+)

@@ -37,13 +37,24 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
 
 
 TASK = Task(
-    "life", "Life", "Project",
+    "life",
+    "Life",
+    "Project",
     (
-        Field("life", "Life", "thing", texts.LIFE, names("lives"), lambda there: list(there.lives),
-              is_required=True, fits=lambda asked, place: _plan({**asked, "set": {}}, place)),
+        Field(
+            "life",
+            "Life",
+            "thing",
+            texts.LIFE,
+            names("lives"),
+            lambda there: list(there.lives),
+            is_required=True,
+            fits=lambda asked, place: _plan({**asked, "set": {}}, place),
+        ),
         bench_changes(_plan),
         Field("check", "Stops one by one", "whole", texts.LIFE_CHECK, default=0, fits=_check),
     ),
-    _compute, subject="life",
+    _compute,
+    subject="life",
     summary="How a brake wears over thousands of stops, and when its life ends",
-)  # fmt: skip
+)

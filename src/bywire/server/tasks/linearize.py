@@ -25,9 +25,13 @@ def _case(asked: Mapping[str, Any]) -> LoopCase | PlantCase:
     from bywire.api.linearize import linear_case
 
     return linear_case(
-        asked["loop"], asked["parameters"], asked["at"], asked["set"], asked["friction"],
+        asked["loop"],
+        asked["parameters"],
+        asked["at"],
+        asked["set"],
+        asked["friction"],
         asked["speed"],
-    )  # fmt: skip
+    )
 
 
 def _with(*wanted: str) -> Fits:
@@ -55,27 +59,43 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     from bywire.api.linearize import linearize
 
     return linearize(
-        asked["loop"], asked["parameters"], asked["at"], asked["set"], locus=asked["locus"],
-        reduce=asked["reduce"], friction=asked["friction"], speed=asked["speed"],
-        dither=asked["dither"], side=asked["side"],
-    )  # fmt: skip
+        asked["loop"],
+        asked["parameters"],
+        asked["at"],
+        asked["set"],
+        locus=asked["locus"],
+        reduce=asked["reduce"],
+        friction=asked["friction"],
+        speed=asked["speed"],
+        dither=asked["dither"],
+        side=asked["side"],
+    )
 
 
 TASK = Task(
-    "linearize", "Linear model", "Linearize",
+    "linearize",
+    "Linear model",
+    "Linearize",
     (
         loop(texts.LOOP_OR_PLANT, "plants"),
         parameters(_with("parameters")),
         Field("at", "Operating point", hint=texts.AT, fits=_with("parameters", "at")),
         changes(_with("parameters", "set")),
         Field("reduce", "Reduce", hint=texts.REDUCE),
-        Field("friction", "Dry friction", "choice", texts.FRICTION,
-              lambda: ("removed", "sliding", "stuck"), fits=_with("friction", "speed")),
+        Field(
+            "friction",
+            "Dry friction",
+            "choice",
+            texts.FRICTION,
+            lambda: ("removed", "sliding", "stuck"),
+            fits=_with("friction", "speed"),
+        ),
         Field("speed", "Speed", hint=texts.SPEED, fits=_with("friction", "speed")),
         Field("locus", "Root locus", hint=texts.LOCUS, fits=_range),
         Field("dither", "Under dither", "flag", texts.DITHER),
         side(),
     ),
-    _compute, subject="loop",
+    _compute,
+    subject="loop",
     summary="The exact linear model of a closed loop, with its sampling, or of a plant",
-)  # fmt: skip
+)

@@ -27,8 +27,11 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
 
 
 TASK = Task(
-    "margins", "Margins of a loop", "Compute",
+    "margins",
+    "Margins of a loop",
+    "Compute",
     (*of_loops(), over(texts.MARGINS_OVER), side()),
-    _compute, subject="loop",
+    _compute,
+    subject="loop",
     summary="Margins and bandwidth of a loop as it is sampled, and the worst case over a range",
-)  # fmt: skip
+)

@@ -19,7 +19,10 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
 
 
 TASK = Task(
-    "page", "Live page", "Make the page",
+    "page",
+    "Live page",
+    "Make the page",
     (bench(), case()),
-    _compute, is_file=True,
-)  # fmt: skip
+    _compute,
+    is_file=True,
+)

@@ -18,15 +18,25 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     from bywire.api.replay import replay
 
     return replay(
-        asked["measurement"], asked["bench"], asked["set"], mapping=asked["mapping"] or None,
-        inputs=asked["inputs"], outputs=asked["outputs"], time=asked["time"], case=asked["case"],
-        tolerances=asked["tolerances"], segments="auto" if asked["segments"] else "",
-        track=asked["track"], progress=progress,
-    )  # fmt: skip
+        asked["measurement"],
+        asked["bench"],
+        asked["set"],
+        mapping=asked["mapping"] or None,
+        inputs=asked["inputs"],
+        outputs=asked["outputs"],
+        time=asked["time"],
+        case=asked["case"],
+        tolerances=asked["tolerances"],
+        segments="auto" if asked["segments"] else "",
+        track=asked["track"],
+        progress=progress,
+    )
 
 
 TASK = Task(
-    "replay", "Replay a measurement", "Replay",
+    "replay",
+    "Replay a measurement",
+    "Replay",
     (
         bench(),
         Field("measurement", "Measurement", "file", texts.MEASUREMENT, is_required=True),
@@ -41,4 +51,4 @@ TASK = Task(
         bench_changes(read_bench),
     ),
     _compute,
-)  # fmt: skip
+)

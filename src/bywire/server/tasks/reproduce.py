@@ -26,8 +26,11 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
 
 
 TASK = Task(
-    "reproduce", "Reproduce a source", "Reproduce",
+    "reproduce",
+    "Reproduce a source",
+    "Reproduce",
     (Field("source", "Source", "choice", texts.SOURCE, _sources, is_required=True),),
-    _compute, subject="source",
+    _compute,
+    subject="source",
     summary="A paper's tables and figures: stated, computed, agrees or not",
-)  # fmt: skip
+)

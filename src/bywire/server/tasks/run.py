@@ -30,11 +30,13 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
 
 
 TASK = Task(
-    "run", "Run with Python", "Run",
+    "run",
+    "Run with Python",
+    "Run",
     (
         bench(),
         bench_changes(read_bench),
         Field("faults", "Faults", "lines", texts.RUN_FAULT, fits=_fit),
     ),
     _compute,
-)  # fmt: skip
+)

@@ -28,12 +28,16 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
 
 
 TASK = Task(
-    "size", "Sizing study", "Compare designs",
+    "size",
+    "Sizing study",
+    "Compare designs",
     (
         Field("study", "Sizing study", "choice", texts.SIZING, names("studies"), is_required=True),
         parameters(lambda asked, place: _fit({**asked, "set": {}}, place)),
         Field("set", "Changes", "changes", texts.SIZING_CHANGES, fits=_fit),
     ),
-    _compute, subject="study", command="study size",
+    _compute,
+    subject="study",
+    command="study size",
     summary="Designs of a brake at equal demands: the best, what limits it, at what price",
-)  # fmt: skip
+)

@@ -69,18 +69,30 @@ def _plan(asked: Mapping[str, Any], place: Place) -> object:
 def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     from bywire.api.run_study import run_study
 
-    return run_study(asked["study"], out, asked["set"], cases=asked["cases"],
-                     progress=_SoFar(out, progress))  # fmt: skip
+    return run_study(
+        asked["study"], out, asked["set"], cases=asked["cases"], progress=_SoFar(out, progress)
+    )
 
 
 TASK = Task(
-    "study", "Run the study", "Run, or go on",
+    "study",
+    "Run the study",
+    "Run, or go on",
     (
-        Field("study", "Study", "thing", texts.STUDY_FILE, is_required=True,
-              offered=lambda there: list(there.studies), fits=lambda asked, place:
-              _plan({**asked, "set": {}}, place)),
+        Field(
+            "study",
+            "Study",
+            "thing",
+            texts.STUDY_FILE,
+            is_required=True,
+            offered=lambda there: list(there.studies),
+            fits=lambda asked, place: _plan({**asked, "set": {}}, place),
+        ),
         Field("cases", "Cases", "whole", texts.STUDY_CASES, least=1),
         bench_changes(_plan),
     ),
-    _compute, subject="study", command="study run", is_kept=True,
-)  # fmt: skip
+    _compute,
+    subject="study",
+    command="study run",
+    is_kept=True,
+)

@@ -44,11 +44,16 @@ def cases(par: Parameters, options: Options, _: Any) -> tuple[Case, ...]:
     model = StarterActuator()
     return (
         Case(
-            "run", model, par, zeros(model.State), zeros(Memory), stimulus,
+            "run",
+            model,
+            par,
+            zeros(model.State),
+            zeros(Memory),
+            stimulus,
             duration=options.duration + options.release,
             start=lambda _: (zeros(model.State), zeros(Memory)),
         ),
-    )  # fmt: skip
+    )
 
 
 def step(options: Options) -> step_response.Setting:

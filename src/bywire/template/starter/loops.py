@@ -29,7 +29,9 @@ LOOP = Loop(
     band=(0.1, 100.0),
     amplitudes=(100.0, 1000.0),
     tunables={
-        "control.k_F": (1e-3, 0.5), "control.k_p": (1e-3, 1.0), "control.k_i": (1e-2, 100.0),
+        "control.k_F": (1e-3, 0.5),
+        "control.k_p": (1e-3, 1.0),
+        "control.k_i": (1e-2, 100.0),
     },
     proof="starter-clamp",
-)  # fmt: skip
+)

@@ -43,9 +43,16 @@ def par() -> MotorcycleParameters:
 
 def state(**changes: float) -> Any:
     x = MotorcycleBrake.State(
-        i=3.0, theta=25.0, omega=4.0, p_mc=2e6, p_pd=1.9e6, y_p=0.4, y_i=0.6,
-        T_winding=293.15, T_housing=293.15,
-    )  # fmt: skip
+        i=3.0,
+        theta=25.0,
+        omega=4.0,
+        p_mc=2e6,
+        p_pd=1.9e6,
+        y_p=0.4,
+        y_i=0.6,
+        T_winding=293.15,
+        T_housing=293.15,
+    )
     return np.array(x._replace(**changes)) / SCALE
 
 

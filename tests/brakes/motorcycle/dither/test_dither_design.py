@@ -26,16 +26,27 @@ from bywire.report.contour import contour
 
 PAR = PARAMETER_SETS.find("dardanelli2010").parameters()
 SHORT = Trial(settle=2.0, window=0.5)
-LIMITS = {"stuck": 0.1, "band": 0.05, "ripple_caliper": 2.0, "current_share": 1.0,
-          "duty_share": 1.0}  # fmt: skip
+LIMITS = {
+    "stuck": 0.1,
+    "band": 0.05,
+    "ripple_caliper": 2.0,
+    "current_share": 1.0,
+    "duty_share": 1.0,
+}
 
 
 def figures(stuck, ripple, copper):
     """Return made-up figures over gains and frequencies."""
     shape = np.shape(stuck)
     zero = np.zeros(shape)
-    return {"stuck": np.array(stuck), "band": zero, "ripple_caliper": np.array(ripple),
-            "copper": np.array(copper), "current_share": zero, "duty_share": zero}  # fmt: skip
+    return {
+        "stuck": np.array(stuck),
+        "band": zero,
+        "ripple_caliper": np.array(ripple),
+        "copper": np.array(copper),
+        "current_share": zero,
+        "duty_share": zero,
+    }
 
 
 def test_the_least_gain_is_enough_from_there_on_upward() -> None:
@@ -121,9 +132,18 @@ def test_dither_shrinks_the_loop_of_the_ramp() -> None:
 
 
 SMALL = dither.STUDY.defaults.replace(
-    {"pressures": (20e5,), "gains": 4, "gain_min": 0.75, "gain_max": 1.5, "frequencies": 3,
-     "f_min": 40.0, "f_max": 65.0, "settle": 2.0, "compare": "none"}
-)  # fmt: skip
+    {
+        "pressures": (20e5,),
+        "gains": 4,
+        "gain_min": 0.75,
+        "gain_max": 1.5,
+        "frequencies": 3,
+        "f_min": 40.0,
+        "f_max": 65.0,
+        "settle": 2.0,
+        "compare": "none",
+    }
+)
 
 
 def test_a_small_study_finds_a_dither_that_holds_on_the_bench() -> None:

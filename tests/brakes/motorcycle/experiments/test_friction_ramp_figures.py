@@ -18,8 +18,10 @@ def test_a_loop_without_area_has_no_ratio(monkeypatch: pytest.MonkeyPatch) -> No
 
     def flat(family: str, *given: object) -> dict[str, Kpi]:
         kpis = evaluate(family, *given)
-        return {name: replace(kpi, value=0.0, note="") if name == "loop_area" else kpi
-                for name, kpi in kpis.items()}  # fmt: skip
+        return {
+            name: replace(kpi, value=0.0, note="") if name == "loop_area" else kpi
+            for name, kpi in kpis.items()
+        }
 
     monkeypatch.setattr(friction_ramp, "evaluate", flat)
     short = {"options.i_max": "1 A", "options.slope": "20 A/s"}

@@ -12,8 +12,13 @@ from run_once import run_once
 SET = "dardanelli2010"
 IDEAL = ["current", "voltage"]
 ECU = ["current-loop", "current-direct", "pressure"]
-UNITS = {"current": "A", "voltage": "V", "current-loop": "A", "current-direct": "A",
-         "pressure": "bar"}  # fmt: skip
+UNITS = {
+    "current": "A",
+    "voltage": "V",
+    "current-loop": "A",
+    "current-direct": "A",
+    "pressure": "bar",
+}
 ECU_ONLY = {"p_ref", "duty", "i_star", "i_dit", "sat_current", "sat_duty"}
 
 

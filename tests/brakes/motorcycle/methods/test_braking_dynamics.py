@@ -83,8 +83,9 @@ def test_lines_beside_a_dither_30_times_their_size() -> None:
     found = lines(u, 1e-3, 1.0, 15.0, (50.0,))
     np.testing.assert_allclose(found, [1.234, 7.89], rtol=1e-6)
     points = measured_points(u, y, 1e-3, found, (50.0,))
-    np.testing.assert_allclose(np.exp(points.log_gain), [2.0 * np.exp(-1j), 0.1 * np.exp(-2j)],
-                               rtol=1e-5)  # fmt: skip
+    np.testing.assert_allclose(
+        np.exp(points.log_gain), [2.0 * np.exp(-1j), 0.1 * np.exp(-2j)], rtol=1e-5
+    )
 
 
 def test_steps_are_told_from_sines() -> None:
@@ -211,8 +212,9 @@ def test_what_lacks_is_named(data: dict[int, xr.Dataset], every: dict[int, Ident
     still = first.assign(i=("time", np.full(first.sizes["time"], 1.0)))
     with pytest.raises(ParameterError, match="neither steps nor has a sine"):
         identified(still)
-    stuck = first.assign(p_mc=("time", 5e5 + np.random.default_rng(0).normal(
-        0.0, 2e3, first.sizes["time"])))  # fmt: skip
+    stuck = first.assign(
+        p_mc=("time", 5e5 + np.random.default_rng(0).normal(0.0, 2e3, first.sizes["time"]))
+    )
     with pytest.raises(ParameterError, match="hardly answers the step at low pressure"):
         identified(stuck)
     with pytest.raises(ParameterError, match="no true values"):

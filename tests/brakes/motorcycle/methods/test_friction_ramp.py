@@ -168,9 +168,7 @@ def test_what_is_put_in_comes_back() -> None:
         assert one.claimed < 0.01 * one.truth, one
 
 
-def test_a_damping_that_is_not_as_told_is_found_out(
-    rising: xr.Dataset, alone: Identified
-) -> None:
+def test_a_damping_that_is_not_as_told_is_found_out(rising: xr.Dataset, alone: Identified) -> None:
     wrong = PAR.replace({"master_cylinder.k_damp": 1.6e4})
     found = METHOD.identify(rising, wrong, COARSE, Effort(starts=1))
     residual, usual = (

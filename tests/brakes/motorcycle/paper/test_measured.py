@@ -42,9 +42,15 @@ from bywire.reproduction.reproduction import Reproduction
 # of Table 3 and Fig. 7's peak.
 UNEXPLAINED = {
     *(f"table4.{region}.T2" for region in ("low", "medium", "high")),
-    "table4.low.overshoot", "table4.medium.T1", "table4.high.T1", "table3.k_brk_p",
-    "fig5.p_max", "fig5.i_max", "fig5.loop_area_ratio", "fig7.peak",
-}  # fmt: skip
+    "table4.low.overshoot",
+    "table4.medium.T1",
+    "table4.high.T1",
+    "table3.k_brk_p",
+    "fig5.p_max",
+    "fig5.i_max",
+    "fig5.loop_area_ratio",
+    "fig7.peak",
+}
 FIRM = ("seal.f_cfr_n", "seal.k_brk_p", "ecu.filter.zeta")
 """parameters that the statements hold firmly"""
 
@@ -135,22 +141,28 @@ def test_the_ecu_knows_the_estimated_friction_and_the_nominal_position_is_kept()
     own = par.leaves()
     assert all(own[name] == own[source] for name, source in TIED.items())
     assert travel_at(20e5, par) == pytest.approx(par.master_cylinder.x_nominal, rel=1e-4)
-    assert brake({}, par).master_cylinder.x_rest == pytest.approx(par.master_cylinder.x_rest,
-                                                                   rel=1e-4)  # fmt: skip
+    assert brake({}, par).master_cylinder.x_rest == pytest.approx(
+        par.master_cylinder.x_rest, rel=1e-4
+    )
 
 
 @pytest.mark.parametrize(
     "together",
     [
-        {"gear.k_g": 2.0, "master_cylinder.A_mc": 0.5, "master_cylinder.k_damp": 0.25,
-         "gear.M_mc": 0.25, "fluid.beta": 0.5},
+        {
+            "gear.k_g": 2.0,
+            "master_cylinder.A_mc": 0.5,
+            "master_cylinder.k_damp": 0.25,
+            "gear.M_mc": 0.25,
+            "fluid.beta": 0.5,
+        },
         {"caliper.A_pd": 2.0, "caliper.K_pd": 4.0},
         {"fluid.nu": 16.0, "pipeline.d_pl": 2.0},
         {"fluid.rho": 16.0, "pipeline.d_pl": 2.0},
         {"pipeline.L_pl": 16.0, "pipeline.d_pl": 2.0},
         {"pipeline.k_lf": 16.0, "pipeline.d_pl": 2.0},
     ],
-)  # fmt: skip
+)
 def test_what_is_held_shows_in_a_product_alone(together):
     par = parameters("dardanelli2010-table1")
     other = par.replace({name: share * par.leaves()[name] for name, share in together.items()})
@@ -201,8 +213,9 @@ def test_overshoot_is_no_slow_pair(page):
 @pytest.mark.trust
 def test_bounds_that_the_stored_set_lies_at_are_said(best):
     assert best.estimate.at_bounds() == {"gear.eta_g": 1.0, "master_cylinder.k_damp": 0.0}
-    assert all("lies at its bound" in best.estimate.vague()[name]
-               for name in best.estimate.at_bounds())  # fmt: skip
+    assert all(
+        "lies at its bound" in best.estimate.vague()[name] for name in best.estimate.at_bounds()
+    )
 
 
 @pytest.mark.trust
@@ -211,8 +224,9 @@ def test_holding_and_searching_agree_at_the_stored_set(best):
     again = settled(np.array([own[u.name] for u in unknowns()]))
     assert again.misfit == pytest.approx(best.misfit, rel=0.01)
     assert again.estimate.names == best.estimate.names
-    for value, stored, (low, high) in zip(again.estimate.values, best.estimate.values,
-                                          best.estimate.intervals(), strict=True):  # fmt: skip
+    for value, stored, (low, high) in zip(
+        again.estimate.values, best.estimate.values, best.estimate.intervals(), strict=True
+    ):
         assert abs(value - stored) < 0.05 * (high - low)
 
 

@@ -19,19 +19,28 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 CASES: dict[str, tuple[dict[str, Any], float, float]] = {
     "to standstill on wet road uphill": (
-        {**on_surface("wet-asphalt"), "vehicle.road.gradient": 0.08}, 2.5, 0.9,
+        {**on_surface("wet-asphalt"), "vehicle.road.gradient": 0.08},
+        2.5,
+        0.9,
     ),
     "a wheel locks on snow": ({**on_surface("snow"), "ecu.front_slip.slip_set": 0.9}, 6.0, 0.6),
     "the rear wheel lifts": (
         {"ecu.front_lift.a_lim": 20.0, "vehicle.body.h": 0.8, "ecu.front_slip.slip_set": 0.3},
-        15.0, 0.9,
+        15.0,
+        0.9,
     ),
     "dry road turns wet, and dry again downhill": (
-        {**on_surface("dry-asphalt", "wet-asphalt"), "vehicle.road.x_change": 3.0,
-         "vehicle.road.x_back": 8.0, "vehicle.road.gradient_further": -0.05,
-         "ecu.mix.alpha": 0.8}, 15.0, 0.9,
+        {
+            **on_surface("dry-asphalt", "wet-asphalt"),
+            "vehicle.road.x_change": 3.0,
+            "vehicle.road.x_back": 8.0,
+            "vehicle.road.gradient_further": -0.05,
+            "ecu.mix.alpha": 0.8,
+        },
+        15.0,
+        0.9,
     ),
-}  # fmt: skip
+}
 
 
 def stop(case: str) -> Run:

@@ -71,9 +71,7 @@ RUNS = {
     "end stop": lambda: from_parked({"wedge.x_stop": 7e-4}, PULSE),
     "low voltage": lambda: from_parked({"drive.V_dc": 8.0}, PULSE, step=SHORT_STEP),
     "current limit": lambda: from_parked({"drive.i_max": 4.0}, PULSE, step=SHORT_STEP),
-    "tips": lambda: from_parked(
-        {"control.offset.delta_preload": -20e-6}, PULSE, step=SHORT_STEP
-    ),
+    "tips": lambda: from_parked({"control.offset.delta_preload": -20e-6}, PULSE, step=SHORT_STEP),
     "disc that stops": lambda: from_parked({"flywheel.J_F": 1.0}, PULSE, step=SHORT_STEP),
 }
 

@@ -17,9 +17,14 @@ from bywire.simulation.run import Run, simulate
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 FRICTIONLESS = {
-    "bearing.C_0": 0.0, "bearing.C_2": 0.0, "bearing.T_nu": 0.0, "screw.eta_f": 1.0,
-    "screw.eta_b": 1.0, "wedge_friction.mu_int": 0.0, "wedge_friction.mu_R": 0.0,
-}  # fmt: skip
+    "bearing.C_0": 0.0,
+    "bearing.C_2": 0.0,
+    "bearing.T_nu": 0.0,
+    "screw.eta_f": 1.0,
+    "screw.eta_b": 1.0,
+    "wedge_friction.mu_int": 0.0,
+    "wedge_friction.mu_R": 0.0,
+}
 
 
 def brake(changes: dict[str, float] | None = None) -> WedgeParameters:
@@ -64,6 +69,8 @@ def test_results_of_the_benchmark(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wedge_brake, "_ROUNDS", 1)
     found = [*wedge_brake.single(brake()), *wedge_brake.regularized(brake())]
     assert [r.id for r in found] == [
-        "wedge.single.hand_c", "wedge.single.realtime_factor", "wedge.peer.tanh_rk4",
-    ]  # fmt: skip
+        "wedge.single.hand_c",
+        "wedge.single.realtime_factor",
+        "wedge.peer.tanh_rk4",
+    ]
     assert "at equal error it is slower still" in found[-1].note

@@ -13,8 +13,9 @@ PERIOD = 0.5  # s from one application to the next
 
 
 def ran(options=None, changes=None, faults=()):
-    bench = bywire.Bench("gap-adjusting", "roberts2003", changes or {}, options=options or {},
-                         faults=faults)  # fmt: skip
+    bench = bywire.Bench(
+        "gap-adjusting", "roberts2003", changes or {}, options=options or {}, faults=faults
+    )
     return bywire.run(bench, estimate_error=False)
 
 
@@ -44,8 +45,9 @@ def test_it_turns_the_teeth_that_the_adjuster_of_a_life_turns(sound):
         gap *= sound.bench.par.control.adjuster.gap_slope_hat
         seen.append((gap - z["clearance"], float(braked["clearance"].values[-1])))
         readings = {"beyond": gap - z["clearance"], "T_disc": 293.15}
-        z = life.between(z, readings, bywire.parameters("roberts2003-corner"),
-                         WEDGE_PADS.defaults())  # fmt: skip
+        z = life.between(
+            z, readings, bywire.parameters("roberts2003-corner"), WEDGE_PADS.defaults()
+        )
         assert float(braked["clicks"].values[-1]) == z["clicks"] == (3.0 if k > 1 else 0.0)
         assert seen[-1][1] == pytest.approx(z["clearance"], abs=1e-9)
     # As well as the moment control knows where the pads touch; docs/life.md states 2 and 5 um.
@@ -84,8 +86,19 @@ def test_what_it_presses_is_its_own_work_in_the_books(dragging):
     assert run["F_N"].sel(time=1.45, method="nearest") > 500.0
     stored = 0.5 * dragging.bench.par.caliper.K_cal * 0.03e-3**2
     assert made["adjuster_work"] == pytest.approx(stored, rel=0.2)  # the disc does the rest
-    taken = sum(run[name] for name in ("E_copper", "E_damping", "E_shaft", "E_wedge", "E_heart",
-                                       "E_caliper", "E_stop", "E_stored"))  # fmt: skip
+    taken = sum(
+        run[name]
+        for name in (
+            "E_copper",
+            "E_damping",
+            "E_shaft",
+            "E_wedge",
+            "E_heart",
+            "E_caliper",
+            "E_stop",
+            "E_stored",
+        )
+    )
     lacking = (run["E_source"] - taken).values
     assert np.abs(lacking - lacking[0]).max() < 0.01 * made["adjuster_work"]
 

@@ -60,9 +60,9 @@ def test_a_motor_that_stands_leaves_the_waves_of_the_other(first_moves: bool) ->
 def test_windows_at_and_after_a_contact_are_left_out() -> None:
     """Moving up and down past a contact at 3, with a reach of two windows."""
     d = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
-    reach = np.concatenate((
-        np.column_stack((d - 2.4, d + 0.4)), np.column_stack((d + 2.4, d - 0.4))
-    ))  # fmt: skip
+    reach = np.concatenate(
+        (np.column_stack((d - 2.4, d + 0.4)), np.column_stack((d + 2.4, d - 0.4)))
+    )
     none = np.zeros(14)
     heart = Squeeze(none, none, np.tile(d, 2), none, np.zeros((14, 4)), reach, none, 0.3)
     kept = clear_of(Contacts(closed=3.0, apart=-10.0), heart)

@@ -156,10 +156,16 @@ def test_a_run_down_alone_tells_ratios_only(
     once = identified("run-down", free, par)
     J = par.motor_1.J_M + par.rig.J_dummy
     twice = identified(
-        "run-down", free,
-        par.replace({"motor_1.J_M": 2.0 * J - par.rig.J_dummy, "motor_1.K_ref": 0.2,
-                     "motor_1.D_M": 2.0 * par.motor_1.D_M}),
-    )  # fmt: skip
+        "run-down",
+        free,
+        par.replace(
+            {
+                "motor_1.J_M": 2.0 * J - par.rig.J_dummy,
+                "motor_1.K_ref": 0.2,
+                "motor_1.D_M": 2.0 * par.motor_1.D_M,
+            }
+        ),
+    )
     for found in (once, twice):
         assert not found.parameters
         assert "a run-down alone tells friction and damping per inertia only" in found.notes[0]
@@ -201,9 +207,12 @@ def only(record: str) -> Change:
     ],
 )
 def test_too_little_is_refused(
-    name: str, change: Change, message: str, par: WedgeParameters,
+    name: str,
+    change: Change,
+    message: str,
+    par: WedgeParameters,
     measured: Callable[[str], xr.Dataset],
-) -> None:  # fmt: skip
+) -> None:
     with pytest.raises(ParameterError, match=message):
         identified(name, change(measured(name)), par)
 

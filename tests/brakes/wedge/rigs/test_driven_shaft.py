@@ -21,10 +21,15 @@ def moved(case: Case, own: xr.Dataset, step: float) -> np.ndarray:
     """Return the angle of the shaft alone."""
     first = own.isel(time=0)
     one = trial(
-        DrivenShaft(), case.par, own, {"i": "i", "F": "F"}, {"theta": 1.0}, step=step,
+        DrivenShaft(),
+        case.par,
+        own,
+        {"i": "i", "F": "F"},
+        {"theta": 1.0},
+        step=step,
         state=DrivenShaft.State(float(first["theta"]), float(first["omega"])),
         memory=Load(float(first["i"]), float(first["F"])),
-    )  # fmt: skip
+    )
     return simulate(one.run, ("theta",))["theta"]
 
 
@@ -49,8 +54,12 @@ def test_under_the_force_of_the_other_screw() -> None:
     par = parameters("roberts2003").replace({"rig.load": "screw"})
     options = load_sweep.EXPERIMENT.defaults.replace({"levels": 1, "i_drive": 6.0})
     case = load_sweep.EXPERIMENT.cases(par, options, None)[0]
-    sensors = {"theta": Sensor("theta_1"), "omega": Sensor("omega_1"), "i": Sensor("i_1"),
-               "F": Sensor("F")}  # fmt: skip
+    sensors = {
+        "theta": Sensor("theta_1"),
+        "omega": Sensor("omega_1"),
+        "i": Sensor("i_1"),
+        "F": Sensor("F"),
+    }
     own = sensed(case, sensors, np.random.default_rng(1)).sel(time=slice(0.4, 0.65))
     axis = own["time"].values - own["time"].values[0]
     own = own.assign_coords(time=("time", axis)).assign(F=("time", -own["F"].values))

@@ -21,13 +21,14 @@ RIGS = {
     "dummy": (ShaftRig(), {"rig.load": "dummy"}),
     "screw": (ShaftRig(), {"rig.load": "screw", "rig.mode_1": "current"}),
     "slipping clamp": (
-        ShaftRig(), {"rig.clamp": "closed", "rig.mode_1": "current", "rig.T_clamp": 0.2},
+        ShaftRig(),
+        {"rig.clamp": "closed", "rig.mode_1": "current", "rig.T_clamp": 0.2},
     ),
     "loss by motor torque": (ScrewRig(), {"screw.law": "drive"}),
     "both by position": (ScrewRig(), {}),
     "current against position": (ScrewRig(), {"rig.mode_1": "current"}),
     "both by current": (ScrewRig(), {"rig.mode_1": "current", "rig.mode_2": "current"}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", RIGS)

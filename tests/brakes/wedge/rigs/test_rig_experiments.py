@@ -117,8 +117,7 @@ def test_stiffness_assumes_symmetry_as_the_paper_says():
     assert found["K_S"] == pytest.approx(60e6, rel=0.01)
     assert 1.03 < found["K_W"] / 40e6 < 1.08
     smooth = unequal | {"wedge_friction.mu_int": 0.0}
-    check_stiffness(values(run_once(bywire.Bench("stiffness", "roberts2003", smooth,
-                                                   step=40e-6))))  # fmt: skip
+    check_stiffness(values(run_once(bywire.Bench("stiffness", "roberts2003", smooth, step=40e-6))))
 
 
 def test_compression_is_as_before_and_tension_is_softer(results):
@@ -169,9 +168,12 @@ def test_position_steps(results):
 def test_free_shaft_swings_as_its_loop():
     """Without friction the low-bandwidth step overshoots as zeta and the dummy's inertia say."""
     free = {
-        "bearing.C_0": 0.0, "bearing.T_nu": 0.0, "motor_1.T_cog": 0.0, "motor_1.D_M": 0.0,
+        "bearing.C_0": 0.0,
+        "bearing.T_nu": 0.0,
+        "motor_1.T_cog": 0.0,
+        "motor_1.D_M": 0.0,
         "encoder.law": "ideal",
-    }  # fmt: skip
+    }
     options = {"f_low": 2.0, "duration": 2.0, "record": 1e-3, "a_small": 0.1}
     bench = bywire.Bench("dummy-shaft", "roberts2003", free, options)
     par = parameters_of(run_once(bench).recordings["low_small"])

@@ -24,9 +24,13 @@ def test_force_at_rest_without_friction(sign):
     par = rig(FRICTIONLESS | BOTH | {"rig.sensor.tau_F": 2e-3})
     i = 6.0 * sign
     run = drive(
-        ScrewRig(), par, 4.0, record=1e-2,
-        i_1_set=lambda t: i * np.minimum(t, 1.0), i_2_set=lambda t: -i * np.minimum(t, 1.0),
-    )  # fmt: skip
+        ScrewRig(),
+        par,
+        4.0,
+        record=1e-2,
+        i_1_set=lambda t: i * np.minimum(t, 1.0),
+        i_2_set=lambda t: -i * np.minimum(t, 1.0),
+    )
     F = par.motor_1.K_ref * i / SLOPE
     assert run["F"][-1] == pytest.approx(F, rel=1e-6)
     assert run["y_F"][-1] == pytest.approx(F, rel=1e-6)
@@ -49,17 +53,27 @@ def test_frequency_of_the_motors_against_each_other():
 
 def test_equal_motors_do_not_fight():
     run = drive(
-        ScrewRig(), rig(), 0.3,
-        theta_1_set=lambda t: np.sin(100.0 * t), theta_2_set=lambda t: np.sin(100.0 * t),
-    )  # fmt: skip
+        ScrewRig(),
+        rig(),
+        0.3,
+        theta_1_set=lambda t: np.sin(100.0 * t),
+        theta_2_set=lambda t: np.sin(100.0 * t),
+    )
     assert np.abs(run["F"]).max() < 1e-6
 
 
 @pytest.mark.parametrize(("share", "moves"), [(0.95, False), (1.05, True)])
 def test_back_driving(share, moves):
     """A screw is driven back where eta_b times the torque of the force overcomes the bearing."""
-    par = rig(BOTH | {"motor_1.T_cog": 0.0, "motor_2.T_cog": 0.0, "bearing.T_nu": 0.0,
-                      "rig.sensor.tau_F": 1e-3})  # fmt: skip
+    par = rig(
+        BOTH
+        | {
+            "motor_1.T_cog": 0.0,
+            "motor_2.T_cog": 0.0,
+            "bearing.T_nu": 0.0,
+            "rig.sensor.tau_F": 1e-3,
+        }
+    )
     T_1 = 15.0 * par.motor_1.K_ref
     T_b = par.bearing.C_0 * (1.0 + par.bearing.G_S)
     F = par.screw.eta_f * (T_1 - T_b) / SLOPE
@@ -76,9 +90,7 @@ def test_force_stays_where_friction_holds_it():
     """After the currents are gone, set-valued friction holds the rest of the force for good."""
     par = rig(BOTH)
     ramp = lambda t: 10.0 * np.interp(t, [0.0, 0.5, 0.6, 1.1], [0.0, 1.0, 1.0, 0.0])  # noqa: E731
-    run = drive(
-        ScrewRig(), par, 3.0, record=1e-2, i_1_set=ramp, i_2_set=lambda t: -ramp(t)
-    )
+    run = drive(ScrewRig(), par, 3.0, record=1e-2, i_1_set=ramp, i_2_set=lambda t: -ramp(t))
     late = run.time > 1.5
     assert run["F"][-1] > 300.0
     assert not run["omega_1"][late].any()

@@ -42,10 +42,13 @@ def test_slow_position_loop_is_of_second_order(J_dummy):
 def test_current_loop_against_its_transfer_function(winding, gain):
     """Demand filter, PI, winding, sense filter; the gains no longer cancel the winding's pole."""
     par = rig(CLAMPED)
-    par = par.replace({
-        "motor_1.R_ref": winding * par.motor_1.R_ref, "motor_1.L_M": par.motor_1.L_M,
-        "drive.k_p": gain * par.drive.k_p,
-    })  # fmt: skip
+    par = par.replace(
+        {
+            "motor_1.R_ref": winding * par.motor_1.R_ref,
+            "motor_1.L_M": par.motor_1.L_M,
+            "drive.k_p": gain * par.drive.k_p,
+        }
+    )
     own, R, L = par.drive, par.motor_1.R_ref, par.motor_1.L_M
     w_d, w_s = 2.0 * math.pi * own.f_demand, 2.0 * math.pi * own.f_sense
     # (s + w_s) V (k_p s + k_i) over s (L s + R)(s + w_s) + w_s V (k_p s + k_i), and the filter.

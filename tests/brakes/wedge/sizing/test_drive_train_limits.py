@@ -21,9 +21,13 @@ def designs(**changes: float) -> xr.Dataset:
     power = np.full(shape, 80.0)
     power[1, 1] = (70.0, 60.0)
     cube = {
-        "filtered": power, "t_90": np.full(shape, 0.08), "current": np.full(shape, 12.0),
-        "held": np.full(shape, 950.0), "left": np.zeros(shape), "stop": np.zeros(shape),
-    }  # fmt: skip
+        "filtered": power,
+        "t_90": np.full(shape, 0.08),
+        "current": np.full(shape, 12.0),
+        "held": np.full(shape, 950.0),
+        "left": np.zeros(shape),
+        "stop": np.zeros(shape),
+    }
     cube["t_90"][0, 1, 1] = 0.12
     cube["stop"][1, 2, 0] = 30.0
     for name, value in changes.items():
@@ -52,8 +56,12 @@ def test_each_limit_that_is_reached_is_named():
     at = middle(designs(t_90=0.1, current=par.control.position.i_max, held=905.0, left=47.4))
     texts = active(at, par, DEFAULTS)
     assert [text.partition(":")[0] for text in texts] == [
-        "time", "current", "hold", "release", "power",
-    ]  # fmt: skip
+        "time",
+        "current",
+        "hold",
+        "release",
+        "power",
+    ]
     assert "100 ms of the 100 ms demanded, slowest at mu_B = 0.45" in texts[0]
     assert "control.position.i_max = 20 A with mu_B = 0.45" in texts[1]
 

@@ -11,9 +11,7 @@ from bywire.brakes.wedge.stability import brake, controlled, motion, neutral
 from bywire.brakes.wedge.studies.stability import DEFAULTS, compute
 from bywire.core.catalog import parameters
 
-ROUGH = DEFAULTS.replace(
-    {"coefficients": 4, "slopes": 3, "mu_B_min": 0.15, "mu_B_max": 0.75}
-)  # fmt: skip
+ROUGH = DEFAULTS.replace({"coefficients": 4, "slopes": 3, "mu_B_min": 0.15, "mu_B_max": 0.75})
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +72,8 @@ def test_a_controller_that_knows_the_friction_keeps_its_margin() -> None:
 def test_the_border_of_the_moment_loop_is_named(found) -> None:
     (border,) = [one for one in found.kpis if one.name == "moment_mu_B"]
     loop, par = LOOPS.find("moment"), parameters("roberts2003")
-    sides = [loop.closed(par.replace({"wedge.mu_B": share * border.value}), 200.0).is_stable
-             for share in (0.999, 1.001)]  # fmt: skip
+    sides = [
+        loop.closed(par.replace({"wedge.mu_B": share * border.value}), 200.0).is_stable
+        for share in (0.999, 1.001)
+    ]
     assert sides == [True, False]

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from bywire.benchmark.commands import Command
 
-_REQUIRED = ("bandwidth >= 10 Hz", "phase margin >= 60 deg", "overshoot <= 15 %",
-             "steady state error <= 1 %")  # fmt: skip
+_REQUIRED = (
+    "bandwidth >= 10 Hz",
+    "phase margin >= 60 deg",
+    "overshoot <= 15 %",
+    "steady state error <= 1 %",
+)
 _REQUIREMENTS = tuple(word for text in _REQUIRED for word in ("--require", text))
 
 COMMANDS = (

@@ -108,10 +108,18 @@ def _program(par: MotorcycleParameters, width: float, tolerance: float) -> Any:
         )
         memory = stacked(after)
         solved = diffrax.diffeqsolve(
-            term, solver, 0.0, par.ecu.T_s, FIRST_STEP, z, memory[duty_at],
-            stepsize_controller=control, max_steps=None,
-            saveat=diffrax.SaveAt(t1=True), adjoint=diffrax.ForwardMode(),
-        )  # fmt: skip
+            term,
+            solver,
+            0.0,
+            par.ecu.T_s,
+            FIRST_STEP,
+            z,
+            memory[duty_at],
+            stepsize_controller=control,
+            max_steps=None,
+            saveat=diffrax.SaveAt(t1=True),
+            adjoint=diffrax.ForwardMode(),
+        )
         return (solved.ys[0], memory), x.p_mc.value
 
     def program(start: Any, demand: Any) -> Any:

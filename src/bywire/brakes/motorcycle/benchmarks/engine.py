@@ -33,9 +33,15 @@ from bywire.simulation.variations import case_matrix
 CASES = 1024
 VARIED = ("motor.R_m", "motor.K_e", "seal.T_pr", "seal.f_cfr_p", "caliper.K_pd", "fluid.beta")
 DIRECTIONS = (
-    "motor.R_m", "motor.K_e", "seal.T_pr", "seal.f_cfr_p", "caliper.K_pd", "fluid.beta",
-    "gear.J_mot", "pipeline.d_pl",
-)  # fmt: skip
+    "motor.R_m",
+    "motor.K_e",
+    "seal.T_pr",
+    "seal.f_cfr_p",
+    "caliper.K_pd",
+    "fluid.beta",
+    "gear.J_mot",
+    "pipeline.d_pl",
+)
 _ROUNDS, _ENSEMBLE_ROUNDS = 60, 7
 
 
@@ -56,14 +62,28 @@ def single_and_sensitivities(par: MotorcycleParameters) -> list[Result]:
     )
     plain = median(seconds["plain"])
     return [
-        at_most("single.hand_c", ratio(seconds, "bywire", "hand"), 1.0, "ratio",
-                "one hard-braking run of 1.2 s, all outputs, over hand-written C; same compiler "
-                "and flags, one call each"),
-        Result("single.realtime_factor", run.duration / plain, "1",
-               note="simulated over wall time, a call from Python with all its preparation"),
-        at_most("sensitivities.plain", ratio(seconds, "tangents", "plain"), 4.5, "ratio",
-                "eight directions with the value over a plain run"),
-    ]  # fmt: skip
+        at_most(
+            "single.hand_c",
+            ratio(seconds, "bywire", "hand"),
+            1.0,
+            "ratio",
+            "one hard-braking run of 1.2 s, all outputs, over hand-written C; same compiler "
+            "and flags, one call each",
+        ),
+        Result(
+            "single.realtime_factor",
+            run.duration / plain,
+            "1",
+            note="simulated over wall time, a call from Python with all its preparation",
+        ),
+        at_most(
+            "sensitivities.plain",
+            ratio(seconds, "tangents", "plain"),
+            4.5,
+            "ratio",
+            "eight directions with the value over a plain run",
+        ),
+    ]
 
 
 def ensemble(par: MotorcycleParameters) -> list[Result]:
@@ -89,12 +109,16 @@ def ensemble(par: MotorcycleParameters) -> list[Result]:
     )
     width = vector_doubles()
     return [
-        at_least("ensemble.hand_c", least_ratio(seconds, "hand", "bywire"), 0.7 * width,
-                 "times faster",
-                 f"{CASES} variations of {len(VARIED)} parameters, three signals and no energies "
-                 "on both sides, over scalar C with the flags of a single run; least processor "
-                 f"times of a thread each, in turn; 0.7 of the vector width, {width} doubles"),
-    ]  # fmt: skip
+        at_least(
+            "ensemble.hand_c",
+            least_ratio(seconds, "hand", "bywire"),
+            0.7 * width,
+            "times faster",
+            f"{CASES} variations of {len(VARIED)} parameters, three signals and no energies "
+            "on both sides, over scalar C with the flags of a single run; least processor "
+            f"times of a thread each, in turn; 0.7 of the vector width, {width} doubles",
+        ),
+    ]
 
 
 def _hand_ensemble(run: Run, variations: dict[str, np.ndarray], signals: tuple[str, ...]) -> Work:

@@ -48,17 +48,23 @@ def measured() -> list[Result]:
     apart = np.abs(there().values[:LANES] - ours).max(axis=(0, 1)) / np.abs(ours).max(axis=(0, 1))
     return [
         at_least(
-            "study.gpu_ratio", lanes / CORES / gpu, RATIO, "times faster",
+            "study.gpu_ratio",
+            lanes / CORES / gpu,
+            RATIO,
+            "times faster",
             f"hard brakings a second of {device.label}, {THREADS} variations of {len(VARIED)} "
             f"parameters with their rows fetched, by the clock, over lanes of {CORES} cores, each "
             f"as quick as the processor time of {LANES} says; {1e6 * gpu:.3g} and "
             f"{1e6 * lanes:.3g} us a case, of one core",
         ),
         at_most(
-            "study.gpu_difference", float(apart.max()), DIFFERENCE, "1",
+            "study.gpu_difference",
+            float(apart.max()),
+            DIFFERENCE,
+            "1",
             "largest difference of a signal, of its largest value, between the two",
         ),
-    ]  # fmt: skip
+    ]
 
 
 PART = Part("graphics processor", measured)

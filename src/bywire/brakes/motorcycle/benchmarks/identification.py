@@ -49,15 +49,24 @@ def measured(par: MotorcycleParameters) -> list[Result]:
     whole = median(b for _, b, _ in seconds)
     peer_seconds = peer() * STARTS / _PEER_STARTS
     return [
-        Result("identify.ramp_in_runs", in_runs, "runs",
-               note=f"seal friction from a ramp of 50 s at 1 kHz, {len(unknowns)} unknowns, "
-               f"{STARTS} starts on all cores, uncertainty and replay included, {whole:.3g} s, "
-               "over one plain run of the ramp"),
-        at_least("identify.scipy", peer_seconds / whole, 5.0, "times faster",
-                 "the same over scipy.optimize.least_squares with its own differences on the same "
-                 f"slips and the same kernel, one start after another, {_PEER_STARTS} starts "
-                 f"measured and {STARTS} reckoned, {peer_seconds:.3g} s"),
-    ]  # fmt: skip
+        Result(
+            "identify.ramp_in_runs",
+            in_runs,
+            "runs",
+            note=f"seal friction from a ramp of 50 s at 1 kHz, {len(unknowns)} unknowns, "
+            f"{STARTS} starts on all cores, uncertainty and replay included, {whole:.3g} s, "
+            "over one plain run of the ramp",
+        ),
+        at_least(
+            "identify.scipy",
+            peer_seconds / whole,
+            5.0,
+            "times faster",
+            "the same over scipy.optimize.least_squares with its own differences on the same "
+            f"slips and the same kernel, one start after another, {_PEER_STARTS} starts "
+            f"measured and {STARTS} reckoned, {peer_seconds:.3g} s",
+        ),
+    ]
 
 
 def _by_scipy(

@@ -67,9 +67,14 @@ def solve(
 
     def advance(z: Array, duty: float) -> Array:
         path = odeint(
-            lambda z, _: slope(z, duty), z, span, Dfun=lambda z, _: jacobian(z, duty),
-            rtol=tolerance, atol=tolerance, mxstep=MAX_STEPS,
-        )  # fmt: skip
+            lambda z, _: slope(z, duty),
+            z,
+            span,
+            Dfun=lambda z, _: jacobian(z, duty),
+            rtol=tolerance,
+            atol=tolerance,
+            mxstep=MAX_STEPS,
+        )
         return np.asarray(path[-1])
 
     return march(advance, par, stimulus, duration)

@@ -76,9 +76,14 @@ def solve(
         lambda z, u, t: jacobian(z, held[0]),
     )
     simulation = Simulation(
-        [block], dt=FIRST_STEP, Solver=GEAR32, log=False, tolerance_fpi=IMPLICIT * tolerance,
-        tolerance_lte_rel=tolerance, tolerance_lte_abs=tolerance,
-    )  # fmt: skip
+        [block],
+        dt=FIRST_STEP,
+        Solver=GEAR32,
+        log=False,
+        tolerance_fpi=IMPLICIT * tolerance,
+        tolerance_lte_rel=tolerance,
+        tolerance_lte_abs=tolerance,
+    )
 
     def advance(z: Array, duty: float) -> Array:
         held[0], simulation.dt = duty, FIRST_STEP

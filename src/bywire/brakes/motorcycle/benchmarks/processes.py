@@ -55,8 +55,9 @@ def _seconds(bench: Path, changes: dict[str, str]) -> float:
 
 
 def _memory(bench: Path, changes: dict[str, str]) -> Result:
-    command = python_command("-c", _MEMORY, "run", str(bench), "--json",
-                             "--set", "options.duration=60 s")  # fmt: skip
+    command = python_command(
+        "-c", _MEMORY, "run", str(bench), "--json", "--set", "options.duration=60 s"
+    )
     done = subprocess.run(
         command,
         env=environment() | changes,

@@ -84,20 +84,28 @@ def studies() -> Iterator[Result]:
         simulated, judged = simulated_and_judged(plan, _ROUNDS)
         cores = os.cpu_count() or 1
         yield at_most(
-            "study.million_seconds", 1e6 * whole / cores, 600.0, "s",
+            "study.million_seconds",
+            1e6 * whole / cores,
+            600.0,
+            "s",
             f"a million stops with all key figures on {cores} cores, {1e3 * whole:.3g} ms of a "
             f"core each, measured over {_CHUNKS * CHUNK}",
-        )  # fmt: skip
+        )
         yield at_most(
-            "study.kpi_share", judged / simulated, 0.05, "1",
+            "study.kpi_share",
+            judged / simulated,
+            0.05,
+            "1",
             f"key figures, {1e6 * judged:.3g} us a case, over its simulation with noise, "
             f"{1e3 * simulated:.3g} ms",
-        )  # fmt: skip
+        )
         yield _of_steps(Path(folder))
         yield Result(
-            "study.beside_share", (whole - simulated - judged) / simulated, "1",
+            "study.beside_share",
+            (whole - simulated - judged) / simulated,
+            "1",
             note="cases made and checked, warnings and books over the simulation",
-        )  # fmt: skip
+        )
         yield _command(Path(folder))
         if Path("/proc/self/status").exists():
             yield _memory(path, Path(folder) / "out")
@@ -118,9 +126,12 @@ def _of_steps(folder: Path) -> Result:
     path.write_text(_STUDY.replace("hard-braking", "pressure-step"), encoding="utf-8")
     simulated, judged = simulated_and_judged(read_study(path), _ROUNDS)
     return at_most(
-        "study.step_kpi_share", judged / simulated, 0.05, "1",
+        "study.step_kpi_share",
+        judged / simulated,
+        0.05,
+        "1",
         f"the same of pressure steps: {1e6 * judged:.3g} us over {1e3 * simulated:.3g} ms",
-    )  # fmt: skip
+    )
 
 
 def _command(folder: Path) -> Result:
@@ -130,17 +141,21 @@ def _command(folder: Path) -> Result:
     for k in range(_COMMANDS + 1):
         before, begin = _of_children(), time.perf_counter()
         fewer = () if k else ("--cases", "512")
-        line = python_command("-m", "bywire", "study", "run", str(study),
-                              "--out", str(folder / f"many-{k}"), *fewer)  # fmt: skip
+        line = python_command(
+            "-m", "bywire", "study", "run", str(study), "--out", str(folder / f"many-{k}"), *fewer
+        )
         subprocess.run(line, env=environment(), capture_output=True, check=True)
         seconds.append(time.perf_counter() - begin)
         spent.append(_of_children() - before)
     cores = os.cpu_count() or 1
     return at_most(
-        "study.command_seconds", min(seconds[1:]), 8.0, "s",
+        "study.command_seconds",
+        min(seconds[1:]),
+        8.0,
+        "s",
         f"a study of 10,000 stops from the command line to its report on {cores} cores, warm, by "
         f"the clock; {min(spent[1:]):.3g} s of processor time in all of its processes",
-    )  # fmt: skip
+    )
 
 
 def _of_children() -> float:
@@ -150,12 +165,28 @@ def _of_children() -> float:
 
 
 def _memory(study: Path, out: Path) -> Result:
-    line = python_command("-c", _MEMORY, "study", "run", str(study), "--out", str(out),
-                          "--cases", str(_CASES), "--workers", "1", "--json")  # fmt: skip
+    line = python_command(
+        "-c",
+        _MEMORY,
+        "study",
+        "run",
+        str(study),
+        "--out",
+        str(out),
+        "--cases",
+        str(_CASES),
+        "--workers",
+        "1",
+        "--json",
+    )
     done = subprocess.run(
-        line, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        line,
+        env=environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
         check=True,
-    )  # fmt: skip
+    )
     peak = float(done.stderr.split()[-1]) * 1024.0 / 1e6
     return at_most("study.memory", peak, 500.0, "MB", f"peak of a study of {_CASES} cases")
 
@@ -181,10 +212,13 @@ def _efficiency(plan: StudyPlan, cores: int, seconds: float) -> Result:
             plain.append(_rate(Pool(cores), plan, cores, chunks))
             clustered.append(_rate(Cluster(cluster.scheduler_address), plan, cores, chunks))
     return at_least(
-        "study.efficiency", max(clustered) / max(plain), 0.95, "1",
+        "study.efficiency",
+        max(clustered) / max(plain),
+        0.95,
+        "1",
         f"cases a second of {cores} workers of dask.distributed, started as docs/studies.md "
         f"says, over {cores} plain processes; the better of {_TURNS} turns of each",
-    )  # fmt: skip
+    )
 
 
 def _rate(executor: Executor, plan: StudyPlan, cores: int, chunks: int) -> float:

@@ -144,9 +144,7 @@ def best_of(candidates: Sequence[Candidate]) -> int | None:
     return min(admissible, key=lambda k: candidates[k].price, default=None)
 
 
-def _candidate(
-    gains: Array, columns: Sequence[Figures], limits: Mapping[str, float]
-) -> Candidate:
+def _candidate(gains: Array, columns: Sequence[Figures], limits: Mapping[str, float]) -> Candidate:
     each = [least(gains, column, limits) for column in columns]
     n = max(range(len(each)), key=lambda k: (math.isnan(each[k].gain), each[k].gain))
     gain, binding = each[n].gain, each[n].binding
@@ -154,8 +152,10 @@ def _candidate(
         return Candidate(gain, n, binding, math.nan, math.nan, ())
     there = [at_gain(gains, column, limits, gain, binding) for column in columns]
     return Candidate(
-        gain, n, binding,
+        gain,
+        n,
+        binding,
         price=float(np.mean([at_pressure.figures["copper"] for at_pressure in there])),
         ripple=max(at_pressure.figures["ripple_caliper"] for at_pressure in there),
         exceeded=tuple(sorted({name for at_pressure in there for name in at_pressure.exceeded})),
-    )  # fmt: skip
+    )

@@ -63,27 +63,40 @@ def mapped(
     for name, (unit, label) in FIGURES.items():
         values = np.stack([at_pressure[name] for at_pressure in figures])
         columns[name] = variable(values, dims, unit, label)
-        columns[f"worst_{name}"] = variable(
-            values.max(axis=0), dims[1:], unit, f"{label}, worst"
-        )
+        columns[f"worst_{name}"] = variable(values.max(axis=0), dims[1:], unit, f"{label}, worst")
     enough = [
-        [least(gains, {n: v[:, k] for n, v in at_pressure.items()}, limits)
-         for k in range(len(grid.frequencies))]
+        [
+            least(gains, {n: v[:, k] for n, v in at_pressure.items()}, limits)
+            for k in range(len(grid.frequencies))
+        ]
         for at_pressure in figures
-    ]  # fmt: skip
+    ]
     both = ("pressure", "frequency")
     predicted = [[needed_gain(par, f, p) for f in grid.frequencies] for p in grid.pressures]
     middle = grid.pressures[len(grid.pressures) // 2]
     columns |= {
-        "least_gain": variable([[c.gain for c in row] for row in enough], both, "1",
-                               "least gain that overcomes the friction"),
-        "least_copper": variable([[c.figures["copper"] for c in row] for row in enough], both, "W",
-                                 "dither's copper power at the least gain"),
-        "predicted_gain": variable(predicted, both, "1",
-                                   "gain that breaks a stuck shaft away, from linear models"),
-        "reach": variable([reach(par, f, middle) for f in grid.frequencies], ("frequency",), "1",
-                          "motor current over dither, stuck shaft"),
-    }  # fmt: skip
+        "least_gain": variable(
+            [[c.gain for c in row] for row in enough],
+            both,
+            "1",
+            "least gain that overcomes the friction",
+        ),
+        "least_copper": variable(
+            [[c.figures["copper"] for c in row] for row in enough],
+            both,
+            "W",
+            "dither's copper power at the least gain",
+        ),
+        "predicted_gain": variable(
+            predicted, both, "1", "gain that breaks a stuck shaft away, from linear models"
+        ),
+        "reach": variable(
+            [reach(par, f, middle) for f in grid.frequencies],
+            ("frequency",),
+            "1",
+            "motor current over dither, stuck shaft",
+        ),
+    }
     return xr.Dataset(columns).assign_coords(
         pressure=variable(list(grid.pressures), ("pressure",), "Pa", "pressure"),
         gain=variable(gains, ("gain",), "1", "dither gain"),
@@ -102,8 +115,15 @@ def by_frequency(grid: Grid, each: list[Candidate]) -> Cut:
         ],
         "beyond": [candidate.verdict or "nothing" for candidate in each],
     }
-    columns = {name: variable([getattr(candidate, name) for candidate in each], ("frequency",),
-                            units.get(name, "1"), name) for name in names}  # fmt: skip
+    columns = {
+        name: variable(
+            [getattr(candidate, name) for candidate in each],
+            ("frequency",),
+            units.get(name, "1"),
+            name,
+        )
+        for name in names
+    }
     columns |= {name: variable(texts, ("frequency",), "1", name) for name, texts in words.items()}
     coordinate = variable(list(grid.frequencies), ("frequency",), "Hz", "dither frequency")
     table = xr.Dataset(columns, coords={"frequency": coordinate})
@@ -120,17 +140,29 @@ def by_pressure(par: Par, data: xr.Dataset) -> Cut:
         amplitude = gain * float(breakaway_current(p, par.ecu.est_par))
         torque = amplitude * reach(par, f, p) * par.motor.K_e
         row = {
-            "frequency": f, "gain": gain,
-            "predicted": float(data["predicted_gain"].values[k, n]), "amplitude": amplitude,
-            "torque": torque, "breakaway": breakaway_torques(par, p)[0],
+            "frequency": f,
+            "gain": gain,
+            "predicted": float(data["predicted_gain"].values[k, n]),
+            "amplitude": amplitude,
+            "torque": torque,
+            "breakaway": breakaway_torques(par, p)[0],
             "copper": float(copper[n]),
-            **{name: float(np.interp(gain, data["gain"].values, data[name].values[k, :, n]))
-               for name in ("ripple_sensor", "ripple_caliper", "current_share")},
-        }  # fmt: skip
+            **{
+                name: float(np.interp(gain, data["gain"].values, data[name].values[k, :, n]))
+                for name in ("ripple_sensor", "ripple_caliper", "current_share")
+            },
+        }
         for name, value in row.items():
             rows.setdefault(name, []).append(value)
-    units = {"frequency": "Hz", "amplitude": "A", "torque": "N*m", "breakaway": "N*m",
-             "copper": "W", "ripple_sensor": "Pa", "ripple_caliper": "Pa"}  # fmt: skip
+    units = {
+        "frequency": "Hz",
+        "amplitude": "A",
+        "torque": "N*m",
+        "breakaway": "N*m",
+        "copper": "W",
+        "ripple_sensor": "Pa",
+        "ripple_caliper": "Pa",
+    }
     table = xr.Dataset(
         {name: variable(v, ("pressure",), units.get(name, "1"), name) for name, v in rows.items()},
         coords={"pressure": data["pressure"]},
@@ -146,11 +178,19 @@ def law(par: Par, data: xr.Dataset, best: int, grid: Grid) -> list[Kpi]:
     current = np.array([float(breakaway_current(pressure, est)) for pressure in p])
     needed = data["least_gain"].values[:, best] * current * est.K_e / est.k_brk_p
     kpis = [
-        Kpi("optimum_reach", reach(par, f, float(np.median(p))), "1",
-            "Motor current over dither at the optimum's frequency, shaft stuck."),
-        Kpi("optimum_predicted_gain", float(data["predicted_gain"].values[:, best].max()),
-            "1", "Gain that breaks the stuck shaft away both ways, from linear models alone."),
-    ]  # fmt: skip
+        Kpi(
+            "optimum_reach",
+            reach(par, f, float(np.median(p))),
+            "1",
+            "Motor current over dither at the optimum's frequency, shaft stuck.",
+        ),
+        Kpi(
+            "optimum_predicted_gain",
+            float(data["predicted_gain"].values[:, best].max()),
+            "1",
+            "Gain that breaks the stuck shaft away both ways, from linear models alone.",
+        ),
+    ]
     if p.size > 1:
         slope, offset = np.polyfit(p, needed, 1)
         offset += float(np.max(needed - (offset + slope * p)))  # enough at every pressure

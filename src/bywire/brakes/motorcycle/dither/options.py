@@ -13,9 +13,7 @@ from bywire.synthesis.study import require_ranges
 
 Count = Annotated[int, Unit("1", 8.0), Field(ge=3, le=101)]
 Node = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Pressures = Annotated[
-    tuple[Node, ...], Unit("Pa", 2e6), Field(min_length=1, max_length=20)
-]
+Pressures = Annotated[tuple[Node, ...], Unit("Pa", 2e6), Field(min_length=1, max_length=20)]
 
 ASSUMPTIONS = (
     "Each dither is tried on the nonlinear brake with the pressure loop closed, which takes the "

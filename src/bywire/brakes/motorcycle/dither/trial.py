@@ -83,8 +83,10 @@ def tried(
     """
     controlled = par.replace({"drive.mode": "pressure"})
     pairs = [(g, f) for g in gains for f in frequencies]
-    both = [_measured(controlled, p, start, pairs, trial) for start in (p - trial.approach,
-                                                                p + trial.approach)]  # fmt: skip
+    both = [
+        _measured(controlled, p, start, pairs, trial)
+        for start in (p - trial.approach, p + trial.approach)
+    ]
     apart = np.abs(both[1]["mean"] - both[0]["mean"]) / dead_band(controlled, p)
     worse = {name: np.fmax(both[0][name], both[1][name]) for name in FIGURES if name != "band"}
     shape = (len(gains), len(frequencies))
@@ -98,9 +100,15 @@ def _measured(
     row = [float(value) for value in zeros(Stimulus)._replace(p_set=p)]
     T = par.ecu.T_s
     run = Run(
-        MotorcycleBrake(), par, state_at(start, par), memory_at(start, par),
-        lambda t: np.repeat([row], t.size, axis=0), trial.settle + trial.window, _STEP, T,
-    )  # fmt: skip
+        MotorcycleBrake(),
+        par,
+        state_at(start, par),
+        memory_at(start, par),
+        lambda t: np.repeat([row], t.size, axis=0),
+        trial.settle + trial.window,
+        _STEP,
+        T,
+    )
     gains, frequencies = (np.array(values) for values in zip(*pairs, strict=True))
     ensemble = simulate_ensemble(
         run, {"ecu.dither.gain": gains, "ecu.dither.f_dit": frequencies}, _SIGNALS

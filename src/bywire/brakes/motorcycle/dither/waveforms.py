@@ -38,12 +38,17 @@ def compared(
         report((k + 1) / len(cases))
     index = np.arange(len(rows))
     table = xr.Dataset(
-        {name: variable(np.array([row[name] for row in rows]), ("case",), _UNITS.get(name, "1"),
-                        name) for name in rows[0]},
+        {
+            name: variable(
+                np.array([row[name] for row in rows]), ("case",), _UNITS.get(name, "1"), name
+            )
+            for name in rows[0]
+        },
         coords={"case": ("case", index)},
-    )  # fmt: skip
-    return Cut(f"waveforms at {f:.4g} Hz, filter after or before the dither joins", table,
-               tuple(rows[0]))  # fmt: skip
+    )
+    return Cut(
+        f"waveforms at {f:.4g} Hz, filter after or before the dither joins", table, tuple(rows[0])
+    )
 
 
 def distortion(par: Par, f: float, p: float) -> float:

@@ -30,10 +30,17 @@ def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tupl
     stimulus = step_at_zero("i_set", 0.0, options.i_step)
     return (
         case_from_rest(
-            "run", par, "current-direct", 0.0, stimulus, options.duration,
-            settle=5e-3, keep=5e-3, record=options.record,
+            "run",
+            par,
+            "current-direct",
+            0.0,
+            stimulus,
+            options.duration,
+            settle=5e-3,
+            keep=5e-3,
+            record=options.record,
         ),
-    )  # fmt: skip
+    )
 
 
 def step(options: Options) -> step_response.Setting:

@@ -47,11 +47,16 @@ def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tupl
     duration = 2.0 * options.i_max / options.slope
     return tuple(
         case_from_rest(
-            label, par, "current", 0.0, lambda t: {"i_set": ramp.sample(t, shape)}, duration,
+            label,
+            par,
+            "current",
+            0.0,
+            lambda t: {"i_set": ramp.sample(t, shape)},
+            duration,
             {"ecu.dither.waveform": chosen},
         )
         for label, chosen in ((WITHOUT, "off"), (WITH, waveform))
-    )  # fmt: skip
+    )
 
 
 def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:

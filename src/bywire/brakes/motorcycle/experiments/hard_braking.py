@@ -34,18 +34,28 @@ def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tupl
     stimulus = step_at_zero("p_set", options.p_from, options.p_to)
     return (
         case_from_rest(
-            "run", par, "pressure", options.p_from, stimulus, options.duration,
-            settle=options.settle, keep=min(options.settle, 0.1),
+            "run",
+            par,
+            "pressure",
+            options.p_from,
+            stimulus,
+            options.duration,
+            settle=options.settle,
+            keep=min(options.settle, 0.1),
         ),
-    )  # fmt: skip
+    )
 
 
 def step(options: Options) -> step_response.Setting:
     """Return the step of the pressure."""
     return step_response.Setting(
-        "p_mc", 0.0, options.p_from, options.p_to, smoothing=options.smoothing,
+        "p_mc",
+        0.0,
+        options.p_from,
+        options.p_to,
+        smoothing=options.smoothing,
         set_point="p_ref",
-    )  # fmt: skip
+    )
 
 
 def judged(options: Options) -> dict[str, Any]:

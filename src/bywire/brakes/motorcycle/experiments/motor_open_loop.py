@@ -65,10 +65,16 @@ def cases(
     offset = holding if options.add_holding else 0.0
     return (
         case_from_rest(
-            "run", par, mode, options.p_start, lambda t: {name: offset + stimulus.sample(t)},
-            options.duration, settle=options.settle, record=options.record,
+            "run",
+            par,
+            mode,
+            options.p_start,
+            lambda t: {name: offset + stimulus.sample(t)},
+            options.duration,
+            settle=options.settle,
+            record=options.record,
         ),
-    )  # fmt: skip
+    )
 
 
 def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:

@@ -49,19 +49,30 @@ def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tupl
         # Without dither: an ECU that has switched its current off does not shake the piston.
         return (
             case_from_rest(
-                "run", par, "current-direct", options.p_from,
+                "run",
+                par,
+                "current-direct",
+                options.p_from,
                 step_at_zero("i_set", holding_current(options.p_from, par), 0.0),
-                options.duration, {"ecu.dither.waveform": "off"}, settle=options.settle, keep=keep,
+                options.duration,
+                {"ecu.dither.waveform": "off"},
+                settle=options.settle,
+                keep=keep,
             ),
-        )  # fmt: skip
+        )
     ramp = max(options.t_ramp, 1e-9)
     return (
         case_from_rest(
-            "run", par, "pressure", options.p_from,
+            "run",
+            par,
+            "pressure",
+            options.p_from,
             lambda t: {"p_set": options.p_from * np.clip(1.0 - t / ramp, 0.0, 1.0)},
-            options.duration, settle=options.settle, keep=keep,
+            options.duration,
+            settle=options.settle,
+            keep=keep,
         ),
-    )  # fmt: skip
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

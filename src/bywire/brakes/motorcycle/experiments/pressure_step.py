@@ -51,10 +51,16 @@ def _from(p: float, par: MotorcycleParameters, options: Options) -> tuple[Case, 
     stimulus = step_at_zero("i_set", i, i + options.i_step)
     return (
         case_from_rest(
-            "run", par, "current", p, stimulus, options.duration,
-            settle=options.settle, keep=min(options.settle, 0.5),
+            "run",
+            par,
+            "current",
+            p,
+            stimulus,
+            options.duration,
+            settle=options.settle,
+            keep=min(options.settle, 0.5),
         ),
-    )  # fmt: skip
+    )
 
 
 def step(options: Options) -> step_response.Setting:
@@ -85,7 +91,10 @@ EXPERIMENT = Experiment(
     cases=cases,
     judge=FamilyJudge(settings),
     kpis=units_of(
-        "step_response", "effort", "occupation", "static_gain",
+        "step_response",
+        "effort",
+        "occupation",
+        "static_gain",
         resolved={"level": "Pa", "gain": "Pa/A"},
     ),
     figures=("step-response", "time-traces"),

@@ -16,13 +16,9 @@ from bywire.core.quantities import Nodes, Unit
 from bywire.plant import seal_friction
 
 FIGURES = Figures(
-    breakaway_apply=(
-        "N*m", "Largest friction torque while applying, at the highest pressure."
-    ),
-    breakaway_release=(
-        "N*m", "Largest friction torque while releasing, at the highest pressure."
-    ),
-)  # fmt: skip
+    breakaway_apply=("N*m", "Largest friction torque while applying, at the highest pressure."),
+    breakaway_release=("N*m", "Largest friction torque while releasing, at the highest pressure."),
+)
 
 
 class Options(ParameterSet):

@@ -184,11 +184,15 @@ def two_pole_error(
     whole, less = linear_model(par, p, x), two_pole(par, p, x)
     a_2, a_1, _ = less.den
     simplified = replace(
-        whole, name="eq-21",
-        A=np.array([[0.0, 1.0], [-1.0 / a_2, -a_1 / a_2]]), B=np.array([[0.0], [less.gain / a_2]]),
-        C=np.array([[1.0, 0.0]]), states=("p_mc", "rate"), state_units=("Pa", "Pa/s"),
+        whole,
+        name="eq-21",
+        A=np.array([[0.0, 1.0], [-1.0 / a_2, -a_1 / a_2]]),
+        B=np.array([[0.0], [less.gain / a_2]]),
+        C=np.array([[1.0, 0.0]]),
+        states=("p_mc", "rate"),
+        state_units=("Pa", "Pa/s"),
         rate=np.zeros(2),
-    )  # fmt: skip
+    )
     return reduction_error(whole, simplified, high)
 
 

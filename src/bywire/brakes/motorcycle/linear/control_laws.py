@@ -99,10 +99,14 @@ def current_loop(par: MotorcycleParameters, p: float, rotor: Rotor) -> LinearMod
     """
     driven = par.replace({"drive.mode": "current-direct", "adc.law": "ideal"})
     return closed_loop(
-        MotorcycleBrake(), driven, state_at(p, driven), memory_at(p, driven),
-        inputs=("i_set",), outputs=("i", "i_meas"),
+        MotorcycleBrake(),
+        driven,
+        state_at(p, driven),
+        memory_at(p, driven),
+        inputs=("i_set",),
+        outputs=("i", "i_meas"),
         locked=("theta", "omega", "p_mc", "p_pd", "y_p") if rotor == "locked" else (),
-    )  # fmt: skip
+    )
 
 
 def _linear(
@@ -124,7 +128,17 @@ def _linear(
     values = ca.Function("law", [x, u], parts)(list(zeros(state_type)), 0.0)
     A, B, C, D = (np.array(value, dtype=float) for value in values)
     return LinearModel(
-        name, A, B, C, D, tuple(signals), inputs, ("out",),
-        tuple(s.unit for s in signals.values()), units[:1] * len(inputs), units[1:],
-        np.zeros(len(signals)), period,
-    )  # fmt: skip
+        name,
+        A,
+        B,
+        C,
+        D,
+        tuple(signals),
+        inputs,
+        ("out",),
+        tuple(s.unit for s in signals.values()),
+        units[:1] * len(inputs),
+        units[1:],
+        np.zeros(len(signals)),
+        period,
+    )

@@ -43,9 +43,13 @@ class PressureLoop:
         mode = {"drive.mode": "current-direct", "adc.law": "ideal"}
         driven = self.par.replace(mode)
         motor = linearize(
-            MotorcycleBrake(), driven, state_at(self.p, driven), memory_at(self.p, driven),
-            inputs=("duty",), outputs=("i", "y_i"),
-        ).reduced(("i", "y_i"), held=True)  # fmt: skip
+            MotorcycleBrake(),
+            driven,
+            state_at(self.p, driven),
+            memory_at(self.p, driven),
+            inputs=("duty",),
+            outputs=("i", "y_i"),
+        ).reduced(("i", "y_i"), held=True)
         sensor = driven.current_sensor
         span = np.diag([1.0, sensor.i_high - sensor.i_low])
         motor = replace(motor, C=span @ motor.C, outputs=("i", "i_meas"), output_units=("A", "A"))
@@ -69,8 +73,9 @@ class PressureLoop:
 
         ecu, T = self.par.ecu, self.plant.period
         current = control.ss([], [], [], [[1.0, 0.0, 0.0]], T)
-        inner = control.feedback(block(self.plant) * block(control_laws.current_control(ecu)),
-                                 current)  # fmt: skip
+        inner = control.feedback(
+            block(self.plant) * block(control_laws.current_control(ecu)), current
+        )
         path = inner * block(control_laws.demand_filter(ecu))
         gain = path[2, 0] * block(control_laws.pressure_feedback(ecu, self.p))
         # The measured pressure goes back into the second input of the pressure control.
@@ -118,9 +123,20 @@ def _single(block: Any, output: str) -> LinearModel:
     """Return a block with one pressure in and one out as a plain model."""
     states = tuple(f"x{k}" for k in range(block.nstates))
     return LinearModel(
-        "pressure-loop", block.A, block.B, block.C, block.D, states, ("p_ref",), (output,),
-        tuple("1" for _ in states), ("Pa",), ("Pa",), np.zeros(len(states)), float(block.dt),
-    )  # fmt: skip
+        "pressure-loop",
+        block.A,
+        block.B,
+        block.C,
+        block.D,
+        states,
+        ("p_ref",),
+        (output,),
+        tuple("1" for _ in states),
+        ("Pa",),
+        ("Pa",),
+        np.zeros(len(states)),
+        float(block.dt),
+    )
 
 
 def _companion(brake: Rational) -> tuple[Array, Array, Array]:
@@ -147,8 +163,16 @@ def _cascade(motor: LinearModel, brake: Rational, f_aa: float) -> LinearModel:
     C[0, :2], C[1, 2 : n + 2], C[2, n + 2] = motor.C[1], c[0], 1.0
     internal = tuple(f"g{k}" for k in range(n))
     return LinearModel(
-        brake.name, A, np.vstack([motor.B, np.zeros((n + 1, 1))]), C, np.zeros((3, 1)),
-        (*motor.states, *internal, "y_p"), motor.inputs, ("i_meas", "p", "p_meas"),
-        (*motor.state_units, *("1" for _ in internal), "Pa"), motor.input_units,
-        ("A", "Pa", "Pa"), np.zeros(n + 3),
-    )  # fmt: skip
+        brake.name,
+        A,
+        np.vstack([motor.B, np.zeros((n + 1, 1))]),
+        C,
+        np.zeros((3, 1)),
+        (*motor.states, *internal, "y_p"),
+        motor.inputs,
+        ("i_meas", "p", "p_meas"),
+        (*motor.state_units, *("1" for _ in internal), "Pa"),
+        motor.input_units,
+        ("A", "Pa", "Pa"),
+        np.zeros(n + 3),
+    )

@@ -94,18 +94,26 @@ def identify(
     figures: dict[str, tuple[float, str]] = {}
     checks: list[Check] = []
     for k, region in enumerate(regions):
-        estimate = fit(region, par, joint=options.fit == "joint", turns=round(options.turns),
-                    pair=options.model == "eq-22")  # fmt: skip
+        estimate = fit(
+            region,
+            par,
+            joint=options.fit == "joint",
+            turns=round(options.turns),
+            pair=options.model == "eq-22",
+        )
         estimates[region.name] = estimate
         figures |= _figures(region, estimate)
         checks += _checks(region, estimate)
         if effort.progress is not None:
             effort.progress("regions", (k + 1) / len(regions))
     return Identified(
-        estimates=estimates, parameters={}, figures=figures, checks=tuple(checks),
+        estimates=estimates,
+        parameters={},
+        figures=figures,
+        checks=tuple(checks),
         curves=curves_of(regions, estimates, par),
         notes=(*map(_described, regions), *_without_pair(estimates)),
-    )  # fmt: skip
+    )
 
 
 def _without_pair(estimates: Mapping[str, Estimate]) -> tuple[str, ...]:
@@ -162,18 +170,29 @@ def _checks(region: Region, estimate: Estimate) -> list[Check]:
     error = float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
     change = max(float(np.ptp(step.pressure)) for step in region.steps)
     checks = [
-        Check(f"{name}.misfit_step", error / change, limit=_MISFIT_STEP,
-              note="step: rms of computed less measured over the change"),
-        Check(f"{name}.step_residual_over_noise", float(np.sqrt(np.mean(noise**2))),
-              note="about 1 where nothing but noise is left"),
-    ]  # fmt: skip
+        Check(
+            f"{name}.misfit_step",
+            error / change,
+            limit=_MISFIT_STEP,
+            note="step: rms of computed less measured over the change",
+        ),
+        Check(
+            f"{name}.step_residual_over_noise",
+            float(np.sqrt(np.mean(noise**2))),
+            note="about 1 where nothing but noise is left",
+        ),
+    ]
     if region.points.frequencies.size:
         e, _ = over_frequency(region, whole).evaluate(values)
         size = e * np.repeat(region.points.deviation, 2)
         checks.append(
-            Check(f"{name}.misfit_sines", float(np.sqrt(np.mean(size**2))), limit=_MISFIT_SINES,
-                  note="sines: rms of relative magnitude and phase [rad], computed less measured")
-        )  # fmt: skip
+            Check(
+                f"{name}.misfit_sines",
+                float(np.sqrt(np.mean(size**2))),
+                limit=_MISFIT_SINES,
+                note="sines: rms of relative magnitude and phase [rad], computed less measured",
+            )
+        )
     return checks
 
 
@@ -185,8 +204,7 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
     if options.plant == "brake":
         return joined(of_brake(par, pressures, changes, *noise))
     models = {
-        name: (p, eq22_of(par, p, options.f_zero, options.f_pole))
-        for name, p in pressures.items()
+        name: (p, eq22_of(par, p, options.f_zero, options.f_pole)) for name, p in pressures.items()
     }
     return joined(of_eq22(models, par, changes, *noise))
 
@@ -221,22 +239,44 @@ METHOD = Method(
     signals={"i": "A", "p_mc": "Pa"},
     options=Options,
     defaults=Options(
-        p_1=10e5, p_2=35e5, model="eq-22", fit="joint", turns=20, plant="brake", p_low=5e5,
-        p_medium=25e5, p_high=37e5, i_step=0.35, amplitude=0.1, f_zero=0.096, f_pole=0.104,
-        sigma_p=2e3, sigma_i=5e-3,
+        p_1=10e5,
+        p_2=35e5,
+        model="eq-22",
+        fit="joint",
+        turns=20,
+        plant="brake",
+        p_low=5e5,
+        p_medium=25e5,
+        p_high=37e5,
+        i_step=0.35,
+        amplitude=0.1,
+        f_zero=0.096,
+        f_pole=0.104,
+        sigma_p=2e3,
+        sigma_i=5e-3,
     ),
     identify=identify,
     synthetic=synthetic,
     several=True,
     simulated=(
-        "plant", "p_low", "p_medium", "p_high", "i_step", "amplitude", "f_zero", "f_pole",
-        "sigma_p", "sigma_i",
+        "plant",
+        "p_low",
+        "p_medium",
+        "p_high",
+        "i_step",
+        "amplitude",
+        "f_zero",
+        "f_pole",
+        "sigma_p",
+        "sigma_i",
     ),
     truth=truth,
     further={
         "K": ("Pa/A", "gain from current to pressure, in each region"),
-        "tau_L": ("s", "zero of the slow pair"), "T_L": ("s", "pole of the slow pair"),
-        "T1": ("s", "slower pole of the drive"), "T2": ("s", "faster pole of the drive"),
+        "tau_L": ("s", "zero of the slow pair"),
+        "T_L": ("s", "pole of the slow pair"),
+        "T1": ("s", "slower pole of the drive"),
+        "T2": ("s", "faster pole of the drive"),
         "p_rest": ("Pa", "pressure before a step, for each step"),
     },
-)  # fmt: skip
+)

@@ -79,9 +79,7 @@ def identify(
     return identified_loop(trials, par, options.names(_GAINS, _WINDING))
 
 
-def _trial(
-    data: xr.Dataset, par: MotorcycleParameters, options: Options, label: str
-) -> Trial:
+def _trial(data: xr.Dataset, par: MotorcycleParameters, options: Options, label: str) -> Trial:
     require_steps(data, "i_set", "i", label)
     loop_par = par.replace(
         {"drive.mode": "current-direct", "adc.law": "ideal", "seal.T_pr": options.T_hold}
@@ -89,10 +87,15 @@ def _trial(
     i = data["i"].values
     sigma = noise_of_levels(i, data["i_set"].values)
     beside = trial(
-        MotorcycleBrake(), loop_par, data.assign(i_meas=("time", i)), {"i_set": "i_set"},
-        {"i_meas": sigma}, state=state_at(0.0, loop_par), memory=memory_at(0.0, loop_par),
+        MotorcycleBrake(),
+        loop_par,
+        data.assign(i_meas=("time", i)),
+        {"i_set": "i_set"},
+        {"i_meas": sigma},
+        state=state_at(0.0, loop_par),
+        memory=memory_at(0.0, loop_par),
         label=label,
-    )  # fmt: skip
+    )
     return without_lead(beside, data, options.lead)
 
 
@@ -106,15 +109,22 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
         hold - options.i_low, hold + options.i_high, options.duration, options.dwell, T, seed=1
     )
     case = case_from_rest(
-        "run", noisy_par, "current-direct", options.p_start, lambda t: {"i_set": demand(t)},
-        options.duration, record=T,
-    )  # fmt: skip
+        "run",
+        noisy_par,
+        "current-direct",
+        options.p_start,
+        lambda t: {"i_set": demand(t)},
+        options.duration,
+        record=T,
+    )
     computed = simulate(as_run(case, 20e-6, seed=(seed,)), ("i_meas",))
     return xr.Dataset(
-        {"i_set": ("time", demand(computed.time), {"units": "A", "long_name": "current demand"}),
-         "i": ("time", computed["i_meas"], {"units": "A", "long_name": "measured current"})},
+        {
+            "i_set": ("time", demand(computed.time), {"units": "A", "long_name": "current demand"}),
+            "i": ("time", computed["i_meas"], {"units": "A", "long_name": "measured current"}),
+        },
         {"time": ("time", np.asarray(computed.time), {"units": "s", "long_name": "time"})},
-    )  # fmt: skip
+    )
 
 
 METHOD = Method(
@@ -125,12 +135,19 @@ METHOD = Method(
     signals={"i_set": "A", "i": "A"},
     options=Options,
     defaults=Options(
-        unknowns="gains", lead=0.1, T_hold=10.0, p_start=20e5, i_low=0.7, i_high=2.0, dwell=0.02,
-        duration=2.0, sigma_i=1e-2,
+        unknowns="gains",
+        lead=0.1,
+        T_hold=10.0,
+        p_start=20e5,
+        i_low=0.7,
+        i_high=2.0,
+        dwell=0.02,
+        duration=2.0,
+        sigma_i=1e-2,
     ),
     identify=identify,
     synthetic=synthetic,
     unknowns=_GAINS,
     several=True,
     simulated=("p_start", "i_low", "i_high", "dwell", "duration", "sigma_i"),
-)  # fmt: skip
+)

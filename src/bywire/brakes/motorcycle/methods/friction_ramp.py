@@ -108,24 +108,41 @@ def identify(
         estimates={"seal friction": best},
         parameters=values,
         checks=(
-            Check("residual_over_noise", best.rms, limit=_LIMIT_RESIDUAL,
-                  note="aligned slips: residual over the sensor's noise"),
-            Check("replay_nrmse", nrmse, limit=_LIMIT_REPLAY,
-                  note="whole ramp, computed less measured, over the range"),
-            Check("zero_over_usual", abs(zero) / options.zero, limit=_LIMIT_ZERO,
-                  note="reading of the current's sensor without current, over its usual size: more "
-                  "may also be the zero of the pressure's sensor, a unit, or the torque constant"),
+            Check(
+                "residual_over_noise",
+                best.rms,
+                limit=_LIMIT_RESIDUAL,
+                note="aligned slips: residual over the sensor's noise",
+            ),
+            Check(
+                "replay_nrmse",
+                nrmse,
+                limit=_LIMIT_REPLAY,
+                note="whole ramp, computed less measured, over the range",
+            ),
+            Check(
+                "zero_over_usual",
+                abs(zero) / options.zero,
+                limit=_LIMIT_ZERO,
+                note="reading of the current's sensor without current, over its usual size: more "
+                "may also be the zero of the pressure's sensor, a unit, or the torque constant",
+            ),
             Check("starts_at_minimum", led.reached / effort.starts),
         ),
         curves=(
-            Curve("ramp", "Pressure on the ramp: measured, and modeled with the estimates.",
-                  whole, "time"),
+            Curve(
+                "ramp",
+                "Pressure on the ramp: measured, and modeled with the estimates.",
+                whole,
+                "time",
+            ),
             _stribeck(identified_par, best),
         ),
         notes=(
-            _counted(shots), f"{led.reached} of {effort.starts} starts reached the minimum",
+            _counted(shots),
+            f"{led.reached} of {effort.starts} starts reached the minimum",
         ),
-    )  # fmt: skip
+    )
 
 
 def _fitted(
@@ -142,9 +159,14 @@ def _fitted(
         for length in (_BEGINNING, _QUICK_LENGTH)
     )
     led = search(
-        longer, scattered(unknowns, effort.starts, effort.spread, effort.seed), "linear",
-        effort.progress, effort.store, effort.threads, partial(nearer, beginning, _HARDLY_TOLD),
-    )  # fmt: skip
+        longer,
+        scattered(unknowns, effort.starts, effort.spread, effort.seed),
+        "linear",
+        effort.progress,
+        effort.store,
+        effort.threads,
+        partial(nearer, beginning, _HARDLY_TOLD),
+    )
     at = led.best.values
     best = estimate(_problem(data, par, options, unknowns, at), start=at)
     if not any(name.startswith("seal.") for name in best.names):
@@ -228,10 +250,12 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
     noise = random.normal(0.0, options.sigma_p, computed.time.size)
     noise_i = random.normal(random.normal(0.0, options.zero), options.sigma_i, computed.time.size)
     return xr.Dataset(
-        {"i": ("time", computed["i"] + noise_i, {"units": "A"}),
-         "p_mc": ("time", computed["p_mc"] + noise, {"units": "Pa"})},
+        {
+            "i": ("time", computed["i"] + noise_i, {"units": "A"}),
+            "p_mc": ("time", computed["p_mc"] + noise, {"units": "Pa"}),
+        },
         {"time": ("time", computed.time, {"units": "s"})},
-    )  # fmt: skip
+    )
 
 
 METHOD = Method(
@@ -242,8 +266,14 @@ METHOD = Method(
     signals={"i": "A", "p_mc": "Pa"},
     options=Options,
     defaults=Options(
-        least=0.2e5, longest=6.0, scatter=5e-4, zero=2e-3, ripple=1e-2, sigma_p=2e3,
-        sigma_i=3e-3, step=20e-6,
+        least=0.2e5,
+        longest=6.0,
+        scatter=5e-4,
+        zero=2e-3,
+        ripple=1e-2,
+        sigma_p=2e3,
+        sigma_i=3e-3,
+        step=20e-6,
     ),
     identify=identify,
     synthetic=synthetic,

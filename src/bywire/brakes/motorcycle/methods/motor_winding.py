@@ -91,14 +91,18 @@ def identify(
     turning = any(float(np.ptp(record["omega"].values)) > _TURNS for record in records.values())
     unknowns = parameters_of(par, _NAMES if turning else _NAMES[:2])
     fit = estimate(output_error(trials, unknowns))
-    notes = () if turning else (
-        "the shaft does not turn: nothing tells K_e; let it turn, and measure its speed",
-    )  # fmt: skip
+    notes = (
+        ()
+        if turning
+        else ("the shaft does not turn: nothing tells K_e; let it turn, and measure its speed",)
+    )
     return Identified(
-        estimates={"winding": fit}, parameters=believable(fit),
-        checks=checks_of(trials, fit), curves=tuple(as_curve(t, fit) for t in trials),
+        estimates={"winding": fit},
+        parameters=believable(fit),
+        checks=checks_of(trials, fit),
+        curves=tuple(as_curve(t, fit) for t in trials),
         notes=notes,
-    )  # fmt: skip
+    )
 
 
 def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Dataset:
@@ -113,19 +117,29 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
         low, high = R * (hold - options.i_low), R * (hold + options.i_high)
     v = levels(low, high, options.duration, options.dwell, options.interval, seed=1)
     case = case_from_rest(
-        "run", source_par, "voltage-source", p, lambda t: {"v_set": v(t)}, options.duration,
+        "run",
+        source_par,
+        "voltage-source",
+        p,
+        lambda t: {"v_set": v(t)},
+        options.duration,
         record=options.interval,
-    )  # fmt: skip
+    )
     computed = simulate(as_run(case, _STEP), ("i_meas", "omega"))
     n = computed.time.size
     omega = computed["omega"] + (0.0 if stuck else random.normal(0.0, options.sigma_omega, n))
     return xr.Dataset(
-        {"v": ("time", v(computed.time), {"units": "V", "long_name": "motor voltage"}),
-         "omega": ("time", omega, {"units": "rad/s", "long_name": "motor speed"}),
-         "i": ("time", computed["i_meas"] + random.normal(0.0, options.sigma_i, n),
-               {"units": "A", "long_name": "measured current"})},
+        {
+            "v": ("time", v(computed.time), {"units": "V", "long_name": "motor voltage"}),
+            "omega": ("time", omega, {"units": "rad/s", "long_name": "motor speed"}),
+            "i": (
+                "time",
+                computed["i_meas"] + random.normal(0.0, options.sigma_i, n),
+                {"units": "A", "long_name": "measured current"},
+            ),
+        },
         {"time": ("time", computed.time, {"units": "s", "long_name": "time"})},
-    )  # fmt: skip
+    )
 
 
 METHOD = Method(
@@ -136,8 +150,16 @@ METHOD = Method(
     signals={"v": "V", "omega": "rad/s", "i": "A"},
     options=Options,
     defaults=Options(
-        rotor="stuck", p_start=20e5, i_low=0.7, i_high=2.0, v_high=3.0, dwell=5e-3, duration=0.5,
-        interval=1e-4, sigma_i=1e-2, sigma_omega=0.05,
+        rotor="stuck",
+        p_start=20e5,
+        i_low=0.7,
+        i_high=2.0,
+        v_high=3.0,
+        dwell=5e-3,
+        duration=0.5,
+        interval=1e-4,
+        sigma_i=1e-2,
+        sigma_omega=0.05,
     ),
     identify=identify,
     synthetic=synthetic,
@@ -146,4 +168,4 @@ METHOD = Method(
     simulated=tuple(Options.model_fields),
     bench_note="the record was made with a voltage source, its rotor locked or at a speed of its "
     "own; the bench's shaft is free, and does not replay it: take over the values alone",
-)  # fmt: skip
+)

@@ -17,34 +17,40 @@ def causes(items: Iterable[Item]) -> tuple[RootCause, ...]:
 def _tables(q: Quoted) -> RootCause:
     t1 = [q(f"table2.{key}@table1") for key in ("K", "zero", "pole1", "pole2")]
     t2 = [q.stated(f"table2.{key}") for key in ("K", "zero", "pole1", "pole2")]
-    return RootCause("Tables 1 and 2 contradict each other: Table 1 in eq. (15) gives a gain of "
-                     f"{t1[0]}, a zero of {t1[1]} and slow poles of {t1[2]} and {t1[3]}, where "
-                     f"Table 2 prints {t2[0]}, {t2[1]}, {t2[2]} and {t2[3]}; the calibrated set "
-                     f"changes five values, such as A_mc from {q.stated('calibrated.A_mc')} to "
-                     f"{q('calibrated.A_mc')}; with Table 1's light rotor, free to move, the "
-                     f"current loop's bandwidth falls from {q.stated('fig3.bandwidth.free')} to "
-                     f"{q('fig3.bandwidth.free@table1')}.",
-                     ("table2.*@table1", "fig3.bandwidth.free@table1"))  # fmt: skip
+    return RootCause(
+        "Tables 1 and 2 contradict each other: Table 1 in eq. (15) gives a gain of "
+        f"{t1[0]}, a zero of {t1[1]} and slow poles of {t1[2]} and {t1[3]}, where "
+        f"Table 2 prints {t2[0]}, {t2[1]}, {t2[2]} and {t2[3]}; the calibrated set "
+        f"changes five values, such as A_mc from {q.stated('calibrated.A_mc')} to "
+        f"{q('calibrated.A_mc')}; with Table 1's light rotor, free to move, the "
+        f"current loop's bandwidth falls from {q.stated('fig3.bandwidth.free')} to "
+        f"{q('fig3.bandwidth.free@table1')}.",
+        ("table2.*@table1", "fig3.bandwidth.free@table1"),
+    )
 
 
 def _gear(q: Quoted) -> RootCause:
     paper, ours = "gear.returned.paper", "gear.returned.directional"
-    return RootCause("Eq. (8) lets the gear give energy where the load drives it: a slow release "
-                     f"from 37 bar returns {q(paper)} of {q.stated(paper)} stored "
-                     f"({q.share(paper)}; with Table 1 {q.share(f'{paper}@table1')}), where a loss "
-                     f"that depends on direction returns {q(ours)} ({q.share(ours)}).",
-                     ("gear.returned.paper*",))  # fmt: skip
+    return RootCause(
+        "Eq. (8) lets the gear give energy where the load drives it: a slow release "
+        f"from 37 bar returns {q(paper)} of {q.stated(paper)} stored "
+        f"({q.share(paper)}; with Table 1 {q.share(f'{paper}@table1')}), where a loss "
+        f"that depends on direction returns {q(ours)} ({q.share(ours)}).",
+        ("gear.returned.paper*",),
+    )
 
 
 def _gain(q: Quoted) -> RootCause:
     low, high = q("table4.low.K"), q("table4.high.K")
-    return RootCause("Table 3's friction under eq. (20)'s dither does not leave Table 4's gain, "
-                     f"because f_cfr,p exceeds f_cfr,n: {low} at low and {high} at high pressure "
-                     f"({q('table4.medium.K@table1')} with Table 1) instead of "
-                     f"{q.stated('table4.low.K')} and {q.stated('table4.high.K')}; Table 4's gain "
-                     f"would take Fig. 5's ramp to {q('table4.medium.p_ramp')}, where its axis "
-                     f"ends at {q.stated('table4.medium.p_ramp')}.",
-                     ("table4.*.K", "table4.*.K@table1"))  # fmt: skip
+    return RootCause(
+        "Table 3's friction under eq. (20)'s dither does not leave Table 4's gain, "
+        f"because f_cfr,p exceeds f_cfr,n: {low} at low and {high} at high pressure "
+        f"({q('table4.medium.K@table1')} with Table 1) instead of "
+        f"{q.stated('table4.low.K')} and {q.stated('table4.high.K')}; Table 4's gain "
+        f"would take Fig. 5's ramp to {q('table4.medium.p_ramp')}, where its axis "
+        f"ends at {q.stated('table4.medium.p_ramp')}.",
+        ("table4.*.K", "table4.*.K@table1"),
+    )
 
 
 def _bandwidth(q: Quoted) -> RootCause:
@@ -70,23 +76,26 @@ def _bandwidth(q: Quoted) -> RootCause:
 
 def _slow_pair(q: Quoted) -> RootCause:
     zero, pole = q.stated("table4.medium.zero"), q.stated("table4.medium.T_L")
-    return RootCause(f"Table 4 has the zero of its slow pair below the pole ({zero} and {pole} at "
-                     f"medium pressure), so that its step overshoots by {q.stated('table4.air')} "
-                     "and falls, which the paper puts down to air; 1 ml of air gives "
-                     f"{q('table4.air')}. On our brake, without air, the paper's two steps give "
-                     f"{q('table4.medium.identified.zero')} and "
-                     f"{q('table4.medium.identified.T_L')}.",
-                     ("table4.air", "table4.*.identified.zero", "table4.*.identified.T_L"
-    ))  # fmt: skip
+    return RootCause(
+        f"Table 4 has the zero of its slow pair below the pole ({zero} and {pole} at "
+        f"medium pressure), so that its step overshoots by {q.stated('table4.air')} "
+        "and falls, which the paper puts down to air; 1 ml of air gives "
+        f"{q('table4.air')}. On our brake, without air, the paper's two steps give "
+        f"{q('table4.medium.identified.zero')} and "
+        f"{q('table4.medium.identified.T_L')}.",
+        ("table4.air", "table4.*.identified.zero", "table4.*.identified.T_L"),
+    )
 
 
 def _hysteresis(q: Quoted) -> RootCause:
     ratio, slow = "fig5.loop_area_ratio", "fig5.loop_area_ratio.slow"
-    return RootCause("The hysteresis that is left under dither, where the paper says 'totally "
-                     f"removed', is mostly delay: {q(ratio)} of the loop's area without dither "
-                     f"({q(f'{ratio}@table1')} with Table 1), but {q(slow)} "
-                     f"({q(f'{slow}@table1')}) on a ramp ten times slower.",
-                     ("fig5.loop_area_ratio*", "fig5.removed_above*"))  # fmt: skip
+    return RootCause(
+        "The hysteresis that is left under dither, where the paper says 'totally "
+        f"removed', is mostly delay: {q(ratio)} of the loop's area without dither "
+        f"({q(f'{ratio}@table1')} with Table 1), but {q(slow)} "
+        f"({q(f'{slow}@table1')}) on a ramp ten times slower.",
+        ("fig5.loop_area_ratio*", "fig5.removed_above*"),
+    )
 
 
 def _single(q: Quoted) -> RootCause:

@@ -48,7 +48,9 @@ SOURCE = Source(
     summary="electro-mechanical brake-by-wire actuator for a sport motorbike, IFAC 2010",
     reproduce=lambda progress: reproduced(
         Reproduction(MAIN, CITATION, allowances=ALLOWANCES, sets=NAMES),
-        Runs(progress), PARTS, causes,
+        Runs(progress),
+        PARTS,
+        causes,
     ),
-)  # fmt: skip
+)
 reproduce = SOURCE.reproduce

@@ -23,8 +23,11 @@ from bywire.reproduction.root_cause import Quoted, RootCause, causes_of
 NAME = "dardanelli2010-measured"
 SETS = {NAME: "", MAIN: "@calibrated", PRINTED: "@table1"}
 """parameter sets, with what follows an item's id"""
-TITLES = {"": "Estimated from these statements", "calibrated": "Calibrated to Table 2",
-          "table1": "Table 1 as printed"}  # fmt: skip
+TITLES = {
+    "": "Estimated from these statements",
+    "calibrated": "Calibrated to Table 2",
+    "table1": "Table 1 as printed",
+}
 
 Values = dict[str, Mapping[str, float]]
 _SMALL = 0.05  # A: a seventh of Fig. 6's step
@@ -50,8 +53,12 @@ def statements(runs: Runs) -> Part:
         "one that is not met contradicts the others, or what the model's structure can do. The "
         "converter counts as ideal here."
     )
-    return Part("What was measured", text, tuple(items),
-                tables={"Residuals in tolerances": _side_by_side(values)})  # fmt: skip
+    return Part(
+        "What was measured",
+        text,
+        tuple(items),
+        tables={"Residuals in tolerances": _side_by_side(values)},
+    )
 
 
 def _item(s: Statement, name: str, value: float) -> Item:
@@ -59,9 +66,18 @@ def _item(s: Statement, name: str, value: float) -> Item:
     r = s.residual(value)
     met = abs(r) <= 1.0
     fitted = name == NAME and met
-    return compared(f"{s.name}{SETS[name]}", s.fact, value, s.tolerance,
-                    f"{s.note}; residual {r:.2g} tolerances", tuned="calibrated" if fitted else
-                    "an input" if s.name.startswith("table3.") and met else "")  # fmt: skip
+    return compared(
+        f"{s.name}{SETS[name]}",
+        s.fact,
+        value,
+        s.tolerance,
+        f"{s.note}; residual {r:.2g} tolerances",
+        tuned="calibrated"
+        if fitted
+        else "an input"
+        if s.name.startswith("table3.") and met
+        else "",
+    )
 
 
 def _side_by_side(values: Values) -> Table:
@@ -72,10 +88,19 @@ def _side_by_side(values: Values) -> Table:
         unit, r = s.fact.unit, s.residual(values[NAME][s.name])
         shown = (s.fact.value, s.tolerance, values[MAIN][s.name], values[NAME][s.name])
         verdict = Cell("explained", "good") if abs(r) <= 1.0 else Cell("unexplained", "bad")
-        rows.append((Cell(s.name), *(Cell(amount(v, unit), value=v) for v in shown),
-                     Cell(f"{r:.2f}", value=r), verdict))  # fmt: skip
-    columns = (Column("statement"), *(Column(name, numeric=True) for name in numeric),
-               Column("verdict"))  # fmt: skip
+        rows.append(
+            (
+                Cell(s.name),
+                *(Cell(amount(v, unit), value=v) for v in shown),
+                Cell(f"{r:.2f}", value=r),
+                verdict,
+            )
+        )
+    columns = (
+        Column("statement"),
+        *(Column(name, numeric=True) for name in numeric),
+        Column("verdict"),
+    )
     return Table(columns, tuple(rows))
 
 
@@ -86,11 +111,15 @@ def estimates(runs: Runs) -> Part:
     ends = dict(zip(names, best.estimate.intervals().tolist(), strict=True))
     prior = parameters(PRIOR).leaves()
     items = [
-        found(f"estimated.{u.name}", u.unit, best.estimate[u.name],
-              f"95 % interval {ends[u.name][0]:.3g} to {ends[u.name][1]:.3g}; Table 1's set has "
-              f"{prior[u.name]:.3g}; told by {' and '.join(best.tellers(u.name))}")
+        found(
+            f"estimated.{u.name}",
+            u.unit,
+            best.estimate[u.name],
+            f"95 % interval {ends[u.name][0]:.3g} to {ends[u.name][1]:.3g}; Table 1's set has "
+            f"{prior[u.name]:.3g}; told by {' and '.join(best.tellers(u.name))}",
+        )
         for u in best.estimate.unknowns
-    ]  # fmt: skip
+    ]
     kept = [k.unknown.name for k in best.estimate.kept]
     text = (
         "The intervals take what is left for chance, although it is mostly contradiction: they "
@@ -104,8 +133,10 @@ def estimates(runs: Runs) -> Part:
         "Estimated": _estimated(best, ends, prior),
         "Not told": _not_told(best.estimate.kept),
     }
-    appendix = {"Free parameters: bounds": _bounds(),
-                "What goes together": text_table(("note",), [(n,) for n in more])}  # fmt: skip
+    appendix = {
+        "Free parameters: bounds": _bounds(),
+        "What goes together": text_table(("note",), [(n,) for n in more]),
+    }
     return Part("The estimate", text, tuple(items), tables=tables, appendix=appendix)
 
 
@@ -114,11 +145,16 @@ def _estimated(
 ) -> Table:
     doubts = best.estimate.vague()
     rows = [
-        (u.name, amount(prior[u.name], u.unit), amount(best.estimate[u.name], u.unit),
-         f"{amount(ends[u.name][0], u.unit, 3)} to {amount(ends[u.name][1], u.unit, 3)}",
-         ", ".join(best.tellers(u.name)), doubts.get(u.name, ""))
+        (
+            u.name,
+            amount(prior[u.name], u.unit),
+            amount(best.estimate[u.name], u.unit),
+            f"{amount(ends[u.name][0], u.unit, 3)} to {amount(ends[u.name][1], u.unit, 3)}",
+            ", ".join(best.tellers(u.name)),
+            doubts.get(u.name, ""),
+        )
         for u in best.estimate.unknowns
-    ]  # fmt: skip
+    ]
     heading = ("parameter", "Table 1's set", "estimate", "95 % interval", "told by", "doubt")
     return text_table(heading, rows)
 
@@ -130,8 +166,10 @@ def _not_told(kept: tuple[Kept, ...]) -> Table:
 
 
 def _bounds() -> Table:
-    return text_table(("parameter", "from", "to", "reason"),
-                      [(name, f"{f.low:g}", f"{f.high:g}", f.reason) for name, f in FREE.items()])
+    return text_table(
+        ("parameter", "from", "to", "reason"),
+        [(name, f"{f.low:g}", f"{f.high:g}", f.reason) for name, f in FREE.items()],
+    )
 
 
 def beyond(runs: Runs) -> Part:
@@ -146,11 +184,16 @@ def beyond(runs: Runs) -> Part:
     items = (
         found("step.small.overshoot", "bar", small, f"{of}; {_SMALL:g} A"),
         found("step.overshoot", "bar", paper, f"{of}; {height:g} A as in Fig. 6"),
-        found("step.overshoot_by_table3", "bar", without,
-              f"{of}; {height:g} A with k_brk_p = {printed:g} as printed"),
-        found("ramp.p_max_without_dither", "bar", stuck_at(par),
-              "highest pressure of the ramp (17)"),
-    )  # fmt: skip
+        found(
+            "step.overshoot_by_table3",
+            "bar",
+            without,
+            f"{of}; {height:g} A with k_brk_p = {printed:g} as printed",
+        ),
+        found(
+            "ramp.p_max_without_dither", "bar", stuck_at(par), "highest pressure of the ramp (17)"
+        ),
+    )
     text = (
         "A slow pair overshoots by a share of the step. This brake's steps overshoot by nearly the "
         "same pressure whatever their height, and hardly with k_brk_p as printed, by which the ECU "
@@ -161,58 +204,75 @@ def beyond(runs: Runs) -> Part:
 
 def _fast_pole(q: Quoted) -> RootCause:
     one, other, slow = "table4.medium.T2", "table4.high.T2", "table4.medium.T1"
-    return RootCause("Eq. (20)'s dither turns Table 3's friction into so much damping that the two "
-                     f"poles lie apart: T2 is {q(one)} instead of {q.stated(one)} at medium and "
-                     f"{q(other)} instead of {q.stated(other)} at high pressure. Where more dither "
-                     "takes damping away, T2 comes nearer and T1 goes away: it is "
-                     f"{q(slow)} instead of {q.stated(slow)} at medium pressure.",
-                     ("table4.*.T2*", "table4.medium.T1", "table4.high.T1"))  # fmt: skip
+    return RootCause(
+        "Eq. (20)'s dither turns Table 3's friction into so much damping that the two "
+        f"poles lie apart: T2 is {q(one)} instead of {q.stated(one)} at medium and "
+        f"{q(other)} instead of {q.stated(other)} at high pressure. Where more dither "
+        "takes damping away, T2 comes nearer and T1 goes away: it is "
+        f"{q(slow)} instead of {q.stated(slow)} at medium pressure.",
+        ("table4.*.T2*", "table4.medium.T1", "table4.high.T1"),
+    )
 
 
 def _slow_pair(q: Quoted) -> RootCause:
     name = "table4.low.overshoot"
-    return RootCause("Nothing in eqs. (13) has a slow zero below its pole: the step overshoots by "
-                     f"{q(name)} instead of {q.stated(name)} at low pressure, and what it has of "
-                     "it at medium and high pressure is no slow pair: "
-                     f"{q('step.small.overshoot')} of a step of {_SMALL:g} A from 25 bar, and "
-                     f"{q('step.overshoot')} of one seven times as high.",
-                     ("table4.*.overshoot*",))  # fmt: skip
+    return RootCause(
+        "Nothing in eqs. (13) has a slow zero below its pole: the step overshoots by "
+        f"{q(name)} instead of {q.stated(name)} at low pressure, and what it has of "
+        "it at medium and high pressure is no slow pair: "
+        f"{q('step.small.overshoot')} of a step of {_SMALL:g} A from 25 bar, and "
+        f"{q('step.overshoot')} of one seven times as high.",
+        ("table4.*.overshoot*",),
+    )
 
 
 def _break_away(q: Quoted) -> RootCause:
     name = "table3.k_brk_p"
-    return RootCause("Overshoot and Table 3 contradict each other: the ECU dithers in proportion "
-                     f"to k_brk_p, {q(name)} instead of {q.stated(name)}, which takes damping "
-                     "away; with Table 3's the step of Fig. 6 overshoots by "
-                     f"{q('step.overshoot_by_table3')} instead of {q('step.overshoot')}.",
-                     (name,))  # fmt: skip
+    return RootCause(
+        "Overshoot and Table 3 contradict each other: the ECU dithers in proportion "
+        f"to k_brk_p, {q(name)} instead of {q.stated(name)}, which takes damping "
+        "away; with Table 3's the step of Fig. 6 overshoots by "
+        f"{q('step.overshoot_by_table3')} instead of {q('step.overshoot')}.",
+        (name,),
+    )
 
 
 def _braking(q: Quoted) -> RootCause:
-    return RootCause("Nothing but dithered friction damps this piston, k_damp being nothing, so "
-                     f"that hard braking reaches {q('fig7.peak')} where Fig. 7a's axis leaves "
-                     f"{q.stated('fig7.peak')} within half a label; more damping would take the "
-                     "overshoot of the steps away.", ("fig7.peak",))  # fmt: skip
+    return RootCause(
+        "Nothing but dithered friction damps this piston, k_damp being nothing, so "
+        f"that hard braking reaches {q('fig7.peak')} where Fig. 7a's axis leaves "
+        f"{q.stated('fig7.peak')} within half a label; more damping would take the "
+        "overshoot of the steps away.",
+        ("fig7.peak",),
+    )
 
 
 def _ramp(q: Quoted) -> RootCause:
-    return RootCause("Table 4's gain contradicts Fig. 5: with it the ramp to 5 A ends at "
-                     f"{q('fig5.p_max')}, where the figure's axis leaves {q.stated('fig5.p_max')} "
-                     "within half a label.", ("fig5.p_max*",))  # fmt: skip
+    return RootCause(
+        "Table 4's gain contradicts Fig. 5: with it the ramp to 5 A ends at "
+        f"{q('fig5.p_max')}, where the figure's axis leaves {q.stated('fig5.p_max')} "
+        "within half a label.",
+        ("fig5.p_max*",),
+    )
 
 
 def _ripple(q: Quoted) -> RootCause:
-    return RootCause("Eq. (20)'s dither is larger than what Fig. 5 has room for: behind the 20 Hz "
-                     f"low-pass the measured current reaches {q('fig5.i_max')} instead of "
-                     f"{q.stated('fig5.i_max')}.", ("fig5.i_max*",))  # fmt: skip
+    return RootCause(
+        "Eq. (20)'s dither is larger than what Fig. 5 has room for: behind the 20 Hz "
+        f"low-pass the measured current reaches {q('fig5.i_max')} instead of "
+        f"{q.stated('fig5.i_max')}.",
+        ("fig5.i_max*",),
+    )
 
 
 def _stuck(q: Quoted) -> RootCause:
-    return RootCause("The loop that dither leaves is delay of the dithered brake on the ramp, and "
-                     f"friction bends its ends: {q('fig5.loop_area_ratio')} of that without, "
-                     "where the piston jumps, then sticks at "
-                     f"{q('ramp.p_max_without_dither')} and draws a small loop.",
-                     ("fig5.loop_area_ratio*",))  # fmt: skip
+    return RootCause(
+        "The loop that dither leaves is delay of the dithered brake on the ramp, and "
+        f"friction bends its ends: {q('fig5.loop_area_ratio')} of that without, "
+        "where the piston jumps, then sticks at "
+        f"{q('ramp.p_max_without_dither')} and draws a small loop.",
+        ("fig5.loop_area_ratio*",),
+    )
 
 
 SOURCE = Source(
@@ -220,10 +280,11 @@ SOURCE = Source(
     summary="the same brake as measured: all parameters from Table 4, Figs. 5 to 7 and Table 3",
     reproduce=lambda progress: reproduced(
         Reproduction(NAME, CITATION, allowances=allowances(), sets=TITLES),
-        Runs(progress), {"statements": statements, "estimate": estimates, "beyond": beyond},
+        Runs(progress),
+        {"statements": statements, "estimate": estimates, "beyond": beyond},
         lambda items: causes_of(
             items, _fast_pole, _slow_pair, _break_away, _ramp, _ripple, _stuck, _braking
         ),
     ),
-)  # fmt: skip
+)
 reproduce = SOURCE.reproduce

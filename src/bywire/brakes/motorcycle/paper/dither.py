@@ -59,16 +59,22 @@ def _items(runs: Runs, waveform: str) -> list[Item]:
         found(f"{prefix}.thd", "%", sent, "harmonic distortion of the dither as sampled"),
         found(f"{prefix}.thd.motor", "%", got, "harmonic distortion of the motor current"),
         found(
-            f"{prefix}.ripple", "bar", float(np.ptp(window["p_mc"].values)) / BAR,
+            f"{prefix}.ripple",
+            "bar",
+            float(np.ptp(window["p_mc"].values)) / BAR,
             "pressure, peak to peak, at rest at the current that holds 25 bar without friction",
         ),
         found(f"{prefix}.p_max", "bar", loops.p_max(WITH), "on the ramp of eq. (17)"),
         found(
-            f"{prefix}.loop_area_ratio", "%", loops.area_ratio,
+            f"{prefix}.loop_area_ratio",
+            "%",
+            loops.area_ratio,
             "area with dither over that without, on the ramp of eq. (17)",
         ),
         found(
-            f"{prefix}.share_stuck", "%", 100.0 * loops.values["share_stuck_dithered"],
+            f"{prefix}.share_stuck",
+            "%",
+            100.0 * loops.values["share_stuck_dithered"],
             "of the time, on the ramp of eq. (17)",
         ),
-    ]  # fmt: skip
+    ]

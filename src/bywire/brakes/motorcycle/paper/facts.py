@@ -18,23 +18,49 @@ def _table(where: str, rows: Mapping[str, tuple[float, str]]) -> dict[str, Fact]
     return {name: Fact(value, unit, where) for name, (value, unit) in rows.items()}
 
 
-TABLE1 = _table("Table 1", {
-    "beta": (1e9, "Pa"), "nu": (5e-4, "m**2/s"), "k_damp": (2e4, "N*s/m"),
-    "rho": (1e3, "kg/m**3"), "d_pl": (8.0, "mm"), "L_pl": (1.0, "m"), "A_mc": (120.0, "mm**2"),
-    "x_mc": (7.0, "mm"), "A_pd": (300.0, "mm**2"), "K_pd": (1e6, "N/m"), "k_g": (3e-4, "m/rad"),
-    "eta_g": (0.9, "1"), "J_mot": (1e-5, "kg*m**2"), "K_e": (30.4e-3, "Wb"),
-    "M_mc": (1e-2, "kg"),
-})  # fmt: skip
+TABLE1 = _table(
+    "Table 1",
+    {
+        "beta": (1e9, "Pa"),
+        "nu": (5e-4, "m**2/s"),
+        "k_damp": (2e4, "N*s/m"),
+        "rho": (1e3, "kg/m**3"),
+        "d_pl": (8.0, "mm"),
+        "L_pl": (1.0, "m"),
+        "A_mc": (120.0, "mm**2"),
+        "x_mc": (7.0, "mm"),
+        "A_pd": (300.0, "mm**2"),
+        "K_pd": (1e6, "N/m"),
+        "k_g": (3e-4, "m/rad"),
+        "eta_g": (0.9, "1"),
+        "J_mot": (1e-5, "kg*m**2"),
+        "K_e": (30.4e-3, "Wb"),
+        "M_mc": (1e-2, "kg"),
+    },
+)
 
-TABLE2 = _table("Table 2", {
-    "K": (10.1, "bar/A"), "zero": (160.0, "Hz"), "pole1": (0.866, "Hz"), "pole2": (9.75, "Hz"),
-    "pole3": (4.7e4, "Hz"),
-})  # fmt: skip
+TABLE2 = _table(
+    "Table 2",
+    {
+        "K": (10.1, "bar/A"),
+        "zero": (160.0, "Hz"),
+        "pole1": (0.866, "Hz"),
+        "pole2": (9.75, "Hz"),
+        "pole3": (4.7e4, "Hz"),
+    },
+)
 
-TABLE3 = _table("Table 3", {
-    "k_brk_p": (2.6, "1"), "f_cfr_p": (1.6e-8, "N*m/Pa"), "c": (5.0, "s/rad"),
-    "mu_T": (2e-7, "N*m*s/rad"), "f_cfr_n": (5.4e-9, "N*m/Pa"), "k_brk_n": (2.3, "1"),
-})  # fmt: skip
+TABLE3 = _table(
+    "Table 3",
+    {
+        "k_brk_p": (2.6, "1"),
+        "f_cfr_p": (1.6e-8, "N*m/Pa"),
+        "c": (5.0, "s/rad"),
+        "mu_T": (2e-7, "N*m*s/rad"),
+        "f_cfr_n": (5.4e-9, "N*m/Pa"),
+        "k_brk_n": (2.3, "1"),
+    },
+)
 
 _UNITS4 = {"K": "bar/A", "zero": "Hz", "T1": "Hz", "T2": "Hz", "T_L": "Hz"}
 TABLE4 = {

@@ -31,24 +31,46 @@ def part(runs: Runs) -> Part:
     step, locked = _step(runs, {}), _step(runs, LOCKED)
     tolerance = ROUND
     items = [
-        compared("fig3.bandwidth", facts.FIG3_BANDWIDTH, small_signal(MAIN, "locked", "i_meas"),
-                 tolerance, "-3 dB of the measured current behind the 180 Hz filter, small signal, "
-                 "rotor locked", tuned="calibrated"),
-        compared("fig3.bandwidth.motor_current", facts.FIG3_BANDWIDTH,
-                 small_signal(MAIN, "locked", "i"), tolerance,
-                 "the same gains, the motor current before the filter, rotor locked",
-                 tuned="calibrated"),
-        compared("fig3.bandwidth.free", facts.FIG3_BANDWIDTH, small_signal(MAIN, "free", "i_meas"),
-                 tolerance,
-                 "measured current, rotor free: the back-EMF of the moving shaft slows it"),
-        compared("fig3.bandwidth.free@table1", facts.FIG3_BANDWIDTH,
-                 small_signal(PRINTED, "free", "i_meas"), tolerance,
-                 "measured current, rotor free: Table 1's light rotor moves with the current"),
-        compared("fig3.peak", facts.FIG3_TOP, kpis(locked)["peak_current"], "<=",
-                 "motor current after the step of 0.73 A, rotor locked"),
+        compared(
+            "fig3.bandwidth",
+            facts.FIG3_BANDWIDTH,
+            small_signal(MAIN, "locked", "i_meas"),
+            tolerance,
+            "-3 dB of the measured current behind the 180 Hz filter, small signal, rotor locked",
+            tuned="calibrated",
+        ),
+        compared(
+            "fig3.bandwidth.motor_current",
+            facts.FIG3_BANDWIDTH,
+            small_signal(MAIN, "locked", "i"),
+            tolerance,
+            "the same gains, the motor current before the filter, rotor locked",
+            tuned="calibrated",
+        ),
+        compared(
+            "fig3.bandwidth.free",
+            facts.FIG3_BANDWIDTH,
+            small_signal(MAIN, "free", "i_meas"),
+            tolerance,
+            "measured current, rotor free: the back-EMF of the moving shaft slows it",
+        ),
+        compared(
+            "fig3.bandwidth.free@table1",
+            facts.FIG3_BANDWIDTH,
+            small_signal(PRINTED, "free", "i_meas"),
+            tolerance,
+            "measured current, rotor free: Table 1's light rotor moves with the current",
+        ),
+        compared(
+            "fig3.peak",
+            facts.FIG3_TOP,
+            kpis(locked)["peak_current"],
+            "<=",
+            "motor current after the step of 0.73 A, rotor locked",
+        ),
         *_step_items("fig3", step, "motor current; the piston breaks away and moves"),
         *_step_items("fig3.locked", locked, "motor current; rotor locked"),
-    ]  # fmt: skip
+    ]
     text = (
         "The paper identifies the motor and tunes a PI for 100 Hz; neither motor nor gains are "
         "printed. Ours were chosen so that the measured current of the locked rotor has 100 Hz at "
@@ -56,15 +78,24 @@ def part(runs: Runs) -> Part:
         "on which the paper's identification rests, holds only for a locked or heavy rotor."
     )
     exhibits = (
-        Exhibit("fig3", lambda: step_response(locked.recordings["run"], "i", "i_ref"),
-                "Fig. 3: current after a step of its set point to 0.73 A, rotor locked."),
-        Exhibit("fig3-free", lambda: step_response(step.recordings["run"], "i", "i_ref"),
-                "The same with the piston free to move from its rest position, calibrated set."),
-    )  # fmt: skip
+        Exhibit(
+            "fig3",
+            lambda: step_response(locked.recordings["run"], "i", "i_ref"),
+            "Fig. 3: current after a step of its set point to 0.73 A, rotor locked.",
+        ),
+        Exhibit(
+            "fig3-free",
+            lambda: step_response(step.recordings["run"], "i", "i_ref"),
+            "The same with the piston free to move from its rest position, calibrated set.",
+        ),
+    )
     return Part(
-        "Figure 3: current loop", text, tuple(items), exhibits,
+        "Figure 3: current loop",
+        text,
+        tuple(items),
+        exhibits,
         {"fig3-free": step.recordings["run"], "fig3-locked": locked.recordings["run"]},
-    )  # fmt: skip
+    )
 
 
 def small_signal(name: str, rotor: Rotor, output: str) -> float:

@@ -87,9 +87,14 @@ def part(runs: Runs) -> Part:
             found(f"fig5.loop_area_ratio.zeta{zeta:g}", "%", other.area_ratio, note),
         ]
     ideal = Loops(runs.bench("friction-ramp", MAIN, {"adc.law": "ideal"}))
-    items.append(found("fig5.p_max.ideal_adc", "bar", ideal.p_max(WITHOUT),
-                       "without dither, converters of infinite resolution: the jumps are a little "
-                       "higher"))  # fmt: skip
+    items.append(
+        found(
+            "fig5.p_max.ideal_adc",
+            "bar",
+            ideal.p_max(WITHOUT),
+            "without dither, converters of infinite resolution: the jumps are a little higher",
+        )
+    )
     text = (
         "Without dither the pressure climbs in stick-slip jumps. With dither the loop shrinks to "
         "a fraction. Most of what is left is no friction hysteresis but delay: a ramp ten times "
@@ -101,11 +106,19 @@ def part(runs: Runs) -> Part:
     recordings = {
         f"fig5-{label}{suffix}": selected(
             runs.bench("friction-ramp", name).recordings[label],
-            "i", "i_meas", "i_filtered", "i_star", "i_dit", "p_mc", "omega", "x_mc", "stuck",
+            "i",
+            "i_meas",
+            "i_filtered",
+            "i_star",
+            "i_dit",
+            "p_mc",
+            "omega",
+            "x_mc",
+            "stuck",
         )
         for name, suffix in SETS.items()
         for label in (WITHOUT, WITH)
-    }  # fmt: skip
+    }
     exhibits = tuple(_exhibit(runs, name, suffix) for name, suffix in SETS.items())
     return Part("Figure 5: friction and dither", text, tuple(items), exhibits, recordings)
 
@@ -113,12 +126,13 @@ def part(runs: Runs) -> Part:
 def _exhibit(runs: Runs, name: str, suffix: str) -> Exhibit:
     """Return Fig. 5 for one parameter set."""
     recordings = runs.bench("friction-ramp", name).recordings
-    return Exhibit(f"fig5{suffix.replace('@', '-')}",
-                   lambda: hysteresis_loop(
-                       recordings, "p_mc", "i_filtered", "i_star", average=0.02),
-                   "Fig. 5: measured current (low-passed at 20 Hz) over pressure during the slow "
-                   "ramp, averaged over one dither period; pale: with its ripple. Parameter set "
-                   f"{name}.")  # fmt: skip
+    return Exhibit(
+        f"fig5{suffix.replace('@', '-')}",
+        lambda: hysteresis_loop(recordings, "p_mc", "i_filtered", "i_star", average=0.02),
+        "Fig. 5: measured current (low-passed at 20 Hz) over pressure during the slow "
+        "ramp, averaged over one dither period; pale: with its ripple. Parameter set "
+        f"{name}.",
+    )
 
 
 def _set_items(name: str, suffix: str, loops: Loops) -> list[Item]:
@@ -127,32 +141,65 @@ def _set_items(name: str, suffix: str, loops: Loops) -> list[Item]:
     levels = ", ".join(f"{level / BAR:.2f}" for level in stairs.levels)
     slow = 100.0 * _slow_area(name) / values["loop_area_undithered"]
     return [
-        compared(f"fig5.p_max{suffix}", facts.FIG5_TOP, loops.p_max(WITHOUT), "<=",
-                 "without dither"),
-        compared(f"fig5.p_max.dither{suffix}", facts.FIG5_TOP, loops.p_max(WITH), "<=",
-                 "with dither"),
-        compared(f"fig5.loop_area_ratio{suffix}", facts.FIG5_LOOP, loops.area_ratio, LOOP,
-                 "area with dither over that without, averaged over one dither period; mostly "
-                 "delay"),
-        compared(f"fig5.loop_area_ratio.slow{suffix}", facts.FIG5_LOOP, slow, LOOP,
-                 f"the same with dither on a ramp {SLOWER:g} times slower: friction alone"),
-        compared(f"fig5.removed_above{suffix}", facts.FIG5_REMOVED, loops.removed_above, LEVEL,
-                 f"pressure above which the width stays below {100 * REMOVED:g} % of the "
-                 f"undithered loop's at mid-height; {LEVEL.size:g} bar is the lowest level looked "
-                 "at"),
-        compared(f"fig5.i_max.dither{suffix}", facts.FIG5_CURRENT,
-                 peak(loops.result.recordings[WITH], "i_filtered"), "<=",
-                 "measured current behind the 20 Hz low-pass: dither of eq. (20) leaves more "
-                 "ripple than the figure has room for"),
+        compared(
+            f"fig5.p_max{suffix}", facts.FIG5_TOP, loops.p_max(WITHOUT), "<=", "without dither"
+        ),
+        compared(
+            f"fig5.p_max.dither{suffix}", facts.FIG5_TOP, loops.p_max(WITH), "<=", "with dither"
+        ),
+        compared(
+            f"fig5.loop_area_ratio{suffix}",
+            facts.FIG5_LOOP,
+            loops.area_ratio,
+            LOOP,
+            "area with dither over that without, averaged over one dither period; mostly delay",
+        ),
+        compared(
+            f"fig5.loop_area_ratio.slow{suffix}",
+            facts.FIG5_LOOP,
+            slow,
+            LOOP,
+            f"the same with dither on a ramp {SLOWER:g} times slower: friction alone",
+        ),
+        compared(
+            f"fig5.removed_above{suffix}",
+            facts.FIG5_REMOVED,
+            loops.removed_above,
+            LEVEL,
+            f"pressure above which the width stays below {100 * REMOVED:g} % of the "
+            f"undithered loop's at mid-height; {LEVEL.size:g} bar is the lowest level looked "
+            "at",
+        ),
+        compared(
+            f"fig5.i_max.dither{suffix}",
+            facts.FIG5_CURRENT,
+            peak(loops.result.recordings[WITH], "i_filtered"),
+            "<=",
+            "measured current behind the 20 Hz low-pass: dither of eq. (20) leaves more "
+            "ripple than the figure has room for",
+        ),
         found(f"fig5.jumps{suffix}", "1", float(stairs.levels.size), f"ending at {levels} bar"),
-        found(f"fig5.share_stuck{suffix}", "%", 100.0 * values["share_stuck_undithered"],
-              "of the time, without dither"),
-        found(f"fig5.share_stuck.dither{suffix}", "%", 100.0 * values["share_stuck_dithered"],
-              "of the time, with dither"),
-        found(f"fig5.dither_passed{suffix}", "%", loops.dither_passed, "motor current at 50 Hz "
-              "over the dither, through the 80 Hz filter and the current loop; section 4.2, "
-              "without a number: the loop correctly tracks the dither"),
-    ]  # fmt: skip
+        found(
+            f"fig5.share_stuck{suffix}",
+            "%",
+            100.0 * values["share_stuck_undithered"],
+            "of the time, without dither",
+        ),
+        found(
+            f"fig5.share_stuck.dither{suffix}",
+            "%",
+            100.0 * values["share_stuck_dithered"],
+            "of the time, with dither",
+        ),
+        found(
+            f"fig5.dither_passed{suffix}",
+            "%",
+            loops.dither_passed,
+            "motor current at 50 Hz "
+            "over the dither, through the 80 Hz filter and the current loop; section 4.2, "
+            "without a number: the loop correctly tracks the dither",
+        ),
+    ]
 
 
 def _slow_area(name: str) -> float:

@@ -33,20 +33,29 @@ def part(runs: Runs) -> Part:
     _, high = step_peak(model, HEIGHT)
     items = [
         compared(
-            "fig6.peak", facts.FIG6_TOP, (START + high) / BAR, None,
+            "fig6.peak",
+            facts.FIG6_TOP,
+            (START + high) / BAR,
+            None,
             "highest pressure of Table 4's medium model from 25 bar; paper beside paper, not "
             "judged",
         ),
         compared(
-            "fig6.change.theoretical", final, HEIGHT * theoretical(parameters(MAIN)).gain_bar,
-            None, "final change of pressure by eq. (15)", tuned="calibrated",
+            "fig6.change.theoretical",
+            final,
+            HEIGHT * theoretical(parameters(MAIN)).gain_bar,
+            None,
+            "final change of pressure by eq. (15)",
+            tuned="calibrated",
         ),
         compared(
-            "fig6.change.theoretical@table1", final,
+            "fig6.change.theoretical@table1",
+            final,
             HEIGHT * theoretical(parameters("dardanelli2010-table1")).gain_bar,
-            None, "final change of pressure by eq. (15), Table 1; judged as table2.K@table1",
+            None,
+            "final change of pressure by eq. (15), Table 1; judged as table2.K@table1",
         ),
-    ]  # fmt: skip
+    ]
     rise = Fact(_rise_time(model), "s", "eq. (22) with the numbers of Table 4, medium")
     for name, suffix in SETS.items():
         items += _nonlinear(runs, name, suffix, final, rise)
@@ -75,21 +84,28 @@ def _nonlinear(runs: Runs, name: str, suffix: str, final: Fact, rise: Fact) -> l
     bias = before(runs.bench("pressure-step", name, options=frictionless)) / BAR
     return [
         compared(
-            f"fig6.change{suffix}", final, values["static_gain"] * HEIGHT / BAR,
+            f"fig6.change{suffix}",
+            final,
+            values["static_gain"] * HEIGHT / BAR,
             None,
             "final change of pressure, nonlinear brake with dither; judged as "
             f"table4.medium.K{suffix}",
         ),
         compared(
-            f"fig6.rise_time{suffix}", rise, values["rise_time"], None,
+            f"fig6.rise_time{suffix}",
+            rise,
+            values["rise_time"],
+            None,
             "10 to 90 % of the change, nonlinear brake with dither; judged as "
             f"table4.medium.corner{suffix}",
         ),
         found(
-            f"fig6.bias{suffix}", "bar", bias,
+            f"fig6.bias{suffix}",
+            "bar",
+            bias,
             "pressure under dither at the current that holds 25 bar without friction",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _rise_time(model: Rational) -> float:
@@ -111,10 +127,18 @@ def _misfit(run: xr.Dataset, start: float) -> Item:
     """Return how far the identified model is off the step that it was not fitted to."""
     t = run["time"].values
     error = run["p_mc"].values - (start + HEIGHT * identified_model("medium").step(t))
-    means = averaged(error[t >= 0.0], round(1.0 / (run["time"].values[1] - run["time"].values[0])
-                                            / parameters(MAIN).ecu.dither.f_dit))  # fmt: skip
+    means = averaged(
+        error[t >= 0.0],
+        round(
+            1.0
+            / (run["time"].values[1] - run["time"].values[0])
+            / parameters(MAIN).ecu.dither.f_dit
+        ),
+    )
     return found(
-        "fig6.misfit.identified", "bar", float(np.sqrt(np.mean(means**2))) / BAR,
+        "fig6.misfit.identified",
+        "bar",
+        float(np.sqrt(np.mean(means**2))) / BAR,
         "rms over 4 s, dither averaged: nonlinear brake less the model identified on it",
     )
 

@@ -39,47 +39,81 @@ def part(runs: Runs) -> Part:
     for name, suffix in SETS.items():
         items += _hard_braking(runs.bench("hard-braking", name), suffix)
         tests[name] = _closed_loop(name).isel(amplitude=0)
-        items.append(compared(f"fig7.bandwidth{suffix}", facts.BANDWIDTH, _bandwidth(tests[name]),
-                              ">=", "-3 dB of the nonlinear closed loop with dither, sines of 1 "
-                              "bar at 25 bar"))  # fmt: skip
+        items.append(
+            compared(
+                f"fig7.bandwidth{suffix}",
+                facts.BANDWIDTH,
+                _bandwidth(tests[name]),
+                ">=",
+                "-3 dB of the nonlinear closed loop with dither, sines of 1 bar at 25 bar",
+            )
+        )
         items += _tracking(runs.bench("pedal-tracking", name), suffix)
-    items.append(found("fig7.bandwidth.3bar", "Hz",
-                       _bandwidth(_closed_loop(MAIN).isel(amplitude=1)),
-                       "the same with sines of 3 bar: friction makes it depend on the amplitude"
-    ))  # fmt: skip
+    items.append(
+        found(
+            "fig7.bandwidth.3bar",
+            "Hz",
+            _bandwidth(_closed_loop(MAIN).isel(amplitude=1)),
+            "the same with sines of 3 bar: friction makes it depend on the amplitude",
+        )
+    )
     items += _linear_loop()
     without = runs.bench(
         "hard-braking", MAIN, {"ecu.dither.waveform": "off"}, {"duration": HUNTING}
     )
     pressure = without.recordings["run"]["p_mc"]
     late = pressure.values[pressure["time"].values >= 0.8 * HUNTING]
-    items.append(found("fig7.hunting", "bar", float(np.ptp(late)) / BAR,
-                       f"peak to peak in the last fifth of {HUNTING:g} s of braking, dither off: "
-                       "it hunts"))  # fmt: skip
+    items.append(
+        found(
+            "fig7.hunting",
+            "bar",
+            float(np.ptp(late)) / BAR,
+            f"peak to peak in the last fifth of {HUNTING:g} s of braking, dither off: it hunts",
+        )
+    )
     text = (
         "The PID's gains are not printed; ours were tuned on Table 4's medium model with filters, "
         "current loop and sampling for a crossover of 10 Hz. On the nonlinear brake overshoot and "
         "steady state are met; its small-signal bandwidth is far below 10 Hz, because dither turns "
         "friction into damping that Table 4's models do not have."
     )
-    return Part("Figure 7: pressure control", text, tuple(items), _exhibits(runs, tests), {
-        "fig7a": runs.bench("hard-braking", MAIN).recordings["run"],
-        "fig7b": runs.bench("pedal-tracking", MAIN).recordings["run"],
-    })  # fmt: skip
+    return Part(
+        "Figure 7: pressure control",
+        text,
+        tuple(items),
+        _exhibits(runs, tests),
+        {
+            "fig7a": runs.bench("hard-braking", MAIN).recordings["run"],
+            "fig7b": runs.bench("pedal-tracking", MAIN).recordings["run"],
+        },
+    )
 
 
 def _hard_braking(result: Result, suffix: str) -> list[Item]:
     values = kpis(result)
     return [
-        compared(f"fig7.overshoot{suffix}", facts.OVERSHOOT, values["overshoot"], "<=",
-                 "hard braking, 6 to 37 bar, nonlinear brake with dither"),
-        compared(f"fig7.steady_state_error{suffix}", facts.STEADY_STATE,
-                 values["steady_state_error"] / BAR, STEADY,
-                 "mean of the last 0.24 s of hard braking"),
+        compared(
+            f"fig7.overshoot{suffix}",
+            facts.OVERSHOOT,
+            values["overshoot"],
+            "<=",
+            "hard braking, 6 to 37 bar, nonlinear brake with dither",
+        ),
+        compared(
+            f"fig7.steady_state_error{suffix}",
+            facts.STEADY_STATE,
+            values["steady_state_error"] / BAR,
+            STEADY,
+            "mean of the last 0.24 s of hard braking",
+        ),
         found(f"fig7.rise_time{suffix}", "s", values["rise_time"], "10 to 90 %, hard braking"),
-        found(f"fig7.settling_time{suffix}", "s", values["settling_time"],
-              "into 2 % of the step, hard braking"),
-    ]  # fmt: skip
+        found(
+            f"fig7.settling_time{suffix}",
+            "s",
+            values["settling_time"],
+            "into 2 % of the step, hard braking",
+        ),
+    ]
 
 
 def _tracking(result: Result, suffix: str) -> list[Item]:
@@ -87,11 +121,19 @@ def _tracking(result: Result, suffix: str) -> list[Item]:
     note = "built-in ride over 5 to 30 bar; that of Fig. 7b is not published"
     return [
         found(f"fig7b.lag{suffix}", "s", values["tracking_lag"], f"delay that fits best; {note}"),
-        found(f"fig7b.rms{suffix}", "bar", values["tracking_rms"] / BAR,
-              f"pressure less set point; {note}"),
-        found(f"fig7b.rms_without_lag{suffix}", "bar", values["tracking_rms_without_lag"] / BAR,
-              f"pressure less delayed set point; {note}"),
-    ]  # fmt: skip
+        found(
+            f"fig7b.rms{suffix}",
+            "bar",
+            values["tracking_rms"] / BAR,
+            f"pressure less set point; {note}",
+        ),
+        found(
+            f"fig7b.rms_without_lag{suffix}",
+            "bar",
+            values["tracking_rms_without_lag"] / BAR,
+            f"pressure less delayed set point; {note}",
+        ),
+    ]
 
 
 def _closed_loop(name: str) -> xr.Dataset:
@@ -110,23 +152,50 @@ def _linear_loop() -> list[Item]:
     chain = "linear model, exact sampled loop with the 80 Hz filter, current PI and 180 Hz filters"
     tuned = "gains tuned to it"
     items = [
-        compared("fig7.crossover", facts.BANDWIDTH, medium.margin().crossover, ROUND,
-                 f"Table 4, medium; {chain}; {tuned}", tuned="calibrated"),
-        compared("fig7.phase_margin", facts.PHASE_MARGIN, medium.margin().phase, ">=",
-                 f"at the crossover; Table 4, medium; {chain}; {tuned}", tuned="calibrated"),
-        found("fig7.bandwidth.table4", "Hz", bandwidth(medium.closed, BAND),
-              f"-3 dB, set point to pressure, same gains; Table 4, medium; {chain}; D on the "
-              "measurement: a crossover of 10 Hz is not yet a bandwidth of 10 Hz"),
-    ]  # fmt: skip
+        compared(
+            "fig7.crossover",
+            facts.BANDWIDTH,
+            medium.margin().crossover,
+            ROUND,
+            f"Table 4, medium; {chain}; {tuned}",
+            tuned="calibrated",
+        ),
+        compared(
+            "fig7.phase_margin",
+            facts.PHASE_MARGIN,
+            medium.margin().phase,
+            ">=",
+            f"at the crossover; Table 4, medium; {chain}; {tuned}",
+            tuned="calibrated",
+        ),
+        found(
+            "fig7.bandwidth.table4",
+            "Hz",
+            bandwidth(medium.closed, BAND),
+            f"-3 dB, set point to pressure, same gains; Table 4, medium; {chain}; D on the "
+            "measurement: a crossover of 10 Hz is not yet a bandwidth of 10 Hz",
+        ),
+    ]
     for region in ("low", "high"):
         other = loops[region].margin()
-        items.append(found(f"fig7.phase_margin.{region}", "deg", other.phase,
-                           f"same gains; Table 4, {region}, at its crossover of "
-                           f"{other.crossover:.2f} Hz"))  # fmt: skip
+        items.append(
+            found(
+                f"fig7.phase_margin.{region}",
+                "deg",
+                other.phase,
+                f"same gains; Table 4, {region}, at its crossover of {other.crossover:.2f} Hz",
+            )
+        )
     T1 = 1.0 / (2.0 * math.pi * facts.TABLE4["medium"]["T1"].value)
     pi = cancelling_pi(medium, T1, facts.BANDWIDTH.value)
-    items.append(found("fig7.phase_margin.pi", "deg", pi.margin().phase, "a PI that cancels T1, "
-                       "crossover 10 Hz, Table 4, medium: the PID needs its D"))  # fmt: skip
+    items.append(
+        found(
+            "fig7.phase_margin.pi",
+            "deg",
+            pi.margin().phase,
+            "a PI that cancels T1, crossover 10 Hz, Table 4, medium: the PID needs its D",
+        )
+    )
     return items
 
 
@@ -156,13 +225,15 @@ def _exhibits(runs: Runs, tests: dict[str, xr.Dataset]) -> tuple[Exhibit, ...]:
             ),
             "Fig. 7a: hard braking from 6 to 37 bar, calibrated set.",
         ),
-        Exhibit("fig7b",
-                lambda: tracking(
-                    runs.bench("pedal-tracking", MAIN).recordings["run"], "p_mc", "p_ref"),
-                "Fig. 7b: the pressure follows the pedal; the ride is ours, the range the "
-                "paper's."),
-        Exhibit("fig7-bode",
-                lambda: bode(responses, marks={"required bandwidth": facts.BANDWIDTH.value}),
-                "Closed loop from set point to pressure: linear with Table 4's medium model, and "
-                "the nonlinear brake with dither (points: sines of 1 bar at 25 bar)."),
-    )  # fmt: skip
+        Exhibit(
+            "fig7b",
+            lambda: tracking(runs.bench("pedal-tracking", MAIN).recordings["run"], "p_mc", "p_ref"),
+            "Fig. 7b: the pressure follows the pedal; the ride is ours, the range the paper's.",
+        ),
+        Exhibit(
+            "fig7-bode",
+            lambda: bode(responses, marks={"required bandwidth": facts.BANDWIDTH.value}),
+            "Closed loop from set point to pressure: linear with Table 4's medium model, and "
+            "the nonlinear brake with dither (points: sines of 1 bar at 25 bar).",
+        ),
+    )

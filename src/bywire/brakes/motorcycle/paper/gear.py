@@ -36,10 +36,12 @@ def part(runs: Runs) -> Part:
         pads = _pad_energy(parameters(name))
         items.append(
             found(
-                f"gear.stored.pads{suffix}", "J", pads,
+                f"gear.stored.pads{suffix}",
+                "J",
+                pads,
                 "of what is stored, in the pads alone: (A_pd p)^2/(2 K_pd)",
             )
-        )  # fmt: skip
+        )
     par = parameters(MAIN)
     text = (
         "Eq. (8) multiplies the motor's torque by a constant efficiency. Driving, that is a loss; "
@@ -54,11 +56,12 @@ def part(runs: Runs) -> Part:
     )
     exhibits = tuple(
         Exhibit(
-            f"gear-{law}", partial(energy_balance, release, source="W_shaft", sinks=MECHANICAL),
+            f"gear-{law}",
+            partial(energy_balance, release, source="W_shaft", sinks=MECHANICAL),
             caption.format(law),
         )
         for law, release in releases.items()
-    )  # fmt: skip
+    )
     kept = {
         f"gear-{law}": selected(release, "i", "p_mc", "x_mc", "W_shaft", "E_gear", "E_stored")
         for law, release in releases.items()
@@ -70,18 +73,23 @@ def _items(release: xr.Dataset, law: str, suffix: str) -> list[Item]:
     """Return what was stored, and what came back."""
     stored, returned = _energies(release)
     bound = Fact(
-        stored, "J", "physical bound: no more can return than is stored, by our computation",
+        stored,
+        "J",
+        "physical bound: no more can return than is stored, by our computation",
         "physical bound",
-    )  # fmt: skip
+    )
     note = f"law '{law}', {'eq. (8)' if law == 'paper' else 'ours'}"
     return [
         found(f"gear.stored.{law}{suffix}", "J", stored, f"at 37 bar, frictionless; {note}"),
         compared(
-            f"gear.returned.{law}{suffix}", bound, returned, "<=",
+            f"gear.returned.{law}{suffix}",
+            bound,
+            returned,
+            "<=",
             f"work at the motor's shaft during a slow release, {100.0 * returned / stored:.1f} % "
             f"of what was stored; {note}",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _pad_energy(par: MotorcycleParameters) -> float:
@@ -94,9 +102,14 @@ def _release(runs: Runs, name: str, law: str) -> xr.Dataset:
     overrides = {**FRICTIONLESS, "gear.law": law}
     i = holding_current(P_FROM, parameters(name).replace({"gear.law": law}))
     stimulus = {
-        "kind": "ramp", "start": i, "end": 0.0, "slope": i / T_RELEASE, "t_start": 0.0,
-        "t_hold": 0.0, "after": "stay",
-    }  # fmt: skip
+        "kind": "ramp",
+        "start": i,
+        "end": 0.0,
+        "slope": i / T_RELEASE,
+        "t_start": 0.0,
+        "t_hold": 0.0,
+        "after": "stay",
+    }
     options = {"source": "current", "p_start": P_FROM, "duration": T_RELEASE, "record": 0.1}
     return runs.bench("motor-open-loop", name, overrides, options, stimulus).recordings["run"]
 

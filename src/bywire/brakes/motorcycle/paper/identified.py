@@ -36,10 +36,16 @@ def identified(model: str) -> Identified:
     par = parameters(MAIN)
     p = facts.REGIONS
     options = braking_dynamics.METHOD.defaults.replace(
-        {"model": model, "fit": "two-step" if model == "eq-22" else "joint", "turns": 1,
-         "p_low": p["low"], "p_medium": p["medium"], "p_high": p["high"],
-         "i_step": facts.FIG6_STEP.value}
-    )  # fmt: skip
+        {
+            "model": model,
+            "fit": "two-step" if model == "eq-22" else "joint",
+            "turns": 1,
+            "p_low": p["low"],
+            "p_medium": p["medium"],
+            "p_high": p["high"],
+            "i_step": facts.FIG6_STEP.value,
+        }
+    )
     method = braking_dynamics.METHOD
     return method.identify(method.synthetic(par, options, SEED), par, options, Effort())
 
@@ -55,21 +61,34 @@ def items() -> list[Item]:
     for region in facts.REGIONS:
         row, estimate = facts.TABLE4[region], identified("eq-22").estimates[region]
         five, prefix = five_of(estimate), f"table4.{region}.identified"
-        deviation = {u.name: float(d) for u, d in zip(estimate.unknowns, estimate.deviations,
-                                                      strict=True)}  # fmt: skip
-        rows.append(compared(f"{prefix}.K", row["K"], five["K"] / BAR, GAIN,
-                             f"first step, {_interval(five['K'], deviation.get('K', math.nan))}: "
-                             "step of 0.35 A, nonlinear brake with dither and sensors' noise"
-        ))  # fmt: skip
+        deviation = {
+            u.name: float(d) for u, d in zip(estimate.unknowns, estimate.deviations, strict=True)
+        }
+        rows.append(
+            compared(
+                f"{prefix}.K",
+                row["K"],
+                five["K"] / BAR,
+                GAIN,
+                f"first step, {_interval(five['K'], deviation.get('K', math.nan))}: "
+                "step of 0.35 A, nonlinear brake with dither and sensors' noise",
+            )
+        )
         for key, name in _KEYS.items():
             T = five[name]
             step = "second step, sines of 0.1 A" if key in ("T1", "T2") else "first step"
             if key == "T1":
                 zero = 1.0 / (2.0 * math.pi * five["tau_L"])
                 step += f"; the slow pair's zero at {zero:.3g} Hz nearly cancels it"
-            rows.append(compared(f"{prefix}.{key}", row[key], 1.0 / (2.0 * math.pi * T), CORNER,
-                                 f"{step}, {_interval(T, deviation.get(name, math.nan))}"
-            ))  # fmt: skip
+            rows.append(
+                compared(
+                    f"{prefix}.{key}",
+                    row[key],
+                    1.0 / (2.0 * math.pi * T),
+                    CORNER,
+                    f"{step}, {_interval(T, deviation.get(name, math.nan))}",
+                )
+            )
         rows += _without_pair(region)
     return rows
 
@@ -103,7 +122,10 @@ def exhibit() -> Exhibit:
         Response("eq. (15), calibrated", f, theoretical(parameters(MAIN)).response(f) / BAR),
         Response("sines, our brake", gain["frequency"].values, measured / BAR, measured=True),
     ]
-    return Exhibit("table4-identified", lambda: bode(responses, gain_unit="bar/A"),
-                   "Pressure over measured current at 25 bar: eq. (22) identified on our nonlinear "
-                   "brake by the paper's two steps (points: sines of 0.1 A), Table 4's medium "
-                   "model, and eq. (15).")  # fmt: skip
+    return Exhibit(
+        "table4-identified",
+        lambda: bode(responses, gain_unit="bar/A"),
+        "Pressure over measured current at 25 bar: eq. (22) identified on our nonlinear "
+        "brake by the paper's two steps (points: sines of 0.1 A), Table 4's medium "
+        "model, and eq. (15).",
+    )

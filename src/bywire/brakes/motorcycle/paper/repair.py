@@ -85,12 +85,23 @@ def _short_stroke() -> list[Item]:
     p_end = float(brentq(lambda p: travel_at(p, par) - s_mc, P_NOMINAL, 60e5))
     return [
         found("short_stroke.s_mc", "mm", 1e3 * s_mc, "gives Table 1 in (15) the pole 3 of Table 2"),
-        compared("short_stroke.pole3", facts.TABLE2["pole3"], pole(s_mc), DIGITS,
-                 "Table 1 with that stroke", tuned="calibrated"),
-        compared("short_stroke.p_end", facts.SENSOR_RANGE, p_end / BAR, None,
-                 "pressure at which the piston meets the chamber's end with that stroke: within "
-                 "the range; not judged, the stroke is a trial of ours"),
-    ]  # fmt: skip
+        compared(
+            "short_stroke.pole3",
+            facts.TABLE2["pole3"],
+            pole(s_mc),
+            DIGITS,
+            "Table 1 with that stroke",
+            tuned="calibrated",
+        ),
+        compared(
+            "short_stroke.p_end",
+            facts.SENSOR_RANGE,
+            p_end / BAR,
+            None,
+            "pressure at which the piston meets the chamber's end with that stroke: within "
+            "the range; not judged, the stroke is a trial of ours",
+        ),
+    ]
 
 
 def _with_stroke(par: MotorcycleParameters, s_mc: float) -> MotorcycleParameters:
@@ -112,6 +123,11 @@ def _laminar(par: MotorcycleParameters) -> Item:
     d, nu, rho = par.pipeline.d_pl, par.fluid.nu, par.fluid.rho
     textbook = 128.0 * nu * rho * par.pipeline.L_pl / (math.pi * d**4)
     coefficient = par.pipeline.k_lf * textbook / pipeline.resistance(par.pipeline, par.fluid)
-    return compared("laminar.coefficient", facts.K_LF, coefficient, DIGITS,
-                    "128 nu rho L/(pi d^4) of Hagen and Poiseuille, written as k nu rho pi L/A^2: "
-                    "a quarter; the models use the paper's")  # fmt: skip
+    return compared(
+        "laminar.coefficient",
+        facts.K_LF,
+        coefficient,
+        DIGITS,
+        "128 nu rho L/(pi d^4) of Hagen and Poiseuille, written as k nu rho pi L/A^2: "
+        "a quarter; the models use the paper's",
+    )

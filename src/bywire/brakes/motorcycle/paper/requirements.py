@@ -42,21 +42,42 @@ def part(runs: Runs) -> Part:
         note = "gains tuned to the four requirements" if suffix else "gains of Fig. 7's bench"
         for response in figures.small:
             bar = f"{response.amplitude / BAR:g}"
-            items.append(compared(f"requirements.bandwidth.{bar}bar{suffix}", facts.BANDWIDTH,
-                                  response.bandwidth, ">=",
-                                  f"-3 dB, sine of {bar} bar around 20 bar, with dither; {note}",
-                                  tuned=tuned))  # fmt: skip
+            items.append(
+                compared(
+                    f"requirements.bandwidth.{bar}bar{suffix}",
+                    facts.BANDWIDTH,
+                    response.bandwidth,
+                    ">=",
+                    f"-3 dB, sine of {bar} bar around 20 bar, with dither; {note}",
+                    tuned=tuned,
+                )
+            )
         items += [
-            compared(f"requirements.phase_margin{suffix}", facts.PHASE_MARGIN,
-                     margins(loop, par, P).phase, ">=",
-                     f"exact sampled loop without friction, cut at the measured pressure; {note}",
-                     tuned=tuned),
-            compared(f"requirements.overshoot{suffix}", facts.OVERSHOOT, figures.step["overshoot"],
-                     "<=", f"6 to 37 bar; {note}", tuned=tuned),
-            compared(f"requirements.steady_state{suffix}", facts.STEADY_STATE,
-                     figures.step["steady_state_error"] / 100.0 * STEP / BAR, STEADY,
-                     f"6 to 37 bar; {note}", tuned=tuned),
-        ]  # fmt: skip
+            compared(
+                f"requirements.phase_margin{suffix}",
+                facts.PHASE_MARGIN,
+                margins(loop, par, P).phase,
+                ">=",
+                f"exact sampled loop without friction, cut at the measured pressure; {note}",
+                tuned=tuned,
+            ),
+            compared(
+                f"requirements.overshoot{suffix}",
+                facts.OVERSHOOT,
+                figures.step["overshoot"],
+                "<=",
+                f"6 to 37 bar; {note}",
+                tuned=tuned,
+            ),
+            compared(
+                f"requirements.steady_state{suffix}",
+                facts.STEADY_STATE,
+                figures.step["steady_state_error"] / 100.0 * STEP / BAR,
+                STEADY,
+                f"6 to 37 bar; {note}",
+                tuned=tuned,
+            ),
+        ]
     text = (
         "The gains are not printed. Those of Fig. 7's bench, designed on the linear model, lose "
         "most of their bandwidth to friction at small amplitudes, dither or not. One set of gains "
@@ -68,9 +89,11 @@ def part(runs: Runs) -> Part:
         responses = [each for name in SETS for each in _responses(name)]
         return bode(responses, marks={"required bandwidth": facts.BANDWIDTH.value})
 
-    figure = Exhibit("requirements", draw,
-                     "Pressure over its set point around 20 bar, friction, dither and converter "
-                     "on.")  # fmt: skip
+    figure = Exhibit(
+        "requirements",
+        draw,
+        "Pressure over its set point around 20 bar, friction, dither and converter on.",
+    )
     return Part("Requirements of section 6 on the nonlinear bench", text, tuple(items), (figure,))
 
 
@@ -79,8 +102,15 @@ def _responses(name: str) -> list[Response]:
     loop, par = LOOPS.find("pressure"), parameters(name)
     point = loop.point(par, P)
     frequencies = [float(f) for f in np.geomspace(1.0, 40.0, 14)]
-    sweep = Sweep(loop.inputs, loop.output, frequencies, AMPLITUDES, flags=(),
-                  whole=loop.whole(point.par), most=12)  # fmt: skip
+    sweep = Sweep(
+        loop.inputs,
+        loop.output,
+        frequencies,
+        AMPLITUDES,
+        flags=(),
+        whole=loop.whole(point.par),
+        most=12,
+    )
     measured = frequency_response(point.run(), sweep).isel(variant=0)
     label = "given" if name == MAIN else "retuned"
     return [

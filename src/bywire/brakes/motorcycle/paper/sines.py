@@ -29,8 +29,9 @@ def of_set_point(
     ``name``: parameter set; ``p``: mean pressure [Pa]; ``amplitudes``: of the set point [Pa];
     ``frequencies``: in Hz.
     """
-    return _measured(LOOPS.find("pressure").point(parameters(name), p), "p_set", amplitudes,
-                     frequencies)  # fmt: skip
+    return _measured(
+        LOOPS.find("pressure").point(parameters(name), p), "p_set", amplitudes, frequencies
+    )
 
 
 def of_current(

@@ -28,13 +28,29 @@ def part(runs: Runs) -> Part:
         hard = runs.bench("hard-braking", name).recordings["run"]
         ratio = par.fluid.beta / P_HARD
         items += [
-            compared(f"table1.x_mc{suffix}", facts.TABLE1["x_mc"], x, PRINTED,
-                     "at 20 bar, a reading: x_rest is derived from it", tuned="calibrated"),
-            compared(f"table1.Re{suffix}", facts.RE_LAMINAR, peak(hard, "Re"), "<=",
-                     "largest Reynolds number during hard braking, Fig. 7a"),
-            compared(f"table1.eq11{suffix}", facts.EQ11, ratio, ">=",
-                     "beta A_pd^2/(V_pd K_pd) = beta/p_pd at 37 bar, by which (10) becomes (11)"),
-        ]  # fmt: skip
+            compared(
+                f"table1.x_mc{suffix}",
+                facts.TABLE1["x_mc"],
+                x,
+                PRINTED,
+                "at 20 bar, a reading: x_rest is derived from it",
+                tuned="calibrated",
+            ),
+            compared(
+                f"table1.Re{suffix}",
+                facts.RE_LAMINAR,
+                peak(hard, "Re"),
+                "<=",
+                "largest Reynolds number during hard braking, Fig. 7a",
+            ),
+            compared(
+                f"table1.eq11{suffix}",
+                facts.EQ11,
+                ratio,
+                ">=",
+                "beta A_pd^2/(V_pd K_pd) = beta/p_pd at 37 bar, by which (10) becomes (11)",
+            ),
+        ]
     text = (
         "Table 1 gives most physical parameters. Not printed are the piston's stroke s_mc, the "
         "seals' preload T_pr, the motor's winding, the controllers' gains and the pedal map: "

@@ -36,9 +36,16 @@ def part(runs: Runs) -> Part:
         computed = numbers(theoretical(parameters(name)))
         for key, fact in facts.TABLE2.items():
             note = "s_mc, which moves it, is not printed" if key == "pole3" else ""
-            items.append(compared(f"table2.{key}{suffix}", fact, computed[key], DIGITS,
-                                  f"Table 1 in (15){'; ' if note else ''}{note}" if suffix else "",
-                                  tuned="" if suffix else "calibrated"))  # fmt: skip
+            items.append(
+                compared(
+                    f"table2.{key}{suffix}",
+                    fact,
+                    computed[key],
+                    DIGITS,
+                    f"Table 1 in (15){'; ' if note else ''}{note}" if suffix else "",
+                    tuned="" if suffix else "calibrated",
+                )
+            )
     items += _two_poles()
     text = (
         "Table 1 put into eq. (15) does not give Table 2. Few plausible changes repair it: the "
@@ -74,8 +81,10 @@ def _figure() -> Exhibit:
         Response(
             "Table 2 as printed", sparse, facts.table2_model().response(sparse) / BAR, measured=True
         )
-    )  # fmt: skip
-    return Exhibit("table2-bode", lambda: bode(responses, gain_unit="bar/A"),
-                   "Pressure over motor current: eq. (15) from the two parameter sets, the "
-                   "transfer function that Table 2 prints (points), and Table 4's model."
-    )  # fmt: skip
+    )
+    return Exhibit(
+        "table2-bode",
+        lambda: bode(responses, gain_unit="bar/A"),
+        "Pressure over motor current: eq. (15) from the two parameter sets, the "
+        "transfer function that Table 2 prints (points), and Table 4's model.",
+    )

@@ -37,31 +37,51 @@ def part(runs: Runs) -> Part:
     torque = curve["T_fr"].values
     bare = par.seal.k_brk_p * par.seal.f_cfr_p * float(curve["p_mc"].values[-1])
     items += [
-        compared("fig4.top_tick", facts.FIG4_TOP, float(np.max(torque)), "<=",
-                 f"breakaway torque at 40 bar from Table 3 with T_pr = {par.seal.T_pr:g} N m, "
-                 f"chosen; {bare:.3g} N m even without it: the curves are not those of the printed "
-                 "values"),
-        compared("fig4.bottom_tick", facts.FIG4_BOTTOM, float(np.min(torque)), ">=",
-                 "release side at 40 bar"),
+        compared(
+            "fig4.top_tick",
+            facts.FIG4_TOP,
+            float(np.max(torque)),
+            "<=",
+            f"breakaway torque at 40 bar from Table 3 with T_pr = {par.seal.T_pr:g} N m, "
+            f"chosen; {bare:.3g} N m even without it: the curves are not those of the printed "
+            "values",
+        ),
+        compared(
+            "fig4.bottom_tick",
+            facts.FIG4_BOTTOM,
+            float(np.min(torque)),
+            ">=",
+            "release side at 40 bar",
+        ),
         _viscous(par.seal.mu_T / par.gear.k_g),
         _eq19(),
         *_identified_items(),
-    ]  # fmt: skip
+    ]
     text = (
         "Table 3 is used as published; only the preload T_pr, which it omits, is ours. Where the "
         "curves are vertical the piston sticks: the torque is anything between both ends."
     ) + _untold()
-    exhibit = Exhibit("fig4", lambda: stribeck_curve(curve),
-                      "Fig. 4: friction torque at the motor shaft over speed.")  # fmt: skip
-    return Part("Table 3 and Figure 4: friction", text, tuple(items),
-                (exhibit, _identified_exhibit()))  # fmt: skip
+    exhibit = Exhibit(
+        "fig4",
+        lambda: stribeck_curve(curve),
+        "Fig. 4: friction torque at the motor shaft over speed.",
+    )
+    return Part(
+        "Table 3 and Figure 4: friction", text, tuple(items), (exhibit, _identified_exhibit())
+    )
 
 
 def _viscous(mu_F: float) -> Item:
     """Return the viscous coefficient of the text against that of Table 3."""
-    return compared("section3.mu", facts.MU_TEXT, mu_F, ABOUT, "one effect, two values: Table 3's "
-                    "torque per shaft speed mu_T gives the force per shaft speed mu_F = mu_T/k_g; "
-                    "either is negligible beside k_damp; the models use Table 3's")  # fmt: skip
+    return compared(
+        "section3.mu",
+        facts.MU_TEXT,
+        mu_F,
+        ABOUT,
+        "one effect, two values: Table 3's "
+        "torque per shaft speed mu_T gives the force per shaft speed mu_F = mu_T/k_g; "
+        "either is negligible beside k_damp; the models use Table 3's",
+    )
 
 
 def _eq19() -> Item:
@@ -72,10 +92,13 @@ def _eq19() -> Item:
     bounds = ball_screw_gear.friction_bounds(seal.T_p, seal.T_n, 0.0, par.gear)
     needed = -bounds.low / (par.gear.eta_g * par.motor.K_e)
     stated = dither.breakaway_current(P_EQ19, par.ecu.est_par)
-    return compared("eq19.A_dit",
-                    Fact(stated, "A", "eq. (19) at 25 bar with Tables 1 and 3, T_pr = 0"), needed,
-                    PRINTED, "current above the holding current that eq. (8) needs to break away: "
-                    "(19) leaves eta_g out")  # fmt: skip
+    return compared(
+        "eq19.A_dit",
+        Fact(stated, "A", "eq. (19) at 25 bar with Tables 1 and 3, T_pr = 0"),
+        needed,
+        PRINTED,
+        "current above the holding current that eq. (8) needs to break away: (19) leaves eta_g out",
+    )
 
 
 @cache
@@ -99,10 +122,17 @@ def _identified_items() -> list[Item]:
         if label not in ends:
             continue
         low, high = ends[label]
-        rows.append(compared(f"table3.identified.{name}", fact, estimate[label], None,
-                             "identified from our own ramp, where it was put in; 95 % interval "
-                             f"{low:.4g} to {high:.4g}; the search began "
-                             f"{100.0 * (OFF[name] - 1.0):+.0f} % off"))  # fmt: skip
+        rows.append(
+            compared(
+                f"table3.identified.{name}",
+                fact,
+                estimate[label],
+                None,
+                "identified from our own ramp, where it was put in; 95 % interval "
+                f"{low:.4g} to {high:.4g}; the search began "
+                f"{100.0 * (OFF[name] - 1.0):+.0f} % off",
+            )
+        )
     return rows
 
 
@@ -119,6 +149,9 @@ def _identified_exhibit() -> Exhibit:
     """Return Fig. 4 as identified, with the band that noise leaves."""
     curve = next(c for c in _identified().curves if c.name == "stribeck")
     widest = float((curve.data["high"] - curve.data["value"]).max())
-    return Exhibit("fig4-identified", lambda: method_curve(curve),
-                   "Fig. 4 as identified on our own brake from one ramp with sensors' noise; "
-                   f"bands: 95 % confidence, {widest:.1g} N m to either side at most.")  # fmt: skip
+    return Exhibit(
+        "fig4-identified",
+        lambda: method_curve(curve),
+        "Fig. 4 as identified on our own brake from one ramp with sensors' noise; "
+        f"bands: 95 % confidence, {widest:.1g} N m to either side at most.",
+    )

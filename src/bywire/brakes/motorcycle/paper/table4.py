@@ -37,10 +37,15 @@ def part(runs: Runs) -> Part:
     items += _corner(runs, measured)
     items += dardanelli2010_identified.items()
     K = facts.TABLE4["medium"]["K"]
-    items.append(compared("table4.medium.p_ramp", facts.FIG5_TOP, K.value * facts.RAMP_PEAK.value,
-                          None,
-                          "Table 4's gain times the ramp's 5 A; paper beside paper, not judged"
-    ))  # fmt: skip
+    items.append(
+        compared(
+            "table4.medium.p_ramp",
+            facts.FIG5_TOP,
+            K.value * facts.RAMP_PEAK.value,
+            None,
+            "Table 4's gain times the ramp's 5 A; paper beside paper, not judged",
+        )
+    )
     text = (
         "Table 4's gains fit neither Fig. 5 nor the published friction with the published dither: "
         "f_cfr,p exceeds f_cfr,n, so that dither leaves a mean friction against applying. Dither "
@@ -64,15 +69,28 @@ def _region(runs: Runs, region: str, p: float) -> list[Item]:
     for name, suffix in SETS.items():
         step = runs.settled_step(name, p, facts.FIG6_STEP.value)
         gain = kpis(step)["static_gain"] / BAR
-        items.append(compared(f"{prefix}.K{suffix}", row["K"], gain, GAIN,
-                              "nonlinear brake with dither, step of 0.35 A at "
-                              f"{before(step) / BAR:.1f} bar"))  # fmt: skip
+        items.append(
+            compared(
+                f"{prefix}.K{suffix}",
+                row["K"],
+                gain,
+                GAIN,
+                f"nonlinear brake with dither, step of 0.35 A at {before(step) / BAR:.1f} bar",
+            )
+        )
     par = parameters(MAIN)
     slow, fast, _ = theoretical(par, p, travel_at(p, par)).poles_hz
     for key, pole in (("T1", slow), ("T2", fast)):
-        items.append(compared(f"{prefix}.{key}", row[key], float(pole), CORNER,
-                              "pole of eq. (15), tuned to Table 2, where the paper's fit started",
-                              tuned="calibrated"))  # fmt: skip
+        items.append(
+            compared(
+                f"{prefix}.{key}",
+                row[key],
+                float(pole),
+                CORNER,
+                "pole of eq. (15), tuned to Table 2, where the paper's fit started",
+                tuned="calibrated",
+            )
+        )
     note = "low-frequency pair, put down to air in the fluid; no counterpart in eqs. (13) to (15)"
     return [*items, *(quoted(f"{prefix}.{key}", row[key], note) for key in ("zero", "T_L"))]
 
@@ -99,13 +117,22 @@ def _medium_step() -> list[Item]:
         found("table4.medium.step_peak", "bar", high / BAR, "eq. (22), step of 0.35 A"),
         found("table4.medium.step_peak_time", "s", t_peak, "eq. (22), step of 0.35 A"),
         found("table4.medium.step_final", "bar", final / BAR, "eq. (22), step of 0.35 A"),
-        found("table4.medium.zero_below_pole", "1", row["zero"].value / row["T_L"].value,
-              "zero over pole of the slow pair: below 1 the step overshoots and falls; a leak or "
-              "air that fills slowly needs more than 1"),
-        compared("table4.air", Fact(100.0 * (high / final - 1.0), "%", EQ22), air, OVERSHOOT,
-                 "overshoot of the step; computed: eq. (15) with 1 ml of air in the chamber, which "
-                 "moves the slow pole and adds no pair below it: air is not what Table 4 shows"),
-    ]  # fmt: skip
+        found(
+            "table4.medium.zero_below_pole",
+            "1",
+            row["zero"].value / row["T_L"].value,
+            "zero over pole of the slow pair: below 1 the step overshoots and falls; a leak or "
+            "air that fills slowly needs more than 1",
+        ),
+        compared(
+            "table4.air",
+            Fact(100.0 * (high / final - 1.0), "%", EQ22),
+            air,
+            OVERSHOOT,
+            "overshoot of the step; computed: eq. (15) with 1 ml of air in the chamber, which "
+            "moves the slow pole and adds no pair below it: air is not what Table 4 shows",
+        ),
+    ]
 
 
 def _with_air(height: float) -> float:
@@ -160,7 +187,10 @@ def _figure(measured: dict[str, xr.Dataset]) -> Exhibit:
             for name, test in measured.items()
         ),
     ]
-    return Exhibit("table4-bode", lambda: bode(responses, gain_unit="bar/A"),
-                   "Pressure over current demand at 25 bar: Table 4's medium model, eq. (15), and "
-                   "the nonlinear brake with friction and dither (points: sines of 0.1 A through "
-                   "the 80 Hz filter and the current loop).")  # fmt: skip
+    return Exhibit(
+        "table4-bode",
+        lambda: bode(responses, gain_unit="bar/A"),
+        "Pressure over current demand at 25 bar: Table 4's medium model, eq. (15), and "
+        "the nonlinear brake with friction and dither (points: sines of 0.1 A through "
+        "the 80 Hz filter and the current loop).",
+    )

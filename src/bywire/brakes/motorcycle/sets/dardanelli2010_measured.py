@@ -23,35 +23,35 @@ def _told(value: float, interval: str, by: str) -> Cited:
 
 
 ESTIMATED = {
-    "master_cylinder.A_mc": _told(6.982e-05, "-0.00011 to 0.00025",
-        "table4.medium.K, fig6.peak, table3.f_cfr_p"),
-    "gear.eta_g": _told(1, "0.589 to 1.41",
-        "table4.high.overshoot, fig5.loop_area_ratio, table4.high.T1"),
-    "gear.J_mot": _told(1.363e-05, "-3.32e-05 to 6.05e-05",
-        "table4.medium.K, table4.high.K, fig6.peak"),
-    "master_cylinder.k_damp": _told(0, "-3.7e+04 to 3.7e+04",
-        "fig7.peak, table4.high.K"),
-    "caliper.K_pd": _told(1.106e+06, "-4.81e+06 to 7.03e+06",
-        "table4.medium.K, table4.low.T1, fig6.peak"),
-    "seal.f_cfr_p": _told(1.628e-08, "-1.39e-08 to 4.64e-08",
-        "table3.f_cfr_p"),
-    "seal.f_cfr_n": _told(5.405e-09, "2.23e-09 to 8.58e-09",
-        "table3.f_cfr_n"),
-    "seal.k_brk_p": _told(2.886, "-0.147 to 5.92",
-        "fig7.peak, table4.high.K, table4.medium.K"),
-    "seal.k_brk_n": _told(2.291, "-0.88 to 5.46",
-        "table3.k_brk_n"),
-    "seal.c": _told(5.06, "-26.6 to 36.7",
-        "table3.c"),
-    "ecu.filter.zeta": _told(0.7095, "-0.0965 to 1.52",
-        "table4.medium.K, table4.high.T1, fig5.loop_area_ratio"),
-}  # fmt: skip
+    "master_cylinder.A_mc": _told(
+        6.982e-05, "-0.00011 to 0.00025", "table4.medium.K, fig6.peak, table3.f_cfr_p"
+    ),
+    "gear.eta_g": _told(
+        1, "0.589 to 1.41", "table4.high.overshoot, fig5.loop_area_ratio, table4.high.T1"
+    ),
+    "gear.J_mot": _told(
+        1.363e-05, "-3.32e-05 to 6.05e-05", "table4.medium.K, table4.high.K, fig6.peak"
+    ),
+    "master_cylinder.k_damp": _told(0, "-3.7e+04 to 3.7e+04", "fig7.peak, table4.high.K"),
+    "caliper.K_pd": _told(
+        1.106e06, "-4.81e+06 to 7.03e+06", "table4.medium.K, table4.low.T1, fig6.peak"
+    ),
+    "seal.f_cfr_p": _told(1.628e-08, "-1.39e-08 to 4.64e-08", "table3.f_cfr_p"),
+    "seal.f_cfr_n": _told(5.405e-09, "2.23e-09 to 8.58e-09", "table3.f_cfr_n"),
+    "seal.k_brk_p": _told(2.886, "-0.147 to 5.92", "fig7.peak, table4.high.K, table4.medium.K"),
+    "seal.k_brk_n": _told(2.291, "-0.88 to 5.46", "table3.k_brk_n"),
+    "seal.c": _told(5.06, "-26.6 to 36.7", "table3.c"),
+    "ecu.filter.zeta": _told(
+        0.7095, "-0.0965 to 1.52", "table4.medium.K, table4.high.T1, fig5.loop_area_ratio"
+    ),
+}
 NOT_TOLD = ("master_cylinder.s_mc", "fluid.V_air", "seal.T_pr", "seal.mu_T", "pipeline.d_pl")
 _UNTOLD = "as in dardanelli2010-table1: estimated with the others, but no statement tells it"
 _KNOWN = "the ECU knows the friction, as it was estimated"
 _SEAL: dict[str, Formula] = {
-    "f_cfr_p": lambda par: par.seal.f_cfr_p, "k_brk_p": lambda par: par.seal.k_brk_p,
-}  # fmt: skip
+    "f_cfr_p": lambda par: par.seal.f_cfr_p,
+    "k_brk_p": lambda par: par.seal.k_brk_p,
+}
 
 ENTRIES = (
     CitedSet(

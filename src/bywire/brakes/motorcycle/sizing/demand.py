@@ -163,14 +163,21 @@ def geared(par: Par, k_g: float) -> Par:
     """
     r = k_g / par.gear.k_g
     powers = {
-        "seal.T_pr": 1, "seal.f_cfr_p": 1, "seal.f_cfr_n": 1, "seal.c": 1, "seal.mu_T": 2,
-        "ecu.est_par.T_pr": 1, "ecu.est_par.f_cfr_p": 1,
-        "ecu.pressure.k_p": 1, "ecu.pressure.k_i": 1, "ecu.pressure.k_d": 1,
-    }  # fmt: skip
+        "seal.T_pr": 1,
+        "seal.f_cfr_p": 1,
+        "seal.f_cfr_n": 1,
+        "seal.c": 1,
+        "seal.mu_T": 2,
+        "ecu.est_par.T_pr": 1,
+        "ecu.est_par.f_cfr_p": 1,
+        "ecu.pressure.k_p": 1,
+        "ecu.pressure.k_i": 1,
+        "ecu.pressure.k_d": 1,
+    }
     values = par.flat()
-    return par.replace({name: values[name] * r**n for name, n in powers.items()} | {
-        "gear.k_g": k_g
-    })
+    return par.replace(
+        {name: values[name] * r**n for name, n in powers.items()} | {"gear.k_g": k_g}
+    )
 
 
 def _load(par: Par, p: Any, v: Any, omega: Any) -> tuple[Any, seal.Output]:

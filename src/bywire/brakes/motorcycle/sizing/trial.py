@@ -48,14 +48,28 @@ def sine_figures(label: str, par: Par, top: float, amplitude: float, f: float) -
     text = "on the bench, dither off, over the calculated one"
     return [
         Kpi(f"{label}_bench_amplitude", reached, "Pa", "Amplitude of the pressure reached.", note),
-        Kpi(f"{label}_bench_current", float(run["i"].max()) / float(wanted.current.max()), "1",
-            f"Largest current of that sine {text}.", note),
-        Kpi(f"{label}_bench_speed",
-            float(np.abs(run["omega"]).max()) / float(np.abs(wanted.omega).max()), "1",
-            f"Largest speed of that sine {text}.", note),
-        Kpi(f"{label}_bench_power", float(power.max()) / float(wanted.electrical.max()), "1",
-            f"Largest electrical power of that sine {text}.", note),
-    ]  # fmt: skip
+        Kpi(
+            f"{label}_bench_current",
+            float(run["i"].max()) / float(wanted.current.max()),
+            "1",
+            f"Largest current of that sine {text}.",
+            note,
+        ),
+        Kpi(
+            f"{label}_bench_speed",
+            float(np.abs(run["omega"]).max()) / float(np.abs(wanted.omega).max()),
+            "1",
+            f"Largest speed of that sine {text}.",
+            note,
+        ),
+        Kpi(
+            f"{label}_bench_power",
+            float(power.max()) / float(wanted.electrical.max()),
+            "1",
+            f"Largest electrical power of that sine {text}.",
+            note,
+        ),
+    ]
 
 
 def braking_figures(label: str, par: Par, p_from: float, p_to: float) -> list[Kpi]:
@@ -67,10 +81,15 @@ def braking_figures(label: str, par: Par, p_from: float, p_to: float) -> list[Kp
     kpis = {kpi.name: kpi for kpi in experiment.judge({"run": _recorded(case)}, options)}
     wanted = ("rise_time", "overshoot", "peak_current", "peak_power", "share_sat_current")
     return [
-        Kpi(f"{label}_braking_{name}", kpis[name].value, kpis[name].unit,
-            f"Hard braking: {kpis[name].definition}", kpis[name].note)
+        Kpi(
+            f"{label}_braking_{name}",
+            kpis[name].value,
+            kpis[name].unit,
+            f"Hard braking: {kpis[name].definition}",
+            kpis[name].note,
+        )
         for name in wanted
-    ]  # fmt: skip
+    ]
 
 
 def _sine_run(par: Par, mean: float, swing: float, f: float) -> xr.Dataset:
@@ -80,9 +99,15 @@ def _sine_run(par: Par, mean: float, swing: float, f: float) -> xr.Dataset:
         return {"p_set": mean + swing * np.sin(w * t)}
 
     case = case_from_rest(
-        "sine", par, "pressure", mean, stimulus, round(_PERIODS / f, 3), WITHOUT_DITHER,
+        "sine",
+        par,
+        "pressure",
+        mean,
+        stimulus,
+        round(_PERIODS / f, 3),
+        WITHOUT_DITHER,
         settle=settle,
-    )  # fmt: skip
+    )
     return _recorded(case)
 
 

@@ -55,8 +55,12 @@ def compute(par: Par, options: Options, progress: Progress) -> Findings:
             f"{highest / 1e5:.4g} bar, where the piston meets its end stop: lower it, or move the "
             "stop (master_cylinder.x_end)"
         )
-    data = _mapped(par, options, options.ratios,
-                   np.geomspace(options.f_min, options.f_max, options.frequencies))  # fmt: skip
+    data = _mapped(
+        par,
+        options,
+        options.ratios,
+        np.geomspace(options.f_min, options.f_max, options.frequencies),
+    )
     k_best = _best_ratio(par, options)
     chosen = geared(par, k_best)
     f, power = options.bandwidth, float(_electrical(chosen, options).max())
@@ -133,15 +137,28 @@ def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
     A_dit = dither.k_brk_p * (dither.T_pr + dither.f_cfr_p * options.p_peak) / dither.K_e
     note = "" if par.ecu.dither.waveform != "off" else "dither is off"
     return [
-        *(Kpi(f"{label}_{name}", sizes[name], SIZES[name][0], text)
-          for name, text in texts.items()),
+        *(
+            Kpi(f"{label}_{name}", sizes[name], SIZES[name][0], text)
+            for name, text in texts.items()
+        ),
         Kpi(f"{label}_copper", float(copper), "W", "Mean copper loss over the course."),
-        Kpi(f"{label}_dither_current", A_dit * par.ecu.dither.gain, "A",
-            "Amplitude of the dither's current at the peak pressure, eq. (20).", note),
-        *(Kpi(f"{label}_fastest_{kind}", fastest(par, options, kind), "Hz",
-              f"Highest bandwidth of the {kind} within current and voltage limit.")
-          for kind in ("sine", "step")),
-    ]  # fmt: skip
+        Kpi(
+            f"{label}_dither_current",
+            A_dit * par.ecu.dither.gain,
+            "A",
+            "Amplitude of the dither's current at the peak pressure, eq. (20).",
+            note,
+        ),
+        *(
+            Kpi(
+                f"{label}_fastest_{kind}",
+                fastest(par, options, kind),
+                "Hz",
+                f"Highest bandwidth of the {kind} within current and voltage limit.",
+            )
+            for kind in ("sine", "step")
+        ),
+    ]
 
 
 def _mapped(par: Par, options: Options, ratios: int, frequencies: Array) -> xr.Dataset:
@@ -152,8 +169,15 @@ def _mapped(par: Par, options: Options, ratios: int, frequencies: Array) -> xr.D
 def _cut(par: Par, options: Options) -> Cut:
     """Return what changes along the gear ratio at the bandwidth wanted."""
     row = _mapped(par, options, _ROWS, np.array([options.bandwidth])).isel(frequency=0)
-    names = ("electrical", "mechanical", "torque", "speed", "inertia_share", "current_share",
-             "voltage_share")  # fmt: skip
+    names = (
+        "electrical",
+        "mechanical",
+        "torque",
+        "speed",
+        "inertia_share",
+        "current_share",
+        "voltage_share",
+    )
     return Cut(f"{options.demand} at a bandwidth of {options.bandwidth:g} Hz", row, ("k_g", *names))
 
 
@@ -176,8 +200,17 @@ STUDY = Study(
     summary="gear ratio and motor power for a bandwidth and a peak pressure, and their trial",
     options=Options,
     defaults=Options(
-        bandwidth=10.0, p_peak=37e5, amplitude=3e5, p_from=6e5, demand="sine", k_g_min=1e-4,
-        k_g_max=1e-3, ratios=41, f_min=1.0, f_max=30.0, frequencies=31,
+        bandwidth=10.0,
+        p_peak=37e5,
+        amplitude=3e5,
+        p_from=6e5,
+        demand="sine",
+        k_g_min=1e-4,
+        k_g_max=1e-3,
+        ratios=41,
+        f_min=1.0,
+        f_max=30.0,
+        frequencies=31,
     ),
     compute=compute,
     ruled={

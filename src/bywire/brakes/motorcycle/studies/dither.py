@@ -61,9 +61,14 @@ def compute(par: Par, options: Options, progress: Progress) -> Findings:
         f = designs.get("optimum", given)[1]
         cuts.append(compared(dithered, grid, f, limits, lambda share: progress("waveforms", share)))
     return Findings(
-        data, tuple(kpis), ASSUMPTIONS, _maps(data, options, designs), tuple(cuts),
-        _warnings(options, grid, each, best), _limits(grid, each, best),
-    )  # fmt: skip
+        data,
+        tuple(kpis),
+        ASSUMPTIONS,
+        _maps(data, options, designs),
+        tuple(cuts),
+        _warnings(options, grid, each, best),
+        _limits(grid, each, best),
+    )
 
 
 def grid_of(par: Par, options: Options) -> Grid:
@@ -79,9 +84,12 @@ def grid_of(par: Par, options: Options) -> Grid:
 def limits_of(options: Options) -> dict[str, float]:
     """Return the largest admissible value of every figure that has one."""
     return {
-        "stuck": options.stuck_max, "band": options.band_max,
-        "ripple_caliper": options.ripple_max, "current_share": 1.0, "duty_share": 1.0,
-    }  # fmt: skip
+        "stuck": options.stuck_max,
+        "band": options.band_max,
+        "ripple_caliper": options.ripple_max,
+        "current_share": 1.0,
+        "duty_share": 1.0,
+    }
 
 
 def _require_reachable(par: Par, options: Options) -> None:
@@ -113,13 +121,22 @@ def _kpis(
             over = name in limits and value > limits[name] * 1.02  # interpolated designs scatter
             which = "mean of the pressures" if mean else "worst pressure"
             kpis.append(
-                Kpi(f"{label}_{name}", value, unit, f"{text.capitalize()}, {which}.",
-                    "beyond its limit" if over else "")
-            )  # fmt: skip
+                Kpi(
+                    f"{label}_{name}",
+                    value,
+                    unit,
+                    f"{text.capitalize()}, {which}.",
+                    "beyond its limit" if over else "",
+                )
+            )
         kpis.append(
-            Kpi(f"{label}_area_ratio", ratio, "1",
-                "Area of the loop on the ramp of eq. (17) over that without dither; delay counts.")
-        )  # fmt: skip
+            Kpi(
+                f"{label}_area_ratio",
+                ratio,
+                "1",
+                "Area of the loop on the ramp of eq. (17) over that without dither; delay counts.",
+            )
+        )
         kpis += _plant(par, label, gain, f, grid.pressures[len(grid.pressures) // 2])
     return kpis
 
@@ -147,20 +164,34 @@ def _maps(
     limits = {
         f"stuck more than {100 * options.stuck_max:g} %": ("worst_stuck", options.stuck_max),
         f"ripple above {options.ripple_max / 1e5:g} bar": (
-            "worst_ripple_caliper", options.ripple_max,
+            "worst_ripple_caliper",
+            options.ripple_max,
         ),
         "current limit": ("worst_current_share", 1.0),
-    }  # fmt: skip
+    }
     low, high = (p / 1e5 for p in (min(options.pressures), max(options.pressures)))
     where = f"worst of {len(options.pressures)} pressures from {low:g} to {high:g} bar"
     return {
-        "copper": Map("worst_copper", "gain", "frequency", f"Dither's copper power, {where}.",
-                      marks, limits),
-        "stuck": Map("worst_stuck", "gain", "frequency",
-                     f"Share of the time in which the piston sticks, {where}.", marks, limits),
-        "ripple": Map("worst_ripple_caliper", "gain", "frequency",
-                      f"Pressure ripple at the caliper, peak to peak, {where}.", marks, limits),
-    }  # fmt: skip
+        "copper": Map(
+            "worst_copper", "gain", "frequency", f"Dither's copper power, {where}.", marks, limits
+        ),
+        "stuck": Map(
+            "worst_stuck",
+            "gain",
+            "frequency",
+            f"Share of the time in which the piston sticks, {where}.",
+            marks,
+            limits,
+        ),
+        "ripple": Map(
+            "worst_ripple_caliper",
+            "gain",
+            "frequency",
+            f"Pressure ripple at the caliper, peak to peak, {where}.",
+            marks,
+            limits,
+        ),
+    }
 
 
 def _limits(grid: Grid, each: list[Candidate], best: int | None) -> tuple[str, ...]:
@@ -172,8 +203,11 @@ def _limits(grid: Grid, each: list[Candidate], best: int | None) -> tuple[str, .
         f"the gain of {chosen.gain:.3g} is asked for by the {NAMES[chosen.binding]} at "
         f"{grid.pressures[chosen.decisive] / 1e5:g} bar"
     ]
-    out = [f"{f:.4g} Hz ({e.verdict})" for f, e in zip(grid.frequencies, each, strict=True)
-           if e.verdict]  # fmt: skip
+    out = [
+        f"{f:.4g} Hz ({e.verdict})"
+        for f, e in zip(grid.frequencies, each, strict=True)
+        if e.verdict
+    ]
     return (*texts, f"frequencies excluded: {', '.join(out)}") if out else tuple(texts)
 
 

@@ -34,12 +34,21 @@ def single() -> list[Result]:
     seconds = interleaved({"bywire": kernel(run), "hand": opponent}, _ROUNDS)
     substeps = opponent.substeps
     return [
-        at_most("vehicle.single.hand_c", ratio(seconds, "bywire", "hand"), 1.0, "ratio",
-                f"one stop of {run.duration:g} s by slip control, all outputs, over hand-written "
-                "C; same scheme, compiler and flags, one call each"),
-        Result("vehicle.single.substep", 1e9 * median(seconds["bywire"]) / substeps, "ns",
-               note="a substep of vehicle, brakes and books, one call of the kernel"),
-    ]  # fmt: skip
+        at_most(
+            "vehicle.single.hand_c",
+            ratio(seconds, "bywire", "hand"),
+            1.0,
+            "ratio",
+            f"one stop of {run.duration:g} s by slip control, all outputs, over hand-written "
+            "C; same scheme, compiler and flags, one call each",
+        ),
+        Result(
+            "vehicle.single.substep",
+            1e9 * median(seconds["bywire"]) / substeps,
+            "ns",
+            note="a substep of vehicle, brakes and books, one call of the kernel",
+        ),
+    ]
 
 
 PART = Part("vehicle", single)

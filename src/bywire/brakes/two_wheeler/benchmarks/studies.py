@@ -31,11 +31,14 @@ def studies() -> list[Result]:
         simulated, judged = simulated_and_judged(plan, _ROUNDS)
     return [
         at_most(
-            "study.vehicle_kpi_share", judged / simulated, 0.05, "1",
+            "study.vehicle_kpi_share",
+            judged / simulated,
+            0.05,
+            "1",
             f"key figures of a vehicle's stop, {1e6 * judged:.3g} us a case, over its simulation, "
             f"{1e3 * simulated:.3g} ms",
         ),
-    ]  # fmt: skip
+    ]
 
 
 PART = Part("vehicle studies", studies)

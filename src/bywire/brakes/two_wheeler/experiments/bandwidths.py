@@ -21,9 +21,12 @@ from bywire.core.quantities import Duration, Nodes, Unit
 from bywire.plant.road import SurfaceName
 
 _SHOWN = {
-    "stopping_distance": "m", "braking_efficiency": "%", "peak_slip_front": "1", "jerk": "m/s**3",
+    "stopping_distance": "m",
+    "braking_efficiency": "%",
+    "peak_slip_front": "1",
+    "jerk": "m/s**3",
     "locked_time_front": "s",
-}  # fmt: skip
+}
 
 
 class Options(ParameterSet):
@@ -52,15 +55,19 @@ def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tupl
     demands = {"p_f_set": options.p_front, "p_r_set": options.p_rear}
     return tuple(
         rolling_case(
-            par, options.v_0, demands, options.duration,
+            par,
+            options.v_0,
+            demands,
+            options.duration,
             {
-                "front.circuit.f_n": f, "rear.circuit.f_n": f,
+                "front.circuit.f_n": f,
+                "rear.circuit.f_n": f,
                 **on_surface(options.surface),
             },
             _label(f),
         )
         for f in options.f_n
-    )  # fmt: skip
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
@@ -79,9 +86,13 @@ def named(options: Options) -> dict[str, str]:
 
 
 _DEFAULTS = Options(
-    v_0=30.0, p_front=40e5, p_rear=40e5, surface="wet-asphalt",
-    f_n=(2.0, 3.0, 5.0, 10.0, 20.0, 40.0, 100.0), duration=7.0,
-)  # fmt: skip
+    v_0=30.0,
+    p_front=40e5,
+    p_rear=40e5,
+    surface="wet-asphalt",
+    f_n=(2.0, 3.0, 5.0, 10.0, 20.0, 40.0, 100.0),
+    duration=7.0,
+)
 
 EXPERIMENT = Experiment(
     name="bandwidths",
@@ -95,6 +106,9 @@ EXPERIMENT = Experiment(
     named=named,
     figures=("overlaid-traces",),
     compared={
-        "v": "speed", "a": "deceleration", "slip_f": "front slip", "p_f": "front pressure",
+        "v": "speed",
+        "a": "deceleration",
+        "slip_f": "front slip",
+        "p_f": "front pressure",
     },
-)  # fmt: skip
+)

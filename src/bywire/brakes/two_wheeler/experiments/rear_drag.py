@@ -22,9 +22,10 @@ FIGURES = Figures(
     drag=("N*m", f"Mean torque that the rear brake holds in the last {_END:g} s."),
     residual_pressure=("Pa", "Mean pressure at its pads then."),
     release_time=(
-        "s", f"Time from letting go until the torque stays below {_LEFT:g} of what it was."
+        "s",
+        f"Time from letting go until the torque stays below {_LEFT:g} of what it was.",
     ),
-)  # fmt: skip
+)
 _SIGNALS = ("T_r", "p_r")
 
 
@@ -52,12 +53,17 @@ def cases(par: WholeRearParameters, options: Options, _: object = None) -> tuple
     changes = {**on_surface(options.surface), "rear.actuator.drive.mode": "pressure"}
     return (
         rolling_case(
-            par, options.v_0, {"p_r_set": demand}, options.duration, changes,
-            vehicle=(TwoWheelerWholeRear, lambda v, now, heat: at_speed(
-                v, now, heat, options.p_rear
-            )),
+            par,
+            options.v_0,
+            {"p_r_set": demand},
+            options.duration,
+            changes,
+            vehicle=(
+                TwoWheelerWholeRear,
+                lambda v, now, heat: at_speed(v, now, heat, options.p_rear),
+            ),
         ),
-    )  # fmt: skip
+    )
 
 
 def left(run: xr.Dataset, options: Options) -> dict[str, float | tuple[float, str]]:
@@ -65,8 +71,9 @@ def left(run: xr.Dataset, options: Options) -> dict[str, float | tuple[float, st
     t, torque, p = (run[name].values for name in ("time", *_SIGNALS))
     end = t >= t[-1] - _END
     figures: dict[str, float | tuple[float, str]] = {
-        "drag": float(torque[end].mean()), "residual_pressure": float(p[end].mean()),
-    }  # fmt: skip
+        "drag": float(torque[end].mean()),
+        "residual_pressure": float(p[end].mean()),
+    }
     go = int(np.searchsorted(t, options.hold))
     above = np.flatnonzero(torque > _LEFT * torque[min(go, t.size - 1)])
     if not go or go >= t.size or not torque[go] > 0.0:

@@ -226,9 +226,15 @@ def named(options: Options) -> dict[str, str]:
 
 
 _DEFAULTS = Options(
-    v_0=100.0 / 3.6, deceleration=8.0, share=0.8, hold="pressure", stops=10.0, pause=30.0,
-    v_pause=100.0 / 3.6, parked=900.0,
-)  # fmt: skip
+    v_0=100.0 / 3.6,
+    deceleration=8.0,
+    share=0.8,
+    hold="pressure",
+    stops=10.0,
+    pause=30.0,
+    v_pause=100.0 / 3.6,
+    parked=900.0,
+)
 
 EXPERIMENT = Experiment(
     name="repeated-stops",
@@ -245,7 +251,12 @@ EXPERIMENT = Experiment(
     preview=preview,
     named=named,
     compared={
-        "v": "speed", "a": "deceleration", "p_f": "front pressure", "T_disc_f": "front discs",
-        "T_pads_f": "front pads", "T_fluid_f": "front fluid", "T_disc_r": "rear disc",
+        "v": "speed",
+        "a": "deceleration",
+        "p_f": "front pressure",
+        "T_disc_f": "front discs",
+        "T_pads_f": "front pads",
+        "T_fluid_f": "front fluid",
+        "T_disc_r": "rear disc",
     },
-)  # fmt: skip
+)

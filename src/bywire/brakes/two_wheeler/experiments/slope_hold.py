@@ -29,12 +29,14 @@ FIGURES = Figures(
     creep=("m", "Distance in that time."),
     held_time=("s", "That time."),
     roll_off=(
-        "m/s**2", f"Mean acceleration downhill, from {_OPENED:g} s after letting go on.",
+        "m/s**2",
+        f"Mean acceleration downhill, from {_OPENED:g} s after letting go on.",
     ),
     free_roll_off=(
-        "m/s**2", "The same in closed form: slope less rolling resistance, wheels turning along.",
+        "m/s**2",
+        "The same in closed form: slope less rolling resistance, wheels turning along.",
     ),
-)  # fmt: skip
+)
 
 
 class Options(ParameterSet):

@@ -28,7 +28,7 @@ FIGURES = Figures(
     ringing_time=("s", f"Time from the standstill until the speed stays below {_QUIET:g} m/s."),
     creep_speed=("m/s", f"Largest speed from {_CALM:g} s after the first standstill on."),
     creep=("m", "Distance in that time."),
-)  # fmt: skip
+)
 
 
 class Options(ParameterSet):

@@ -48,9 +48,7 @@ EXPERIMENT = Experiment(
     assembly="two-wheeler-by-wire",
     summary="panic stop from {v_0:km/h} with {p_front} in front and {p_rear} behind, on {surface}",
     options=Options,
-    defaults=Options(
-        v_0=_FROM, p_front=40e5, p_rear=40e5, surface="dry-asphalt", duration=0.0
-    ),
+    defaults=Options(v_0=_FROM, p_front=40e5, p_rear=40e5, surface="dry-asphalt", duration=0.0),
     cases=cases,
     judge=JUDGE,
     kpis=units_of("vehicle_stop"),

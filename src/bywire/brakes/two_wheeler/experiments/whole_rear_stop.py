@@ -55,9 +55,7 @@ EXPERIMENT = Experiment(
     assembly="two-wheeler-whole-rear",
     summary="panic stop with the whole motorcycle brake by wire at the rear wheel, {p_rear}",
     options=Options,
-    defaults=Options(
-        v_0=30.0, p_front=40e5, p_rear=40e5, surface="wet-asphalt", duration=0.0
-    ),
+    defaults=Options(v_0=30.0, p_front=40e5, p_rear=40e5, surface="wet-asphalt", duration=0.0),
     cases=cases,
     judge=replace(JUDGE, further=price, further_signals=_SIGNALS),
     kpis=FIGURES.units | units_of("vehicle_stop"),

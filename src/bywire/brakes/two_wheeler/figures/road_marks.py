@@ -50,9 +50,12 @@ def road_marks(run: xr.Dataset, par: VehicleParameters) -> Figure:
     for name, (color, dash) in _STROKES.items():
         shown = channel(run, name)
         upper.plot(
-            *decimate(front, shown.values), color=color, linestyle=dash, linewidth=1.3,
+            *decimate(front, shown.values),
+            color=color,
+            linestyle=dash,
+            linewidth=1.3,
             label=style.plain(shown.label),
-        )  # fmt: skip
+        )
     upper.set_ylabel(style.axis_label("speed", "m/s"))
     span = (float(front[0]) - par.body.L, float(front[-1]))
     _draw_surfaces(lower, par, span)
@@ -62,9 +65,13 @@ def road_marks(run: xr.Dataset, par: VehicleParameters) -> Figure:
     if span[0] < ideal < min(span[1], par.road.x_change):  # of a single surface
         for axes in (upper, lower):
             axes.axvline(
-                ideal, color=style.BLACK, linestyle="--", linewidth=1.0, zorder=2.5,
+                ideal,
+                color=style.BLACK,
+                linestyle="--",
+                linewidth=1.0,
+                zorder=2.5,
                 label="ideal stop" if axes is upper else None,
-            )  # fmt: skip
+            )
     lower.set_yticks(range(len(lanes)), list(lanes))
     lower.set_ylim(-0.6, len(lanes) - 0.4)
     lower.set_ylabel("wheel")
@@ -87,9 +94,14 @@ def _draw_surfaces(axes: Axes, par: VehicleParameters, span: tuple[float, float]
             continue
         name = surface_name(0.5 * (left + right), ways)
         axes.axvspan(
-            left, right, color=TINTS[name], alpha=_TINT, linewidth=0, zorder=0.5,
+            left,
+            right,
+            color=TINTS[name],
+            alpha=_TINT,
+            linewidth=0,
+            zorder=0.5,
             label=None if name in drawn else name.replace("-", " "),
-        )  # fmt: skip
+        )
         drawn.add(name)
 
 
@@ -104,9 +116,13 @@ def _draw_marks(axes: Axes, run: xr.Dataset, place: Array, wheel: str, row: int)
     for label, flags, color, width, order in marks:
         spans = [(begin, end - begin) for begin, end in phases(place, flags)]
         axes.broken_barh(
-            spans, (row - 0.5 * width, width), facecolor=color, linewidth=0, zorder=order,
+            spans,
+            (row - 0.5 * width, width),
+            facecolor=color,
+            linewidth=0,
+            zorder=order,
             label=label if row == 0 else None,
-        )  # fmt: skip
+        )
 
 
 def _of_runs(result: Result) -> list[Shown]:

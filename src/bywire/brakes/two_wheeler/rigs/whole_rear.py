@@ -41,9 +41,12 @@ class TwoWheelerWholeRear(HotBrakes[WholeRearParameters, Any]):
     front_disc = Part(brake_disc, par="front.disc")
     rear_disc = Part(brake_disc, par="rear.disc")
     actuator = Sub(
-        MotorcycleBrake, prefix="rear_", par="rear.actuator", label="rear brake",
+        MotorcycleBrake,
+        prefix="rear_",
+        par="rear.actuator",
+        label="rear brake",
         feeds={"p_set": "p_r_ref"},
-    )  # fmt: skip
+    )
     p_r = Wire("Pa", "pressure at the rear pads", 2e6)
 
     records: ClassVar[tuple[str, ...]] = (*TwoWheelerByWire.records, *actuator.records)

@@ -9,10 +9,12 @@ from bywire.core.provenance import chosen, derived
 from bywire.plant.road import SURFACES
 
 _FROM = {
-    "wheel": "vehicle.front_wheel", "tyre": "vehicle.front_tyre", "brake.circuit": "front.circuit",
+    "wheel": "vehicle.front_wheel",
+    "tyre": "vehicle.front_tyre",
+    "brake.circuit": "front.circuit",
     "brake.disc": "front.disc",
     "slip": "ecu.front_slip",
-}  # fmt: skip
+}
 
 _PLACES = {there: here for here, there in _FROM.items()}
 

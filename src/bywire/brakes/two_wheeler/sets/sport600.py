@@ -57,12 +57,23 @@ _SOUGHT = (
     "wheels, rounded"
 )
 _RULES = {
-    "slip_keep": 0.345, "slip_dump": 0.51, "slip_back": 0.224, "t_lead": 0.133, "a_hold": 13.7,
-    "t_hold": 0.0265, "t_most": 0.47, "dump": 100.0, "depth": 0.935, "back": 1.015,
+    "slip_keep": 0.345,
+    "slip_dump": 0.51,
+    "slip_back": 0.224,
+    "t_lead": 0.133,
+    "a_hold": 13.7,
+    "t_hold": 0.0265,
+    "t_most": 0.47,
+    "dump": 100.0,
+    "depth": 0.935,
+    "back": 1.015,
     "t_step": 0.0183,
-    "step": 0.0425, "growth": 1.12, "tau_a": 0.0055, "tau_p": 0.025,
+    "step": 0.0425,
+    "growth": 1.12,
+    "tau_a": 0.0055,
+    "tau_p": 0.025,
     "v_fall": 4.85,
-}  # fmt: skip
+}
 _DRY = {
     name: derived(value, "dry asphalt for car tyres, as circulated")
     for name, value in SURFACES["dry-asphalt"]._asdict().items()

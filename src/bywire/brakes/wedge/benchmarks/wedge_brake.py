@@ -36,9 +36,15 @@ STEP = 20e-6
 FINE = 1e-6
 CASES = 256
 VARIED = (
-    "wedge.mu_B", "caliper.K_cal", "bearing.C_0", "motor_1.K_ref", "motor_1.J_M", "screw.lead",
-    "heart.K_W", "wedge_friction.mu_int",
-)  # fmt: skip
+    "wedge.mu_B",
+    "caliper.K_cal",
+    "bearing.C_0",
+    "motor_1.K_ref",
+    "motor_1.J_M",
+    "screw.lead",
+    "heart.K_W",
+    "wedge_friction.mu_int",
+)
 SIGNALS = ("x", "y_M", "i_1")
 _ROUNDS, _ENSEMBLE_ROUNDS = 30, 3
 # Regularized friction: the step at which a run takes a second, and the widths of least error there.
@@ -71,13 +77,22 @@ def single(par: WedgeParameters) -> list[Result]:
     )
     passes = opponent.extra / opponent.substeps
     return [
-        at_most("wedge.single.hand_c", ratio(seconds, "bywire", "hand"), 1.0, "ratio",
-                f"one run of Fig. 7, {run.duration:g} s, all outputs, over hand-written C of a "
-                f"fully iterated implicit midpoint, {passes:.2f} passes per substep; same "
-                "compiler and flags, one call each"),
-        Result("wedge.single.realtime_factor", run.duration / median(seconds["plain"]), "1",
-               note="simulated over wall time, a call from Python with all its preparation"),
-    ]  # fmt: skip
+        at_most(
+            "wedge.single.hand_c",
+            ratio(seconds, "bywire", "hand"),
+            1.0,
+            "ratio",
+            f"one run of Fig. 7, {run.duration:g} s, all outputs, over hand-written C of a "
+            f"fully iterated implicit midpoint, {passes:.2f} passes per substep; same "
+            "compiler and flags, one call each",
+        ),
+        Result(
+            "wedge.single.realtime_factor",
+            run.duration / median(seconds["plain"]),
+            "1",
+            note="simulated over wall time, a call from Python with all its preparation",
+        ),
+    ]
 
 
 def ensemble(par: WedgeParameters) -> list[Result]:
@@ -97,12 +112,16 @@ def ensemble(par: WedgeParameters) -> list[Result]:
     )
     width = vector_doubles()
     return [
-        at_least("wedge.ensemble.hand_c", least_ratio(seconds, "hand", "bywire"), 0.7 * width,
-                 "times faster",
-                 f"{CASES} variations of {len(VARIED)} parameters, three signals and no energies "
-                 "on both sides, over scalar C with the flags of a single run; least processor "
-                 f"times of a thread each, in turn; 0.7 of the vector width, {width} doubles"),
-    ]  # fmt: skip
+        at_least(
+            "wedge.ensemble.hand_c",
+            least_ratio(seconds, "hand", "bywire"),
+            0.7 * width,
+            "times faster",
+            f"{CASES} variations of {len(VARIED)} parameters, three signals and no energies "
+            "on both sides, over scalar C with the flags of a single run; least processor "
+            f"times of a thread each, in turn; 0.7 of the vector width, {width} doubles",
+        ),
+    ]
 
 
 def _hand_ensemble(run: Run, variations: dict[str, Array]) -> Work:

@@ -47,9 +47,7 @@ class Parameters(ParameterSet):
     """damping over stiffness"""
 
 
-FAULTS = (
-    ParameterFault("worn", "more free-play on both sides", ("g_1", "g_2"), 5.0),
-)
+FAULTS = (ParameterFault("worn", "more free-play on both sides", ("g_1", "g_2"), 5.0),)
 
 
 class Input(NamedTuple):

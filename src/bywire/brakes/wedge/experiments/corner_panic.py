@@ -58,10 +58,15 @@ def cases(par: WedgeCornerParameters, options: Options, _: object = None) -> tup
     levels = {0.0: options.M_brake}
     return (
         Case(
-            "run", WedgeCorner(), changed, state, memory, lambda t: {"M_set": steps(t, levels)},
+            "run",
+            WedgeCorner(),
+            changed,
+            state,
+            memory,
+            lambda t: {"M_set": steps(t, levels)},
             options.duration,
         ),
-    )  # fmt: skip
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

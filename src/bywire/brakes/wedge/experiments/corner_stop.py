@@ -67,11 +67,16 @@ def cases(par: WedgeCornerParameters, options: Options, _: object = None) -> tup
     levels = {0.0: options.M_brake, options.t_hold: 0.0}
     return (
         Case(
-            "run", WedgeCorner(), changed, state, memory, lambda t: {"M_set": steps(t, levels)},
+            "run",
+            WedgeCorner(),
+            changed,
+            state,
+            memory,
+            lambda t: {"M_set": steps(t, levels)},
             options.t_hold + options.t_end,
             start=lambda par: at_speed(options.v_0, par, options.T_disc),
         ),
-    )  # fmt: skip
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

@@ -54,19 +54,26 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     runs: list[Case] = []
     for label, (winding, gain) in zip(_LABELS, factors, strict=True):
         changes: dict[str, Any] = {
-            "rig.load": "dummy", "rig.clamp": "closed", "rig.mode_1": "current",
+            "rig.load": "dummy",
+            "rig.clamp": "closed",
+            "rig.mode_1": "current",
             "motor_1.R_ref": winding * par.motor_1.R_ref,
             "motor_1.L_M": winding * par.motor_1.L_M,
             "drive.k_p": gain * par.drive.k_p,
             "drive.k_i": gain * par.drive.k_i,
-        }  # fmt: skip
+        }
         runs.append(
             shaft_case(
-                label, par, lambda t: {"i_1_set": steps(t, {0.0: options.i_step})},
-                options.duration, changes,
-                settle=par.control.T_fast, keep=par.control.T_fast, record=options.record,
+                label,
+                par,
+                lambda t: {"i_1_set": steps(t, {0.0: options.i_step})},
+                options.duration,
+                changes,
+                settle=par.control.T_fast,
+                keep=par.control.T_fast,
+                record=options.record,
             )
-        )  # fmt: skip
+        )
     return tuple(runs)
 
 

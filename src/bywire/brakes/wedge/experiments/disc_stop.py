@@ -34,17 +34,16 @@ _CALM = 0.05  # time after the stop [s] in which wedge and current may still mov
 FIGURES = Figures(
     stopping_time=("s", "Time from the demand until the disc stands."),
     stopping_angle=("rad", "Angle of the disc until then."),
-    moment_before_stop=(
-        "N*m", "Mean moment in the last tenth of braking; the run-out is in it."
-    ),
+    moment_before_stop=("N*m", "Mean moment in the last tenth of braking; the run-out is in it."),
     force_before_stop=("N", "Mean normal force in the last tenth of braking."),
     force_held=("N", f"Mean normal force from {_CALM:g} s after the stop to the release."),
     force_change=("N", "Normal force peak to peak in that time."),
     reference_change=(
-        "rad", "How far the common reference moves toward clamping while the disc stands: wind-up."
+        "rad",
+        "How far the common reference moves toward clamping while the disc stands: wind-up.",
     ),
     hold_power=("W", "Mean input power in the time of the held force, standby included."),
-)  # fmt: skip
+)
 _UNITS = {**FIGURES.units, "release_time": "s", "parking_time": "s"}
 
 
@@ -68,16 +67,20 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     levels = {0.0: options.M_brake, options.t_hold: 0.0}
     return tuple(
         case_from_parked(
-            par, lambda t: {"M_set": steps(t, levels)}, options.t_hold + options.t_end,
+            par,
+            lambda t: {"M_set": steps(t, levels)},
+            options.t_hold + options.t_end,
             {
                 "flywheel.law": "coasting",
                 "flywheel.Omega_0": options.Omega_0,
                 "wedge_friction.stopped_disc": reading,
             },
-            label=reading, settle=options.settle, keep=options.settle,
+            label=reading,
+            settle=options.settle,
+            keep=options.settle,
         )
         for reading in READINGS
-    )  # fmt: skip
+    )
 
 
 def stop_figures(run: xr.Dataset, options: Options) -> dict[str, float] | str:

@@ -26,10 +26,8 @@ _LABELS = tuple(f"{motion}_{pair}" for motion in _MOTIONS for pair in ("equal", 
 _PAIRS = tuple(f"_{pair}" for pair in ("equal", "unequal"))
 PEAK = Figures(peak_force=("N", "Largest magnitude that the force sensor shows."))
 HELD = Figures(
-    static_force=(
-        "N", "Magnitude of the mean force in the last tenth of the time after the step."
-    ),
-)  # fmt: skip
+    static_force=("N", "Magnitude of the mean force in the last tenth of the time after the step."),
+)
 APART = Figures(peak_difference=("rad", "Largest difference of the encoders."))
 
 
@@ -70,12 +68,16 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     }
     return tuple(
         screw_case(
-            f"{motion}_{pair}", par, _reference(motion, options), options.duration,
-            modes | changes, record=options.record,
+            f"{motion}_{pair}",
+            par,
+            _reference(motion, options),
+            options.duration,
+            modes | changes,
+            record=options.record,
         )
         for motion in _MOTIONS
         for pair, changes in (("equal", {}), ("unequal", different))
-    )  # fmt: skip
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
@@ -114,8 +116,16 @@ EXPERIMENT = Experiment(
     summary="force between two motors that follow one reference, equal and unequal",
     options=Options,
     defaults=Options(
-        a_step=1.0, omega_ramp=60.0, a_sine=0.5, f_sine=20.0,
-        more_K=-0.05, more_J=0.05, more_R=0.10, more_D=0.50, duration=0.3, record=2e-4,
+        a_step=1.0,
+        omega_ramp=60.0,
+        a_sine=0.5,
+        f_sine=20.0,
+        more_K=-0.05,
+        more_J=0.05,
+        more_R=0.10,
+        more_D=0.50,
+        duration=0.3,
+        record=2e-4,
     ),
     cases=cases,
     judge=judge,
@@ -123,4 +133,4 @@ EXPERIMENT = Experiment(
     | HELD.ending(*_PAIRS)
     | APART.ending("_sine_unequal"),
     figures=("time-traces", "energy-balance"),
-)  # fmt: skip
+)

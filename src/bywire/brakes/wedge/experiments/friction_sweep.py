@@ -77,12 +77,16 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
         changes |= FRICTIONLESS
     return tuple(
         case_from_parked(
-            par, lambda t: {"M_set": steps(t, levels)}, options.t_hold,
+            par,
+            lambda t: {"M_set": steps(t, levels)},
+            options.t_hold,
             changes | with_friction(par, mu_B, options.slope == "known"),
-            label=tag(mu_B), settle=options.settle, keep=options.settle,
+            label=tag(mu_B),
+            settle=options.settle,
+            keep=options.settle,
         )
         for mu_B in options.mu_B
-    )  # fmt: skip
+    )
 
 
 def _stable(run: xr.Dataset, options: Options) -> tuple[float, str]:

@@ -33,7 +33,7 @@ FIGURES = Figures(
     contact_last=("s", "Time until the pads press, last application."),
     adjuster_work=("J", "Work of the adjuster on the caliper: 0 where it turns in the gap."),
     undefined="the pads do not press, or nothing turns",
-)  # fmt: skip
+)
 
 
 class Options(ParameterSet):
@@ -63,16 +63,20 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     levels = {begin: options.M_brake for begin in begins}
     levels |= {begin + options.t_hold: 0.0 for begin in begins}
     changes = {
-        "adjuster.law": "screw", "flywheel.law": "driven",
+        "adjuster.law": "screw",
+        "flywheel.law": "driven",
         "caliper.clearance": par.caliper.clearance + options.more,
-    }  # fmt: skip
+    }
     return (
         case_from_parked(
-            par, lambda t: {"M_set": steps(t, levels)},
-            begins[-1] + options.t_hold + options.t_pause, changes,
-            settle=options.settle, keep=options.settle,
+            par,
+            lambda t: {"M_set": steps(t, levels)},
+            begins[-1] + options.t_hold + options.t_pause,
+            changes,
+            settle=options.settle,
+            keep=options.settle,
         ),
-    )  # fmt: skip
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

@@ -34,14 +34,12 @@ _SETTLED = 0.4  # of a stroke, left out of the means
 FIGURES = Figures(
     force_max=("N", "Largest mean force of a stroke."),
     force_min=("N", "Smallest mean force of a stroke."),
-    eta_f_slope=(
-        "1", "Torque by the force over motor torque, by their growth; motor 1 driving."
-    ),
+    eta_f_slope=("1", "Torque by the force over motor torque, by their growth; motor 1 driving."),
     eta_f_true=("1", "What was put in."),
     eta_b_slope=("1", "The same, inverse, motor 1 driven back."),
     eta_b_true=("1", "What was put in."),
     undefined="the force does not grow with the current: more levels",
-)  # fmt: skip
+)
 
 
 class Options(ParameterSet):
@@ -115,8 +113,10 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     run = recordings["run"]
     par = parameters_of(run)
     k, K = slope_of(par), torque_constant_of(par)
-    rows = [(stroke.sign, *(_mean(run, stroke, name, options) for name in ("y_F", "i_1")))
-            for stroke in strokes(options)]  # fmt: skip
+    rows = [
+        (stroke.sign, *(_mean(run, stroke, name, options) for name in ("y_F", "i_1")))
+        for stroke in strokes(options)
+    ]
     driving = _line([row[1:] for row in rows if row[0] > 0])
     back = _line([row[1:] for row in rows if row[0] < 0])
     forces = [row[1] for row in rows]

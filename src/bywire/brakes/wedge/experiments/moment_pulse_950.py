@@ -46,11 +46,14 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     levels = {0.0: options.M_high, options.t_pulse: 0.0}
     return (
         case_from_parked(
-            par, lambda t: {"M_set": steps(t, levels)}, options.t_pulse + options.t_end,
+            par,
+            lambda t: {"M_set": steps(t, levels)},
+            options.t_pulse + options.t_end,
             {"control.moment.omega_gap": options.omega_gap},
-            settle=options.settle, keep=options.settle,
+            settle=options.settle,
+            keep=options.settle,
         ),
-    )  # fmt: skip
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

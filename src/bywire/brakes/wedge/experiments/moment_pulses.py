@@ -30,17 +30,19 @@ _OVER = "over the disc's last revolution of the hold; over its second half where
 FIGURES = Figures(
     hold_moment=("N*m", f"Mean moment {_OVER}."),
     hold_error=(
-        "%", "That moment less the demand, over the demand: far below 0 where the demand is beyond "
+        "%",
+        "That moment less the demand, over the demand: far below 0 where the demand is beyond "
         "the brake.",
     ),
     hold_ripple=("N*m", f"Moment peak to peak {_OVER}: the disc's run-out."),
     hold_power=("W", f"Mean input power {_OVER}, standby included."),
     brake_power=("W", f"Mean braking power {_OVER}."),
     pulse_moment=(
-        "N*m", "Mean moment over the disc's last revolution of the first pulse; over the pulse's "
+        "N*m",
+        "Mean moment over the disc's last revolution of the first pulse; over the pulse's "
         "last fifth where it is shorter.",
     ),
-)  # fmt: skip
+)
 
 
 class Options(ParameterSet):
@@ -75,10 +77,13 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
         levels[begin + options.t_low] = options.M_high
     return (
         case_from_parked(
-            par, lambda t: {"M_set": steps(t, levels)}, _end(options),
-            settle=options.settle, keep=options.settle,
+            par,
+            lambda t: {"M_set": steps(t, levels)},
+            _end(options),
+            settle=options.settle,
+            keep=options.settle,
         ),
-    )  # fmt: skip
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

@@ -23,10 +23,11 @@ _ROWS = 10  # fewest on the ramp
 FIGURES = Figures(
     ramp_error_mean=("N*m", "Mean of demand less moment, ramp."),
     ramp_error_rms=(
-        "N*m", "Root mean square of demand less moment on the ramp; the run-out is in it."
+        "N*m",
+        "Root mean square of demand less moment on the ramp; the run-out is in it.",
     ),
     ramp_slope=("N*m/s", "Slope of a line through the moment on the ramp."),
-)  # fmt: skip
+)
 
 
 class Options(ParameterSet):
@@ -70,10 +71,13 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     duration = options.t_hold + options.t_low + options.t_ramp + options.t_end
     return (
         case_from_parked(
-            par, lambda t: {"M_set": demand(t, options)}, duration,
-            settle=options.settle, keep=options.settle,
+            par,
+            lambda t: {"M_set": demand(t, options)},
+            duration,
+            settle=options.settle,
+            keep=options.settle,
         ),
-    )  # fmt: skip
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

@@ -36,13 +36,14 @@ FREEDOM = Figures(
     drag_moment=("N*m", "Largest moment from parking on: residual drag."),
     travel_left=("m", "Distance of the wedge from its middle at the end."),
     clearance_regained=(
-        "m", "Clearance at the end, both pads together, no run-out; negative where they press."
+        "m",
+        "Clearance at the end, both pads together, no run-out; negative where they press.",
     ),
     clearance_nominal=("m", "The same with the wedge centered."),
     travel_beyond=("m", "Largest travel of the wedge past its middle, toward the other side."),
     peak_current=("A", "Largest current of a motor during the release."),
     energy_in=("J", "Energy at the drives' input until the brake is parked, standby included."),
-)  # fmt: skip
+)
 
 
 class Options(ParameterSet):
@@ -61,10 +62,13 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     levels = {-options.settle: options.M_hold, 0.0: 0.0}
     return (
         case_from_parked(
-            par, lambda t: {"M_set": steps(t, levels)}, options.duration,
-            settle=options.settle, keep=min(options.settle, 0.1),
+            par,
+            lambda t: {"M_set": steps(t, levels)},
+            options.duration,
+            settle=options.settle,
+            keep=min(options.settle, 0.1),
         ),
-    )  # fmt: skip
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

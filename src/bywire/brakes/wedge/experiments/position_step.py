@@ -39,13 +39,15 @@ CURRENT = Figures(
 _REST = "largest over time and amplitudes, in % of the step."
 OVERALL = Figures(
     difference_screws=(
-        "%", f"Difference of the mean angle to screws that preload each other, no wedge; {_REST}"
+        "%",
+        f"Difference of the mean angle to screws that preload each other, no wedge; {_REST}",
     ),
     difference_motors=(
-        "%", f"Difference of the mean angle to motors whose screws touch nothing; {_REST}"
+        "%",
+        f"Difference of the mean angle to motors whose screws touch nothing; {_REST}",
     ),
     normal_force=("N", "Largest normal force: 0 while the steps stay within the clearance."),
-)  # fmt: skip
+)
 
 
 def _distinct(values: tuple[float, ...]) -> tuple[float, ...]:
@@ -113,12 +115,17 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     """Return a run for every arrangement, bandwidth and amplitude."""
     bands = dict(zip(_BANDS, (options.f_low, options.f_high), strict=True))
     return tuple(
-        _case(par, options, amplitude, f"{kind}-{band}-{_tag(amplitude)}",
-              {"command.mode": "position", "control.position.f_n": f_n, **changes})
+        _case(
+            par,
+            options,
+            amplitude,
+            f"{kind}-{band}-{_tag(amplitude)}",
+            {"command.mode": "position", "control.position.f_n": f_n, **changes},
+        )
         for kind, changes in _arrangements(par, options.delta).items()
         for band, f_n in bands.items()
         for amplitude in options.amplitudes
-    )  # fmt: skip
+    )
 
 
 def _case(
@@ -131,8 +138,12 @@ def _case(
             "theta_1_set": steps(t, {0.0: amplitude}) - apart,
             "theta_2_set": steps(t, {0.0: amplitude}) + apart,
         },
-        options.duration, changes, label, settle=options.settle, keep=options.settle,
-    )  # fmt: skip
+        options.duration,
+        changes,
+        label,
+        settle=options.settle,
+        keep=options.settle,
+    )
 
 
 def finish(run: xr.Dataset, _: Options) -> xr.Dataset:

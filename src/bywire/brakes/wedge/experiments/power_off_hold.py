@@ -43,10 +43,13 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     levels, off = {-options.settle: options.M_hold}, {0.0: 1.0}
     return (
         case_from_parked(
-            par, lambda t: {"M_set": steps(t, levels), "power_off": steps(t, off)},
-            options.duration, settle=options.settle, keep=min(options.settle, 0.1),
+            par,
+            lambda t: {"M_set": steps(t, levels), "power_off": steps(t, off)},
+            options.duration,
+            settle=options.settle,
+            keep=min(options.settle, 0.1),
         ),
-    )  # fmt: skip
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

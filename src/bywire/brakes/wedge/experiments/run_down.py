@@ -69,15 +69,24 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     rig = {"rig.mode_1": "current", "rig.load": "dummy", "rig.clamp": "open"}
     J = par.rig.J_dummy
     ratio = 1.0 + options.J_added / (par.motor_1.J_M + J)
-    kinds = (("free", J, 1.0, 0.0), ("added", J + options.J_added, ratio, 0.0),
-             ("braked", J, 1.0, -options.i_brake))  # fmt: skip
+    kinds = (
+        ("free", J, 1.0, 0.0),
+        ("added", J + options.J_added, ratio, 0.0),
+        ("braked", J, 1.0, -options.i_brake),
+    )
     return tuple(
         shaft_case(
-            label, par, _spun(options, i_after), options.duration, rig | {"rig.J_dummy": J_dummy},
-            settle=longer * options.t_spin, keep=0.0, record=options.record,
+            label,
+            par,
+            _spun(options, i_after),
+            options.duration,
+            rig | {"rig.J_dummy": J_dummy},
+            settle=longer * options.t_spin,
+            keep=0.0,
+            record=options.record,
         )
         for label, J_dummy, longer, i_after in kinds
-    )  # fmt: skip
+    )
 
 
 def _spun(options: Options, i_after: float) -> Stimuli:

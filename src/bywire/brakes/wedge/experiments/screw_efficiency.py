@@ -97,10 +97,11 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     pushed = {
         f"{label}{suffix}": _pushed(share * i, speed, options)
         for label, i, speed in (
-            ("driving", options.i_drive, slow), ("driven_back", options.i_back, -slow),
+            ("driving", options.i_drive, slow),
+            ("driven_back", options.i_back, -slow),
         )
         for suffix, share in (("", 1.0), ("_less", _LESS))
-    }  # fmt: skip
+    }
     return (
         shaft_case("no_load", par, turning, options.duration, alone, **timing),
         *(
@@ -175,9 +176,7 @@ def _mean(run: xr.Dataset, name: str, options: Options) -> float:
     return mean(run, name, _SETTLED * options.duration, options.duration)
 
 
-def _without_force(
-    full: tuple[Reading, float], less: tuple[Reading, float]
-) -> tuple[float, float]:
+def _without_force(full: tuple[Reading, float], less: tuple[Reading, float]) -> tuple[float, float]:
     """Return a torque per force as it is without force, and its growth; NaN where not steady."""
     (there, T), (below, T_less) = full, less
     steady = there.steady * below.steady

@@ -56,9 +56,10 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
     rig = {"rig.mode_1": "position", "rig.load": "dummy", "rig.clamp": "open"}
     return (
-        shaft_case("run", par, there_and_back, 2.0 * T, rig, settle=options.settle,
-                   record=options.record),
-    )  # fmt: skip
+        shaft_case(
+            "run", par, there_and_back, 2.0 * T, rig, settle=options.settle, record=options.record
+        ),
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

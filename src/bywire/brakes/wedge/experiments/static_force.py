@@ -32,16 +32,15 @@ EACH = Figures(
     F_M=("N", "Actuation force at the end, without friction."),
     F_M_closed=("N", "Closed form of it, (tan(alpha) - mu_B) F_N, at that normal force."),
     F_M_rising=(
-        "N", "With friction: mean force while the moment rises slowly, at that normal force."
+        "N",
+        "With friction: mean force while the moment rises slowly, at that normal force.",
     ),
-    F_M_falling=(
-        "N", "The same while it falls slowly: the force at rest is anywhere between."
-    ),
+    F_M_falling=("N", "The same while it falls slowly: the force at rest is anywhere between."),
     C_star=("1", "Brake factor without friction, 2 mu_B F_N / F_M."),
     C_star_closed=("1", "Closed form of it, 2 mu_B / (tan(alpha) - mu_B)."),
     C_star_rising=("1", "With friction: brake factor while the moment rises."),
     C_star_falling=("1", "With friction: brake factor while it falls."),
-)  # fmt: skip
+)
 ALL = Figures(
     F_M_error=("N", "Largest difference of force and closed form, without friction."),
     C_star_error=("%", "Largest difference of brake factor and closed form, without friction."),
@@ -81,13 +80,15 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     duration = options.t_start + 2.5 * options.t_ramp + options.t_hold
     return tuple(
         case_from_parked(
-            par, lambda t: {"M_set": demand(t, options)}, duration,
+            par,
+            lambda t: {"M_set": demand(t, options)},
+            duration,
             stand | with_friction(par, mu_B, known=True) | changes,
             label=f"{kind}-{tag(mu_B)}",
         )
         for kind, changes in ((FREE, FRICTIONLESS), (DRY, {}))
         for mu_B in options.mu_B
-    )  # fmt: skip
+    )
 
 
 def _sign(run: xr.Dataset) -> float:

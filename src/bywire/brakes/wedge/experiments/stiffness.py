@@ -118,8 +118,16 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 def _profile(options: Options) -> tuple[list[float], list[float]]:
     """Return times [s] and currents [A] of the corners."""
     i, hold = options.i_max, _HOLD
-    corners = [0.0, 1.0, 1.0 + hold, 2.0 + hold, 2.0 + 2 * hold, 3.0 + 2 * hold, 3.0 + 3 * hold,
-               4.0 + 3 * hold]  # fmt: skip
+    corners = [
+        0.0,
+        1.0,
+        1.0 + hold,
+        2.0 + hold,
+        2.0 + 2 * hold,
+        3.0 + 2 * hold,
+        3.0 + 3 * hold,
+        4.0 + 3 * hold,
+    ]
     return [options.t_ramp * c for c in corners], [0.0, i, i, 0.0, 0.0, -i, -i, 0.0]
 
 

@@ -60,10 +60,14 @@ def brake_factor(forces: WedgeForces, tan_alpha: float) -> Figure:
     look = style.STROKES[Role.SET_POINT]
     for axes, over in ((upper, False), (lower, True)):
         axes.plot(
-            line, _shown(line, tan_alpha - line, over), color=look.color,
-            linestyle=look.linestyle, linewidth=look.linewidth, zorder=look.zorder,
+            line,
+            _shown(line, tan_alpha - line, over),
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            zorder=look.zorder,
             label="closed form, no friction",
-        )  # fmt: skip
+        )
         for label, color, marker, ratio in (
             ("simulated, no friction", style.BLUE, "o", forces.free),
             ("with friction, moment rises", style.VERMILLION, "^", forces.rising),
@@ -72,9 +76,13 @@ def brake_factor(forces: WedgeForces, tan_alpha: float) -> Figure:
             values = _shown(mu, np.asarray(ratio, dtype=np.float64), over)
             axes.plot(mu, values, marker, color=color, markersize=4.5, zorder=4, label=label)
         axes.axvline(
-            tan_alpha, color=style.GRAY, linestyle=":", linewidth=1.0, zorder=1.5,
+            tan_alpha,
+            color=style.GRAY,
+            linestyle=":",
+            linewidth=1.0,
+            zorder=1.5,
             label="tan(alpha)",
-        )  # fmt: skip
+        )
         axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     lower.set_ylim(-1.05 * FARTHEST, 1.05 * FARTHEST)
     upper.set_ylabel(style.axis_label("actuation over normal force", "1", "\n"))

@@ -128,8 +128,9 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> State:
     touching = ops.where(par.M_contact < M, 1.0, 0.0)
     home = ops.where(u.theta_ref <= 1e-3 * par.omega_creep * T, 1.0, 0.0)
     mode = next_mode(x.mode, wanted, touching, home)
-    begins = ops.where(x.mode < 1.5, ops.where(mode > 1.5, ops.where(mode < 2.5, 1.0, 0.0), 0.0),
-                       0.0)  # fmt: skip
+    begins = ops.where(
+        x.mode < 1.5, ops.where(mode > 1.5, ops.where(mode < 2.5, 1.0, 0.0), 0.0), 0.0
+    )
     theta_c = ops.where(begins > 0.5, u.theta - M / par.slope_hat, x.theta_c)
     law = 2.0 * math.pi * par.f_c * (u.M_set - M) / par.slope_hat
     moment = ops.clip(law, -par.rate_max, par.rate_max)

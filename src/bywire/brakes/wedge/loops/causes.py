@@ -10,10 +10,14 @@ from bywire.analysis.response.saturation import Saturation
 Causes = Mapping[str, Mapping[str, Any]]
 
 _SCREWS: Causes = {
-    "bearing friction": {"bearing.C_0": 0.0, "bearing.C_1": 0.0, "bearing.C_2": 0.0,
-                         "bearing.T_nu": 0.0},
+    "bearing friction": {
+        "bearing.C_0": 0.0,
+        "bearing.C_1": 0.0,
+        "bearing.C_2": 0.0,
+        "bearing.T_nu": 0.0,
+    },
     "screw efficiency": {"screw.eta_f": 1.0, "screw.eta_b": 1.0},
-}  # fmt: skip
+}
 _MOTORS: Causes = {
     "cogging": {"motor_1.T_cog": 0.0, "motor_2.T_cog": 0.0},
     "encoder": {"encoder.law": "ideal"},

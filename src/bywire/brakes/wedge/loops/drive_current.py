@@ -28,11 +28,15 @@ def point(par: ParameterSet, value: float) -> Point:
     """
     clamped = cast(
         WedgeParameters,
-        par.replace({
-            "rig.mode_1": "current", "rig.load": "dummy", "rig.clamp": "closed",
-            "control.T_fast": _SAMPLE,
-        }),
-    )  # fmt: skip
+        par.replace(
+            {
+                "rig.mode_1": "current",
+                "rig.load": "dummy",
+                "rig.clamp": "closed",
+                "control.T_fast": _SAMPLE,
+            }
+        ),
+    )
     _require_reachable(value, clamped)
     drive, motor = clamped.drive, clamped.motor_1
     held = value / drive.G_sense

@@ -41,15 +41,21 @@ def point(par: ParameterSet, value: float) -> Point:
         reference = sign * theta + demand / _stiffness(rig)
         _require_reachable(value, abs(demand), rig)
         state |= {
-            f"demand_{n}": demand, f"sensed_{n}": demand, f"i_{n}": i, f"theta_{n}": sign * theta,
+            f"demand_{n}": demand,
+            f"sensed_{n}": demand,
+            f"i_{n}": i,
+            f"theta_{n}": sign * theta,
             f"integral_{n}": servo_motor.resistance(motor) * i / rig.drive.V_dc,
-        }  # fmt: skip
+        }
         memory |= {f"theta_{n}_ref": reference, f"last_{n}": sign * theta, f"i_{n}_ref": demand}
         stimulus |= {f"theta_{n}_set": reference}
     return Point(
-        ScrewRig(), rig, zeros(ScrewRig.State)._replace(**state),
-        zeros(Memory)._replace(**memory), zeros(Stimulus)._replace(**stimulus),
-    )  # fmt: skip
+        ScrewRig(),
+        rig,
+        zeros(ScrewRig.State)._replace(**state),
+        zeros(Memory)._replace(**memory),
+        zeros(Stimulus)._replace(**stimulus),
+    )
 
 
 def _stiffness(par: WedgeParameters) -> float:

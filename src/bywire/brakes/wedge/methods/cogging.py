@@ -173,8 +173,13 @@ def _turning(data: xr.Dataset, par: WedgeParameters, options: Options) -> Turnin
     def passed(values: Array) -> Array:
         return np.asarray(low_passed(values, interval, options.cutoff)[rows])
 
-    return Turning(moved["theta"].values[rows], ways, np.abs(omega[rows]), torque[rows],
-                   lambda n: (passed(np.cos(n * angle)), passed(np.sin(n * angle))))  # fmt: skip
+    return Turning(
+        moved["theta"].values[rows],
+        ways,
+        np.abs(omega[rows]),
+        torque[rows],
+        lambda n: (passed(np.cos(n * angle)), passed(np.sin(n * angle))),
+    )
 
 
 def _folded(cogging: CoggingFit) -> Curve:
@@ -198,11 +203,13 @@ def _folded(cogging: CoggingFit) -> Curve:
         f"Torque over one period of order {order} without friction: measured both ways, modeled.",
         xr.Dataset(
             {"measured": (dims, table, attrs), "modeled": (dims, model, attrs)},
-            {"direction": ["forward", "backward"],
-             "x": ("x", middle, {"units": "rad", "long_name": f"{order} times the shaft angle"})},
+            {
+                "direction": ["forward", "backward"],
+                "x": ("x", middle, {"units": "rad", "long_name": f"{order} times the shaft angle"}),
+            },
         ),
         "x",
-    )  # fmt: skip
+    )
 
 
 def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:

@@ -87,16 +87,26 @@ def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
     T = par.control.T_fast
     demand = levels(-options.i_step, options.i_step, options.duration, options.dwell, T, seed=1)
     case = shaft_case(
-        "run", par, lambda t: {"i_1_set": demand(t)}, options.duration, _CLAMPED,
+        "run",
+        par,
+        lambda t: {"i_1_set": demand(t)},
+        options.duration,
+        _CLAMPED,
         record=options.interval,
-    )  # fmt: skip
+    )
     computed = simulate(as_run(case, 20e-6), ("i_1",))
     noise = np.random.default_rng(seed).normal(0.0, options.sigma_i, computed.time.size)
     return xr.Dataset(
-        {"i_1_set": ("time", demand(computed.time), {"units": "A", "long_name": "current demand"}),
-         "i_1": ("time", computed["i_1"] + noise, {"units": "A", "long_name": "motor current"})},
+        {
+            "i_1_set": (
+                "time",
+                demand(computed.time),
+                {"units": "A", "long_name": "current demand"},
+            ),
+            "i_1": ("time", computed["i_1"] + noise, {"units": "A", "long_name": "motor current"}),
+        },
         {"time": ("time", np.asarray(computed.time), {"units": "s", "long_name": "time"})},
-    )  # fmt: skip
+    )
 
 
 METHOD = Method(
@@ -107,7 +117,12 @@ METHOD = Method(
     signals={"i_1_set": "A", "i_1": "A"},
     options=Options,
     defaults=Options(
-        unknowns="gains", lead=2e-3, i_step=5.0, dwell=2e-3, duration=0.1, interval=2e-5,
+        unknowns="gains",
+        lead=2e-3,
+        i_step=5.0,
+        dwell=2e-3,
+        duration=0.1,
+        interval=2e-5,
         sigma_i=2e-2,
     ),
     identify=identify,
@@ -115,4 +130,4 @@ METHOD = Method(
     unknowns=_GAINS,
     several=True,
     simulated=("i_step", "dwell", "duration", "interval", "sigma_i"),
-)  # fmt: skip
+)

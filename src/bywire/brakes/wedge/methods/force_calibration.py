@@ -79,8 +79,11 @@ def identify(
         figures=_figures(values, cycle, par),
         checks=(
             lack_of_fit(
-                "current_left_over", evaluate(values)[0], np.ones(cycle.i.size),
-                np.hstack((branches(cycle, 3, cycle.F), cycle.waves)), len(best.values),
+                "current_left_over",
+                evaluate(values)[0],
+                np.ones(cycle.i.size),
+                np.hstack((branches(cycle, 3, cycle.F), cycle.waves)),
+                len(best.values),
                 "whether current over force bends in a way that the law does not",
             ),
         ),
@@ -90,7 +93,7 @@ def identify(
             "between",
             "how the bearings' friction changes with speed is taken from the parameter set",
         ),
-    )  # fmt: skip
+    )
 
 
 def _scatter(cycle: Squeeze) -> float:
@@ -98,9 +101,7 @@ def _scatter(cycle: Squeeze) -> float:
     return max(float(np.median(np.abs(np.diff(cycle.i)))), 1e-9)
 
 
-def _figures(
-    values: Array, cycle: Squeeze, par: WedgeParameters
-) -> dict[str, tuple[float, str]]:
+def _figures(values: Array, cycle: Squeeze, par: WedgeParameters) -> dict[str, tuple[float, str]]:
     K = 0.5 * sum(servo_motor.torque_constant(m) for m in (par.motor_1, par.motor_2))
     per = K / roller_screw.slope(par.screw)
     top = float(np.abs(cycle.F).max())
@@ -133,13 +134,17 @@ def _curve(cycle: Squeeze, values: Array) -> Curve:
         "current-over-force",
         "Current over force, closing and opening, with the calibration line between.",
         xr.Dataset(
-            {name: (dims, values_of, attrs)
-             for name, values_of in zip(("measured", "modeled"), table, strict=True)},
-            {"direction": ["closing", "opening", "mean line"],
-             "F": (dims, F, {"units": "N", "long_name": "force"})},
+            {
+                name: (dims, values_of, attrs)
+                for name, values_of in zip(("measured", "modeled"), table, strict=True)
+            },
+            {
+                "direction": ["closing", "opening", "mean line"],
+                "F": (dims, F, {"units": "N", "long_name": "force"}),
+            },
         ),
         "F",
-    )  # fmt: skip
+    )
 
 
 def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Dataset:

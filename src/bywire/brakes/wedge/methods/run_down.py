@@ -134,9 +134,13 @@ def _fits(runs: Sequence[RunDown], best: Estimate) -> Check:
         weights.append(np.full(e.size, 1.0 / max(float(np.std(e)), 1e-300)))
         begin += e.size
     return lack_of_fit(
-        "torque_left_over", np.concatenate(left), np.concatenate(weights), np.hstack(columns),
-        len(best.values), "whether friction over speed has another shape than the laws",
-    )  # fmt: skip
+        "torque_left_over",
+        np.concatenate(left),
+        np.concatenate(weights),
+        np.hstack(columns),
+        len(best.values),
+        "whether friction over speed has another shape than the laws",
+    )
 
 
 def _ratios(best: Estimate, par: WedgeParameters) -> dict[str, tuple[float, str]]:
@@ -145,8 +149,9 @@ def _ratios(best: Estimate, par: WedgeParameters) -> dict[str, tuple[float, str]
     J = values.get(INERTIA, par.motor_1.J_M) + par.rig.J_dummy
     return {
         f"{name}_per_inertia": (values[name] / J, unit)
-        for name, unit in _RATIOS.items() if name in values
-    }  # fmt: skip
+        for name, unit in _RATIOS.items()
+        if name in values
+    }
 
 
 def _curve(runs: Sequence[RunDown], best: Estimate) -> Curve:
@@ -167,11 +172,13 @@ def _curve(runs: Sequence[RunDown], best: Estimate) -> Curve:
         "Inertia times deceleration over speed while coasting, with the estimated inertia.",
         xr.Dataset(
             {"measured": (dims, filled[0], attrs), "modeled": (dims, filled[1], attrs)},
-            {"record": [run.label for run in runs],
-             "omega": (dims, x, {"units": "rad/s", "long_name": "motor speed"})},
+            {
+                "record": [run.label for run in runs],
+                "omega": (dims, x, {"units": "rad/s", "long_name": "motor speed"}),
+            },
         ),
         "omega",
-    )  # fmt: skip
+    )
 
 
 def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:

@@ -93,9 +93,10 @@ def identify(
     identified_par = rig_par.replace(values)
     full = np.array([identified_par.leaves()[name] for name in _NAMES])
     strokes_read = [
-        stroke for part, shaft, side in zip(parts, shafts, (1, 2), strict=True)
+        stroke
+        for part, shaft, side in zip(parts, shafts, (1, 2), strict=True)
         for stroke in strokes(shaft, part.evaluate(full)[0], identified_par, side)
-    ]  # fmt: skip
+    ]
     return Identified(
         estimates={"screw and bearings": best},
         parameters=values,
@@ -140,10 +141,13 @@ def _require_loads(shafts: list[Motions]) -> None:
             word = "driving" if kind else "driven back"
             raise ParameterError(
                 f"the data does not tell screw.{name} from bearing.C_0: "
-                + (f"{word}, the force stays near {max(seen):.3g} N" if seen
-                   else f"the screw is never {word}")
+                + (
+                    f"{word}, the force stays near {max(seen):.3g} N"
+                    if seen
+                    else f"the screw is never {word}"
+                )
                 + f"; {_ADVICE}"
-            )  # fmt: skip
+            )
 
 
 def _require_losses(shafts: list[Motions], par: WedgeParameters) -> None:
@@ -156,9 +160,11 @@ def _require_losses(shafts: list[Motions], par: WedgeParameters) -> None:
             least = float(np.median(loss[(F * omega < 0.0) == kind]))
             if least < 0.0:
                 raise wrong_sign(
-                    f"i_{side}", "y_F", f"turning as q_{side} does, {word}, the screw would gain "
-                    f"{-least:.3g} N*m; or q_{side} is the wrong one"
-                )  # fmt: skip
+                    f"i_{side}",
+                    "y_F",
+                    f"turning as q_{side} does, {word}, the screw would gain "
+                    f"{-least:.3g} N*m; or q_{side} is the wrong one",
+                )
 
 
 def _figures(par: WedgeParameters, strokes_read: list[Stroke]) -> dict[str, tuple[float, str]]:
@@ -188,11 +194,13 @@ def _curve(strokes_read: list[Stroke]) -> Curve:
         "Motor torque in steady motion over the force between the screws, by stroke.",
         xr.Dataset(
             {"measured": (dims, table[0], attrs), "modeled": (dims, table[1], attrs)},
-            {"direction": ["driving", "driven back"],
-             "F": (dims, F, {"units": "N", "long_name": "force"})},
+            {
+                "direction": ["driving", "driven back"],
+                "F": (dims, F, {"units": "N", "long_name": "force"}),
+            },
         ),
         "F",
-    )  # fmt: skip
+    )
 
 
 def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:

@@ -96,7 +96,7 @@ def identify(
             "free-play is told as a whole: g_1 + g_2 + g_12; how it is shared is not",
             f"the sensor's stiffness is taken as {par.rig.sensor.K_F / 1e6:g} N/um",
         ),
-    )  # fmt: skip
+    )
 
 
 def _fitted(

@@ -24,30 +24,56 @@ def part(runs: Runs) -> Part:
     gain, phase = frequency.without_friction(_LOW)
     preload, nearest = frequency.nearest_preload()
     items = [
-        compared("fig5.limit", facts.NO_LIMIT, 100.0 * max(shares), AT_LIMIT,
-                 "largest share over frequencies and amplitudes"),
+        compared(
+            "fig5.limit",
+            facts.NO_LIMIT,
+            100.0 * max(shares),
+            AT_LIMIT,
+            "largest share over frequencies and amplitudes",
+        ),
         *friction(_LOW, "fig5"),
         *_low_frequency(),
         compared("fig5.linear.gain", facts.SAME_GAIN, gain, SAME_GAIN, "1 to 100 Hz"),
         compared("fig5.linear.phase", facts.SAME_PHASE, phase, SAME_PHASE, "1 to 100 Hz"),
-        compared("fig5.wedge", facts.LITTLE, frequency.apart(_LOW), ALIKE,
-                 "largest distance of both responses, amplitudes of 0.5 and 1 rad"),
-        found("fig5.wedge.preload", "N", preload, "preload of the screw alone that comes closest "
-              f"to the wedge, of 25, 50, 75, 100 N; ours is {parameters().rig.F_0:g} N"),
+        compared(
+            "fig5.wedge",
+            facts.LITTLE,
+            frequency.apart(_LOW),
+            ALIKE,
+            "largest distance of both responses, amplitudes of 0.5 and 1 rad",
+        ),
+        found(
+            "fig5.wedge.preload",
+            "N",
+            preload,
+            "preload of the screw alone that comes closest "
+            f"to the wedge, of 25, 50, 75, 100 N; ours is {parameters().rig.F_0:g} N",
+        ),
         found("fig5.wedge.nearest", "%", nearest, "largest distance with that preload"),
-    ]  # fmt: skip
+    ]
     text = (
         "A controller of 12 Hz on the preloaded screw, at 0.5, 1 and 2 rad: all three, and the "
         "bandwidth, are our choice. 0.25 rad sticks at all frequencies."
     )
     exhibits = (
-        Exhibit("fig5", lambda: frequency.figure(_LOW),
-                "Fig. 5: position frequency response, low bandwidth controller."),
-        Exhibit("fig5-wedge", lambda: frequency.beside(_LOW),
-                "The assembled wedge beside the screw, low bandwidth controller."),
-    )  # fmt: skip
-    return Part("Figure 5: position response, low bandwidth", text, tuple(items), exhibits,
-                {"frequency-response-screw": frequency.screw()})  # fmt: skip
+        Exhibit(
+            "fig5",
+            lambda: frequency.figure(_LOW),
+            "Fig. 5: position frequency response, low bandwidth controller.",
+        ),
+        Exhibit(
+            "fig5-wedge",
+            lambda: frequency.beside(_LOW),
+            "The assembled wedge beside the screw, low bandwidth controller.",
+        ),
+    )
+    return Part(
+        "Figure 5: position response, low bandwidth",
+        text,
+        tuple(items),
+        exhibits,
+        {"frequency-response-screw": frequency.screw()},
+    )
 
 
 def friction(controller: str, figure: str) -> list[Item]:
@@ -58,15 +84,24 @@ def friction(controller: str, figure: str) -> list[Item]:
     linear = frequency.linear(controller, f)
     sizes = frequency.AMPLITUDES[controller]
     away = 100.0 * float(np.abs(frequency.value(sweep, controller, sizes[0])[0] - linear[0]))
-    items.append(compared(f"{figure}.friction", facts.FRICTION_SEEN, away, ">=",
-                          f"amplitude {sizes[0]:g} rad"))  # fmt: skip
+    items.append(
+        compared(
+            f"{figure}.friction", facts.FRICTION_SEEN, away, ">=", f"amplitude {sizes[0]:g} rad"
+        )
+    )
     for size in sizes:
         value = frequency.value(sweep, controller, size)
         lost = frequency.decibels(value / linear)
         late = np.degrees(np.angle(value / linear))
-        items.append(found(f"{figure}.friction.{size:g}", "dB", float(lost[0]),
-                           f"gain at 1 Hz less that of the linear loop, amplitude {size:g} rad; "
-                           f"phase {late[0]:.2g} degree"))  # fmt: skip
+        items.append(
+            found(
+                f"{figure}.friction.{size:g}",
+                "dB",
+                float(lost[0]),
+                f"gain at 1 Hz less that of the linear loop, amplitude {size:g} rad; "
+                f"phase {late[0]:.2g} degree",
+            )
+        )
     return items
 
 
@@ -74,14 +109,25 @@ def _low_frequency() -> list[Item]:
     """Return whether friction shows at low frequency in particular, and where it shows most."""
     sweep = frequency.screw()
     f = sweep["frequency"].values
-    lost = np.array([
-        frequency.decibels(frequency.linear(_LOW, f) / frequency.value(sweep, _LOW, size))
-        for size in frequency.AMPLITUDES[_LOW]
-    ])  # fmt: skip
+    lost = np.array(
+        [
+            frequency.decibels(frequency.linear(_LOW, f) / frequency.value(sweep, _LOW, size))
+            for size in frequency.AMPLITUDES[_LOW]
+        ]
+    )
     return [
-        compared("fig5.friction.low_frequency", facts.FRICTION_LOW,
-                 float((lost[:, 0] / lost[:, -1]).min()), ">=", "smallest ratio of all amplitudes"),
-        found("fig5.friction.most", "Hz", float(f[lost[-1].argmax()]),
-              f"where the gain loses most at 2 rad, {lost[-1].max():.3g} dB; {lost[-1][0]:.2g} dB "
-              "at 1 Hz: around its own bandwidth the loop is least stiff"),
-    ]  # fmt: skip
+        compared(
+            "fig5.friction.low_frequency",
+            facts.FRICTION_LOW,
+            float((lost[:, 0] / lost[:, -1]).min()),
+            ">=",
+            "smallest ratio of all amplitudes",
+        ),
+        found(
+            "fig5.friction.most",
+            "Hz",
+            float(f[lost[-1].argmax()]),
+            f"where the gain loses most at 2 rad, {lost[-1].max():.3g} dB; {lost[-1][0]:.2g} dB "
+            "at 1 Hz: around its own bandwidth the loop is least stiff",
+        ),
+    ]

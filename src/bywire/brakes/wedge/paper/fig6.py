@@ -43,11 +43,20 @@ def part(runs: Runs) -> Part:
         *_efficiency(),
         compared("fig6.linear.gain", facts.SAME_GAIN, gain, SAME_GAIN, "1 to 100 Hz"),
         compared("fig6.linear.phase", facts.SAME_PHASE, phase, SAME_PHASE, "1 to 100 Hz"),
-        compared("fig6.wedge", facts.LITTLE, frequency.apart(_HIGH), ALIKE,
-                 "largest distance of both responses, amplitudes of 0.25, 0.5 and 1 rad"),
-        found("fig6.wedge.below_limit", "%", frequency.apart(_HIGH, limited=False),
-              "the same where the screw does not reach the current limit"),
-    ]  # fmt: skip
+        compared(
+            "fig6.wedge",
+            facts.LITTLE,
+            frequency.apart(_HIGH),
+            ALIKE,
+            "largest distance of both responses, amplitudes of 0.25, 0.5 and 1 rad",
+        ),
+        found(
+            "fig6.wedge.below_limit",
+            "%",
+            frequency.apart(_HIGH, limited=False),
+            "the same where the screw does not reach the current limit",
+        ),
+    ]
     text = (
         "A controller of 60 Hz on the preloaded screw, at 0.25, 0.5 and 1 rad: all three, and the "
         "bandwidth, are our choice. Every sine starts from rest: just below where the limit "
@@ -55,13 +64,24 @@ def part(runs: Runs) -> Part:
         "practice match cannot be judged: the measured curves are not at hand."
     )
     exhibits = (
-        Exhibit("fig6", lambda: frequency.figure(_HIGH),
-                "Fig. 6: position frequency response, high bandwidth controller."),
-        Exhibit("fig6-wedge", lambda: frequency.beside(_HIGH),
-                "The assembled wedge beside the screw, high bandwidth controller."),
-    )  # fmt: skip
-    return Part("Figure 6: position response, high bandwidth", text, tuple(items), exhibits,
-                {"frequency-response-wedge": frequency.wedge()})  # fmt: skip
+        Exhibit(
+            "fig6",
+            lambda: frequency.figure(_HIGH),
+            "Fig. 6: position frequency response, high bandwidth controller.",
+        ),
+        Exhibit(
+            "fig6-wedge",
+            lambda: frequency.beside(_HIGH),
+            "The assembled wedge beside the screw, high bandwidth controller.",
+        ),
+    )
+    return Part(
+        "Figure 6: position response, high bandwidth",
+        text,
+        tuple(items),
+        exhibits,
+        {"frequency-response-wedge": frequency.wedge()},
+    )
 
 
 def _limit() -> list[Item]:
@@ -81,21 +101,37 @@ def _limit() -> list[Item]:
         kinks.append(float(drops[k] / falls[k]))
         slope = _slope(f, frequency.decibels(frequency.value(frequency.screw(), _HIGH, size)))
         each += [
-            found(f"fig6.onset.{size:g}", "Hz", onset,
-                  f"first of 40 frequencies at which the demand reaches the limit, {size:g} rad"),
-            found(f"fig6.kink.{size:g}", "degree", float(drops[k]),
-                  f"fall of the phase from {f[k]:.3g} to {f[k + 1]:.3g} Hz at {size:g} rad; "
-                  f"{falls[k]:.2g} degree in the linear loop"),
-            found(f"fig6.roll_off.{size:g}", "dB", slope,
-                  f"gain per decade over the last five frequencies, {size:g} rad"),
-        ]  # fmt: skip
+            found(
+                f"fig6.onset.{size:g}",
+                "Hz",
+                onset,
+                f"first of 40 frequencies at which the demand reaches the limit, {size:g} rad",
+            ),
+            found(
+                f"fig6.kink.{size:g}",
+                "degree",
+                float(drops[k]),
+                f"fall of the phase from {f[k]:.3g} to {f[k + 1]:.3g} Hz at {size:g} rad; "
+                f"{falls[k]:.2g} degree in the linear loop",
+            ),
+            found(
+                f"fig6.roll_off.{size:g}",
+                "dB",
+                slope,
+                f"gain per decade over the last five frequencies, {size:g} rad",
+            ),
+        ]
     return [
-        compared("fig6.limit", facts.LIMITED, max(onsets) / wide, "<=",
-                 f"largest ratio of all amplitudes; the linear loop falls to -3 dB at "
-                 f"{wide:.3g} Hz"),
+        compared(
+            "fig6.limit",
+            facts.LIMITED,
+            max(onsets) / wide,
+            "<=",
+            f"largest ratio of all amplitudes; the linear loop falls to -3 dB at {wide:.3g} Hz",
+        ),
         compared("fig6.kink", facts.KINK, min(kinks), ">=", "smallest ratio of all amplitudes"),
         *each,
-    ]  # fmt: skip
+    ]
 
 
 def _slope(f: Array, gain: Array) -> float:
@@ -111,14 +147,23 @@ def _efficiency() -> list[Item]:
         lost = frequency.decibels(ideal / lossy)
         note = f"{_LAWS[law]}, amplitude {_SMALL:g} rad"
         items += [
-            compared(f"fig6.efficiency.{law}", facts.EFFICIENCY_HIGH, float(lost[-1] / lost[1]),
-                     ">=", note),
+            compared(
+                f"fig6.efficiency.{law}",
+                facts.EFFICIENCY_HIGH,
+                float(lost[-1] / lost[1]),
+                ">=",
+                note,
+            ),
             *(
-                found(f"fig6.efficiency.{law}.{f:g}", "dB", float(-lost[k]),
-                      f"gain at {f:g} Hz less that of a screw without loss; {note}")
+                found(
+                    f"fig6.efficiency.{law}.{f:g}",
+                    "dB",
+                    float(-lost[k]),
+                    f"gain at {f:g} Hz less that of a screw without loss; {note}",
+                )
                 for k, f in enumerate(_SEEN)
             ),
-        ]  # fmt: skip
+        ]
     return items
 
 
@@ -127,9 +172,13 @@ def _wedge(law: str) -> tuple[Complex, Complex]:
     loop, par = LOOPS.find("position"), frequency.changed(_HIGH).replace({"screw.law": law})
     leaves = par.leaves()
     sweep = Sweep(
-        loop.inputs, loop.output, _SEEN, (_SMALL,),
-        {name: [1.0, leaves[name]] for name in ("screw.eta_f", "screw.eta_b")}, flags=(),
-    )  # fmt: skip
+        loop.inputs,
+        loop.output,
+        _SEEN,
+        (_SMALL,),
+        {name: [1.0, leaves[name]] for name in ("screw.eta_f", "screw.eta_b")},
+        flags=(),
+    )
     measured = frequency_response(loop.point(par, 0.0).run(), sweep).isel(amplitude=0)
     values = measured["gain"].values * np.exp(1j * np.radians(measured["phase"].values))
     return values[0], values[1]
@@ -138,11 +187,20 @@ def _wedge(law: str) -> tuple[Complex, Complex]:
 def _jump() -> list[Item]:
     """Return the gain after a start from rest, and after the frequency fell from above."""
     return [
-        found("fig6.jump.from_rest", "1", _gain(_BELOW),
-              f"gain at {_BELOW:g} Hz and {_SHAKEN:g} rad, from rest: below the limit"),
-        found("fig6.jump.from_above", "1", _gain(_ABOVE), "the same after the frequency fell from "
-              f"{_ABOVE:g} Hz within {_T_FALL:g} s: the loop stays on the limit"),
-    ]  # fmt: skip
+        found(
+            "fig6.jump.from_rest",
+            "1",
+            _gain(_BELOW),
+            f"gain at {_BELOW:g} Hz and {_SHAKEN:g} rad, from rest: below the limit",
+        ),
+        found(
+            "fig6.jump.from_above",
+            "1",
+            _gain(_ABOVE),
+            "the same after the frequency fell from "
+            f"{_ABOVE:g} Hz within {_T_FALL:g} s: the loop stays on the limit",
+        ),
+    ]
 
 
 def _gain(begin: float) -> float:

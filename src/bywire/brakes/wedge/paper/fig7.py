@@ -39,13 +39,18 @@ def part(runs: Runs) -> Part:
         "a measured recording can be drawn on it. Shaded: shafts and wedge stick, so that the "
         "run-out passes on to the moment unhindered until the controller has broken them away."
     )
-    exhibit = Exhibit("fig7", lambda: stacked(result.recordings["run"]),
-                      "Fig. 7: 200 Nm step in moment, with pulses: demand and simulation."
-    )  # fmt: skip
+    exhibit = Exhibit(
+        "fig7",
+        lambda: stacked(result.recordings["run"]),
+        "Fig. 7: 200 Nm step in moment, with pulses: demand and simulation.",
+    )
     return Part(
-        "Figure 7: step and pulses", text, tuple(items), (exhibit,),
+        "Figure 7: step and pulses",
+        text,
+        tuple(items),
+        (exhibit,),
         {"fig7": result.recordings["run"]},
-    )  # fmt: skip
+    )
 
 
 def pulse_ends(result: Result) -> list[float]:
@@ -63,9 +68,14 @@ def _moment(result: Result) -> list[Item]:
     judged = "mean over the last revolution of the disc before the demand changes"
     return [
         compared("fig7.hold_moment", facts.HELD, settled(run, "M_B", hold), FOLLOWED, judged),
-        compared("fig7.pulse_moment", facts.PULSED, worst, FOLLOWED,
-                 f"{judged}; the worst of {len(low)} pulses"),
-    ]  # fmt: skip
+        compared(
+            "fig7.pulse_moment",
+            facts.PULSED,
+            worst,
+            FOLLOWED,
+            f"{judged}; the worst of {len(low)} pulses",
+        ),
+    ]
 
 
 def _oscillation(runs: Runs) -> list[Item]:
@@ -78,22 +88,48 @@ def _oscillation(runs: Runs) -> list[Item]:
     third = float(np.interp(3.0, spectrum["order"], spectrum["amplitude"]))
     ripple = swing(run, "M_B", FROM, end)
     return [
-        compared("fig7.ripple_order", facts.ONCE, float(spectrum["order"][strongest]), ORDER,
-                 "strongest wave over the disc's angle; the model's run-out is one wave per "
-                 "revolution, so that this says only that nothing else oscillates more"),
-        compared("fig7.ripple_without_runout", facts.RUNOUT,
-                 100.0 * swing(plain, "M_B", FROM, end) / ripple, LEFT,
-                 "peak to peak in % of that with run-out: the loop does not hunt"),
-        found("fig7.ripple", "N*m", ripple, "peak to peak of the moment during the hold, from "
-              f"{1e6 * parameters().flywheel.runout:g} um of run-out, our choice"),
-        found("fig7.ripple_passive", "N*m", 2.0 * parameters().flywheel.runout * _stiffness(),
-              "what the run-out would give with the wedge held still: at this frequency, near its "
-              "crossover, the moment control adds to it"),
-        found("fig7.ripple_third", "N*m", third,
-              "amplitude of the third wave per revolution: stick and slip bend the sine"),
-        found("fig7.share_stuck", "%", 100.0 * mean(run, "stuck", FROM, end),
-              "of the hold, shafts and wedge stick"),
-    ]  # fmt: skip
+        compared(
+            "fig7.ripple_order",
+            facts.ONCE,
+            float(spectrum["order"][strongest]),
+            ORDER,
+            "strongest wave over the disc's angle; the model's run-out is one wave per "
+            "revolution, so that this says only that nothing else oscillates more",
+        ),
+        compared(
+            "fig7.ripple_without_runout",
+            facts.RUNOUT,
+            100.0 * swing(plain, "M_B", FROM, end) / ripple,
+            LEFT,
+            "peak to peak in % of that with run-out: the loop does not hunt",
+        ),
+        found(
+            "fig7.ripple",
+            "N*m",
+            ripple,
+            "peak to peak of the moment during the hold, from "
+            f"{1e6 * parameters().flywheel.runout:g} um of run-out, our choice",
+        ),
+        found(
+            "fig7.ripple_passive",
+            "N*m",
+            2.0 * parameters().flywheel.runout * _stiffness(),
+            "what the run-out would give with the wedge held still: at this frequency, near its "
+            "crossover, the moment control adds to it",
+        ),
+        found(
+            "fig7.ripple_third",
+            "N*m",
+            third,
+            "amplitude of the third wave per revolution: stick and slip bend the sine",
+        ),
+        found(
+            "fig7.share_stuck",
+            "%",
+            100.0 * mean(run, "stuck", FROM, end),
+            "of the hold, shafts and wedge stick",
+        ),
+    ]
 
 
 def _stiffness() -> float:
@@ -109,32 +145,69 @@ def _power(result: Result) -> list[Item]:
     holding = settled(run, "P_meas", hold)
     above, peak = holding - standby(), values["peak_power_filtered"] - standby()
     return [
-        compared("fig7.power_peak_time", facts.PEAK_FIRST, t_peak / values["contact_time"], "<=",
-                 "time of the largest input power over that of the contact"),
-        compared("fig7.hold_power", facts.SMALL_POWER, 100.0 * above / peak, "<=",
-                 f"hold {above:.2g} W, peak {peak:.3g} W"),
-        compared("fig7.standby", facts.STANDBY, 100.0 * standby() / holding, ">=",
-                 "standby tuned to Fig. 9's 60 W", tuned="calibrated"),
+        compared(
+            "fig7.power_peak_time",
+            facts.PEAK_FIRST,
+            t_peak / values["contact_time"],
+            "<=",
+            "time of the largest input power over that of the contact",
+        ),
+        compared(
+            "fig7.hold_power",
+            facts.SMALL_POWER,
+            100.0 * above / peak,
+            "<=",
+            f"hold {above:.2g} W, peak {peak:.3g} W",
+        ),
+        compared(
+            "fig7.standby",
+            facts.STANDBY,
+            100.0 * standby() / holding,
+            ">=",
+            "standby tuned to Fig. 9's 60 W",
+            tuned="calibrated",
+        ),
         found("fig7.power_peak", "W", values["peak_power"], "at the drives' input, not filtered"),
-        found("fig7.power_peak_filtered", "W", values["peak_power_filtered"],
-              "at the drives' input through a filter that is ours"),
+        found(
+            "fig7.power_peak_filtered",
+            "W",
+            values["peak_power_filtered"],
+            "at the drives' input through a filter that is ours",
+        ),
         found("fig7.hold_power_watt", "W", above, "above standby, mean over a revolution"),
         found("fig7.brake_power", "W", values["brake_power"], "taken from the disc meanwhile"),
-    ]  # fmt: skip
+    ]
 
 
 def _course(result: Result) -> list[Item]:
     run, values = result.recordings["run"], kpis(result)
     scale = float(run["E_source"].values[-1])
-    bound = Fact(1e-6 * scale, "J", "physical bound: energy in is energy out, to 1e-6 of the input",
-                 "physical bound")  # fmt: skip
+    bound = Fact(
+        1e-6 * scale,
+        "J",
+        "physical bound: energy in is energy out, to 1e-6 of the input",
+        "physical bound",
+    )
     not_printed = "the controller's law and gains are ours"
     return [
         found("fig7.contact_time", "s", values["contact_time"], f"pads on the disc; {not_printed}"),
-        found("fig7.time_to_90", "s", values["time_to_90"],
-              f"the sensor shows 90 % of the demand; {not_printed}"),
-        found("fig7.peak_speed", "rad/s", values["peak_speed"],
-              f"of a motor, while crossing the gap; {not_printed}"),
-        compared("fig7.energy_left", bound, values["energy_left"], "<=",
-                 "largest residual of the energy balance"),
-    ]  # fmt: skip
+        found(
+            "fig7.time_to_90",
+            "s",
+            values["time_to_90"],
+            f"the sensor shows 90 % of the demand; {not_printed}",
+        ),
+        found(
+            "fig7.peak_speed",
+            "rad/s",
+            values["peak_speed"],
+            f"of a motor, while crossing the gap; {not_printed}",
+        ),
+        compared(
+            "fig7.energy_left",
+            bound,
+            values["energy_left"],
+            "<=",
+            "largest residual of the energy balance",
+        ),
+    ]

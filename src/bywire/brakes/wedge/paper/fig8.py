@@ -17,20 +17,29 @@ def part(runs: Runs) -> Part:
     plain = kpis(runs.bench("moment-ramp", MAIN, WITHOUT_RUNOUT))
     items = [
         *_items(result),
-        found("fig8.ramp_error_rms.without_runout", "N*m", plain["ramp_error_rms"],
-              "the same without run-out: how well the controller itself follows"),
-    ]  # fmt: skip
+        found(
+            "fig8.ramp_error_rms.without_runout",
+            "N*m",
+            plain["ramp_error_rms"],
+            "the same without run-out: how well the controller itself follows",
+        ),
+    ]
     text = (
         "Length and slope of the ramp are ours; 'slow' was read as 1 s. Means over a revolution of "
         "the disc are judged, because the run-out's oscillation passes through any of them."
     )
-    exhibit = Exhibit("fig8", lambda: stacked(result.recordings["run"]),
-                      "Fig. 8: 200 Nm step in moment, with ramp: demand and simulation."
-    )  # fmt: skip
+    exhibit = Exhibit(
+        "fig8",
+        lambda: stacked(result.recordings["run"]),
+        "Fig. 8: 200 Nm step in moment, with ramp: demand and simulation.",
+    )
     return Part(
-        "Figure 8: step and ramp", text, tuple(items), (exhibit,),
+        "Figure 8: step and ramp",
+        text,
+        tuple(items),
+        (exhibit,),
         {"fig8": result.recordings["run"]},
-    )  # fmt: skip
+    )
 
 
 def _items(result: Result) -> list[Item]:
@@ -38,17 +47,44 @@ def _items(result: Result) -> list[Item]:
     o = result.bench.chosen_options.flat()
     lowered = o["t_hold"] + o["t_low"]
     end = lowered + o["t_ramp"] + o["t_end"]
-    slope = reading((o["M_high"] - o["M_low"]) / o["t_ramp"], "N*m/s",
-                    f"{facts.RAMPED.where}; read as: within {o['t_ramp']:g} s")  # fmt: skip
+    slope = reading(
+        (o["M_high"] - o["M_low"]) / o["t_ramp"],
+        "N*m/s",
+        f"{facts.RAMPED.where}; read as: within {o['t_ramp']:g} s",
+    )
     return [
-        compared("fig8.low_moment", facts.LOWERED, settled(run, "M_B", lowered),
-                 FOLLOWED, "mean over the last revolution at 160 Nm"),
-        compared("fig8.final_moment", facts.RAMPED, settled(run, "M_B", end),
-                 FOLLOWED, "mean over the last revolution"),
-        compared("fig8.ramp_slope", slope, values["ramp_slope"], FOLLOWED,
-                 "of a line through the moment on the ramp"),
-        compared("fig8.ramp_error", facts.FOLLOWED, values["ramp_error_mean"], ERROR,
-                 "mean of demand less moment on the ramp"),
-        found("fig8.ramp_error_rms", "N*m", values["ramp_error_rms"],
-              "root mean square on the ramp; mostly run-out"),
-    ]  # fmt: skip
+        compared(
+            "fig8.low_moment",
+            facts.LOWERED,
+            settled(run, "M_B", lowered),
+            FOLLOWED,
+            "mean over the last revolution at 160 Nm",
+        ),
+        compared(
+            "fig8.final_moment",
+            facts.RAMPED,
+            settled(run, "M_B", end),
+            FOLLOWED,
+            "mean over the last revolution",
+        ),
+        compared(
+            "fig8.ramp_slope",
+            slope,
+            values["ramp_slope"],
+            FOLLOWED,
+            "of a line through the moment on the ramp",
+        ),
+        compared(
+            "fig8.ramp_error",
+            facts.FOLLOWED,
+            values["ramp_error_mean"],
+            ERROR,
+            "mean of demand less moment on the ramp",
+        ),
+        found(
+            "fig8.ramp_error_rms",
+            "N*m",
+            values["ramp_error_rms"],
+            "root mean square on the ramp; mostly run-out",
+        ),
+    ]

@@ -40,24 +40,35 @@ def part(runs: Runs) -> Part:
         "The disc gives nearly all of the energy that the caliper stores."
     )
     run = result.recordings["run"]
-    exhibit = Exhibit("fig9", lambda: stacked(run),
-                      "Fig. 9: 950 Nm step pulse in moment: demand and simulation.")  # fmt: skip
+    exhibit = Exhibit(
+        "fig9", lambda: stacked(run), "Fig. 9: 950 Nm step pulse in moment: demand and simulation."
+    )
     return Part("Figure 9: large pulse", text, tuple(items), (exhibit,), {"fig9": run})
 
 
 def _moment(result: Result) -> list[Item]:
     values = kpis(result)
     return [
-        compared("fig9.peak_moment", facts.PULSE, values["peak_moment"],
-                 FOLLOWED, "largest moment"),
+        compared(
+            "fig9.peak_moment", facts.PULSE, values["peak_moment"], FOLLOWED, "largest moment"
+        ),
         found("fig9.time_to_90", "s", values["time_to_90"], "the sensor shows 90 % of the demand"),
         found("fig9.normal_force", "N", values["peak_normal_force"], "largest normal force"),
         found("fig9.caliper_energy", "J", values["caliper_energy"], "largest energy stored"),
-        found("fig9.disc_share", "%", values["disc_share"],
-              "work of the disc on the wedge until then, over that energy: self-reinforcement"),
-        found("fig9.energy_in", "J", values["energy_in"], "at the drives' input, standby included; "
-              f"the disc loses {values['energy_braked']:.4g} J"),
-    ]  # fmt: skip
+        found(
+            "fig9.disc_share",
+            "%",
+            values["disc_share"],
+            "work of the disc on the wedge until then, over that energy: self-reinforcement",
+        ),
+        found(
+            "fig9.energy_in",
+            "J",
+            values["energy_in"],
+            "at the drives' input, standby included; "
+            f"the disc loses {values['energy_braked']:.4g} J",
+        ),
+    ]
 
 
 def limited(result: Result, target: float) -> tuple[float, float]:
@@ -78,21 +89,38 @@ def _limits(runs: Runs, result: Result) -> list[Item]:
     effects = {
         M: _friction_effect(runs, name, M)
         for name, M in (
-            ("moment-pulses", facts.HELD.value), ("moment-pulse-950", facts.PULSE.value)
+            ("moment-pulses", facts.HELD.value),
+            ("moment-pulse-950", facts.PULSE.value),
         )
-    }  # fmt: skip
+    }
     at_200, at_950 = effects.values()
     return [
-        compared("fig9.rate_limited", facts.LONG, build_up, ">=",
-                 "the limit of 60 rad/s is ours, tuned to the power"),
-        found("fig9.rate_limited_pulse", "%", kpis(result)["rate_limited"],
-              "share of the whole pulse"),
-        compared("fig9.limits_dominate", facts.LARGE_LIMITED, whole - whole_small, ">=",
-                 f"share at 950 Nm less that at 200 Nm ({whole_small:.3g} %)"),
-        compared("fig9.friction_dominates", facts.SMALL_FRICTION, at_200 / at_950, ">=",
-                 f"root mean square over {FIRST:g} s of what friction changes: "
-                 f"{100 * at_200:.3g} % of 200 Nm, {100 * at_950:.3g} % of 950 Nm"),
-    ]  # fmt: skip
+        compared(
+            "fig9.rate_limited",
+            facts.LONG,
+            build_up,
+            ">=",
+            "the limit of 60 rad/s is ours, tuned to the power",
+        ),
+        found(
+            "fig9.rate_limited_pulse", "%", kpis(result)["rate_limited"], "share of the whole pulse"
+        ),
+        compared(
+            "fig9.limits_dominate",
+            facts.LARGE_LIMITED,
+            whole - whole_small,
+            ">=",
+            f"share at 950 Nm less that at 200 Nm ({whole_small:.3g} %)",
+        ),
+        compared(
+            "fig9.friction_dominates",
+            facts.SMALL_FRICTION,
+            at_200 / at_950,
+            ">=",
+            f"root mean square over {FIRST:g} s of what friction changes: "
+            f"{100 * at_200:.3g} % of 200 Nm, {100 * at_950:.3g} % of 950 Nm",
+        ),
+    ]
 
 
 def _friction_effect(runs: Runs, experiment: str, M: float) -> float:
@@ -118,19 +146,43 @@ def _power(runs: Runs, result: Result) -> list[Item]:
     steady = settled(longer, "P_meas", LONGER) - standby()
     late = float(run["P_meas"].sel(time=end - 1e-3, method="nearest")) - standby()
     return [
-        compared("fig9.power", facts.POWER, peak(run, "P_meas"), None,
-                 "largest filtered power; standby, filter and rate limit are tuned to it",
-                 tuned="calibrated"),
-        compared("fig9.no_initial_peak", facts.NO_PEAK, before / after, "<=",
-                 f"{before:.3g} W before contact, {after:.3g} W after it; a hump remains"),
-        compared("fig9.lowest_power", facts.NOT_LOW, _lowest(run, contact, end) / hold, ">=",
-                 f"pulse of {end:g} s; Fig. 7's hold takes {hold:.3g} W above standby"),
-        found("fig9.lowest_power.short", "1", _lowest(short, contact, SHORT) / hold,
-              f"the same for a pulse of {SHORT:g} s"),
-        compared("fig9.power_reduces", facts.REDUCES, steady / late, "<=",
-                 f"{steady:.3g} W after {LONGER:g} s, {late:.3g} W at the end of the pulse"),
+        compared(
+            "fig9.power",
+            facts.POWER,
+            peak(run, "P_meas"),
+            None,
+            "largest filtered power; standby, filter and rate limit are tuned to it",
+            tuned="calibrated",
+        ),
+        compared(
+            "fig9.no_initial_peak",
+            facts.NO_PEAK,
+            before / after,
+            "<=",
+            f"{before:.3g} W before contact, {after:.3g} W after it; a hump remains",
+        ),
+        compared(
+            "fig9.lowest_power",
+            facts.NOT_LOW,
+            _lowest(run, contact, end) / hold,
+            ">=",
+            f"pulse of {end:g} s; Fig. 7's hold takes {hold:.3g} W above standby",
+        ),
+        found(
+            "fig9.lowest_power.short",
+            "1",
+            _lowest(short, contact, SHORT) / hold,
+            f"the same for a pulse of {SHORT:g} s",
+        ),
+        compared(
+            "fig9.power_reduces",
+            facts.REDUCES,
+            steady / late,
+            "<=",
+            f"{steady:.3g} W after {LONGER:g} s, {late:.3g} W at the end of the pulse",
+        ),
         found("fig9.steady_power", "W", steady, "above standby, last revolution of 1 s at 950 Nm"),
-    ]  # fmt: skip
+    ]
 
 
 def _largest(run: xr.Dataset, begin: float, end: float) -> float:
@@ -152,11 +204,16 @@ def _tail(runs: Runs) -> list[Item]:
     between = f"between thresholds of {THRESHOLDS[0]:g} and {THRESHOLDS[1]:g} Nm"
     why = "the paper puts its difference at the end of Fig. 9 down to the time of this switch"
     return [
-        found("fig9.switch_shift", "s", times[0] - times[1],
-              f"switch from moment to retracting, {between}; {why}"),
-        found("fig9.tail_shift", "s", parking[0] - parking[1],
-              f"time of parking, {between}; {why}"),
-    ]  # fmt: skip
+        found(
+            "fig9.switch_shift",
+            "s",
+            times[0] - times[1],
+            f"switch from moment to retracting, {between}; {why}",
+        ),
+        found(
+            "fig9.tail_shift", "s", parking[0] - parking[1], f"time of parking, {between}; {why}"
+        ),
+    ]
 
 
 def _switches(run: xr.Dataset) -> float:

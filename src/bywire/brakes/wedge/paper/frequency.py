@@ -50,9 +50,14 @@ def _swept(
 ) -> xr.Dataset:
     loop = LOOPS.find(name)
     sweep = Sweep(
-        loop.inputs, loop.output, frequencies, amplitudes,
-        {"control.position.f_n": list(BANDWIDTHS.values())}, flags=flags, most=_PATIENCE,
-    )  # fmt: skip
+        loop.inputs,
+        loop.output,
+        frequencies,
+        amplitudes,
+        {"control.position.f_n": list(BANDWIDTHS.values())},
+        flags=flags,
+        most=_PATIENCE,
+    )
     responses = frequency_response(loop.point(parameters(), 0.0).run(), sweep)
     return responses.assign_coords(controller=("variant", list(BANDWIDTHS)))
 
@@ -123,9 +128,14 @@ def nearest_preload() -> tuple[float, float]:
     sizes = tuple(size for size in AMPLITUDES["low"] if size in _WEDGE)
     loop = LOOPS.find("screw-position")
     sweep = Sweep(
-        loop.inputs, loop.output, FREQUENCIES[::3], sizes, {"rig.F_0": list(_PRELOADS)}, flags=(),
+        loop.inputs,
+        loop.output,
+        FREQUENCIES[::3],
+        sizes,
+        {"rig.F_0": list(_PRELOADS)},
+        flags=(),
         most=_PATIENCE,
-    )  # fmt: skip
+    )
     responses = frequency_response(loop.point(changed("low"), 0.0).run(), sweep)
     values = responses["gain"].values * np.exp(1j * np.radians(responses["phase"].values))
     of_wedge = np.array([value(wedge(), "low", size) for size in sizes])

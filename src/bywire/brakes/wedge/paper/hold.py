@@ -36,8 +36,11 @@ def part(runs: Runs) -> Part:
         "below the neutral point the wedge pushes the motors back until friction holds it."
     )
     run = off.recordings["run"]
-    exhibit = Exhibit("power-off-hold", lambda: stacked(run),
-                      "Power off at 500 Nm: what is left is the run-out's ripple.")  # fmt: skip
+    exhibit = Exhibit(
+        "power-off-hold",
+        lambda: stacked(run),
+        "Power off at 500 Nm: what is left is the run-out's ripple.",
+    )
     return Part("Holding", text, tuple(items), (exhibit,), {"power-off-hold": run})
 
 
@@ -47,19 +50,38 @@ def _power_off(runs: Runs) -> list[Item]:
     usual = kpis(runs.bench("power-off-hold", MAIN))
     low = {**with_friction(parameters(), AWAY, known=True), **WITHOUT_RUNOUT}
     far = kpis(runs.bench("power-off-hold", MAIN, low))
-    still = Fact(0.0, "m", "physical bound: what dry friction holds does not creep",
-                 "physical bound")  # fmt: skip
+    still = Fact(
+        0.0, "m", "physical bound: what dry friction holds does not creep", "physical bound"
+    )
     return [
-        compared("hold.neutral", facts.REMAINS, _share(kept), KEPT,
-                 "moment 2 s after power off in % of that before; run-out off, friction on"),
-        compared("hold.drift", still, usual["drift"], "<=",
-                 "change of the wedge's travel in 2 s after all stuck; run-out on"),
-        found("hold.relaxation", "m", usual["relaxation"],
-              "change of the wedge's travel from power off until all stick"),
+        compared(
+            "hold.neutral",
+            facts.REMAINS,
+            _share(kept),
+            KEPT,
+            "moment 2 s after power off in % of that before; run-out off, friction on",
+        ),
+        compared(
+            "hold.drift",
+            still,
+            usual["drift"],
+            "<=",
+            "change of the wedge's travel in 2 s after all stuck; run-out on",
+        ),
+        found(
+            "hold.relaxation",
+            "m",
+            usual["relaxation"],
+            "change of the wedge's travel from power off until all stick",
+        ),
         found("hold.preload", "N", usual["preload_end"], "preload that is left"),
-        found("hold.far", "%", _share(far),
-              f"as hold.neutral at mu_B = {AWAY:g}: back-driven until friction holds"),
-    ]  # fmt: skip
+        found(
+            "hold.far",
+            "%",
+            _share(far),
+            f"as hold.neutral at mu_B = {AWAY:g}: back-driven until friction holds",
+        ),
+    ]
 
 
 def _share(values: dict[str, float]) -> float:
@@ -72,14 +94,28 @@ def _standing(runs: Runs) -> list[Item]:
     values = kpis(result)
     shares = {name: _self_reinforcement(run) for name, run in result.recordings.items()}
     return [
-        compared("hold.standing", facts.ONLY_TURNING, shares["drop"], STANDING,
-                 "(tan(alpha) F_N - F_M)/(tan(alpha) F_N) on a standing disc, pad term dropped as "
-                 "in the paper"),
-        found("hold.standing.stick", "1", shares["stick"],
-              "the same where the standing pad sticks to the disc, our other reading"),
-        found("hold.force_held", "N", values["force_held_drop"], "normal force on the standing "
-              f"disc; {values['force_before_stop_drop']:.4g} N before the stop"),
-    ]  # fmt: skip
+        compared(
+            "hold.standing",
+            facts.ONLY_TURNING,
+            shares["drop"],
+            STANDING,
+            "(tan(alpha) F_N - F_M)/(tan(alpha) F_N) on a standing disc, pad term dropped as "
+            "in the paper",
+        ),
+        found(
+            "hold.standing.stick",
+            "1",
+            shares["stick"],
+            "the same where the standing pad sticks to the disc, our other reading",
+        ),
+        found(
+            "hold.force_held",
+            "N",
+            values["force_held_drop"],
+            "normal force on the standing "
+            f"disc; {values['force_before_stop_drop']:.4g} N before the stop",
+        ),
+    ]
 
 
 def _self_reinforcement(run: xr.Dataset) -> float:
@@ -99,7 +135,12 @@ def _together(runs: Runs) -> list[Item]:
         run = runs.bench("moment-pulses", MAIN, overrides, LOADED).recordings["run"]
         above[law] = settled(run, "P_in", LOADED["t_hold"]) - standby()
     return [
-        compared("hold.together", facts.TOGETHER, above["scheduled"] / above["preload"], "<=",
-                 f"500 Nm at mu_B = {AWAY:g}: {above['scheduled']:.3g} W together, "
-                 f"{above['preload']:.3g} W preloaded"),
-    ]  # fmt: skip
+        compared(
+            "hold.together",
+            facts.TOGETHER,
+            above["scheduled"] / above["preload"],
+            "<=",
+            f"500 Nm at mu_B = {AWAY:g}: {above['scheduled']:.3g} W together, "
+            f"{above['preload']:.3g} W preloaded",
+        ),
+    ]

@@ -27,14 +27,26 @@ def position(runs: Runs) -> Part:
     items: list[Item] = []
     for controller in ("high", "low"):
         items += [
-            compared(f"position.wedge.{controller}", facts.LITTLE,
-                     values[f"difference_screws_{controller}"], ALIKE,
-                     f"{controller} bandwidth: largest difference over time and amplitudes"),
-            found(f"position.motors.{controller}", "%", values[f"difference_motors_{controller}"],
-                  f"{controller} bandwidth: the same against motors whose screws touch nothing"),
-            found(f"position.dead_band.{controller}", "rad", bands[f"dead_band_{controller}"],
-                  f"{controller} bandwidth: error that friction and cogging can hold at rest"),
-        ]  # fmt: skip
+            compared(
+                f"position.wedge.{controller}",
+                facts.LITTLE,
+                values[f"difference_screws_{controller}"],
+                ALIKE,
+                f"{controller} bandwidth: largest difference over time and amplitudes",
+            ),
+            found(
+                f"position.motors.{controller}",
+                "%",
+                values[f"difference_motors_{controller}"],
+                f"{controller} bandwidth: the same against motors whose screws touch nothing",
+            ),
+            found(
+                f"position.dead_band.{controller}",
+                "rad",
+                bands[f"dead_band_{controller}"],
+                f"{controller} bandwidth: error that friction and cogging can hold at rest",
+            ),
+        ]
     text = (
         "Steps of the position within the clearance, with the wedge and without it. The paper "
         "compares frequency responses."
@@ -50,25 +62,40 @@ def force_fight(runs: Runs) -> Part:
     o = result.bench.chosen_options.flat()
     unequal = ", ".join(f"{100 * o[f'more_{key}']:+g} % {key}" for key in ("K", "J", "R", "D"))
     items = [
-        compared("force_fight.equal", facts.DIFFERENCES_FIGHT, equal, FORCE,
-                 "equal motors: largest force of step, ramp and sine"),
+        compared(
+            "force_fight.equal",
+            facts.DIFFERENCES_FIGHT,
+            equal,
+            FORCE,
+            "equal motors: largest force of step, ramp and sine",
+        ),
         *(
-            found(f"force_fight.{motion}", "N", values[f"peak_force_{motion}_unequal"],
-                  f"largest force, motor 2 with {unequal}, our choice")
+            found(
+                f"force_fight.{motion}",
+                "N",
+                values[f"peak_force_{motion}_unequal"],
+                f"largest force, motor 2 with {unequal}, our choice",
+            )
             for motion in MOTIONS
         ),
-        found("force_fight.static", "N", values["static_force_unequal"],
-              "left after the step: friction holds the screws apart"),
+        found(
+            "force_fight.static",
+            "N",
+            values["static_force_unequal"],
+            "left after the step: friction holds the screws apart",
+        ),
         *_speed(runs),
-    ]  # fmt: skip
+    ]
     text = (
         "Both motors follow one reference, a force sensor between their screws. The paper prints "
         "no forces. The rate limit's reason, higher speeds widen the angle between the motors, is "
         "looked for in Fig. 9's pulse with a weaker second motor."
     )
-    exhibit = Exhibit("force-fight", lambda: time_traces(result.recordings["step_unequal"]),
-                      "Force fight: step of both motors, of which the second one differs."
-    )  # fmt: skip
+    exhibit = Exhibit(
+        "force-fight",
+        lambda: time_traces(result.recordings["step_unequal"]),
+        "Force fight: step of both motors, of which the second one differs.",
+    )
     return Part("Force fight", text, tuple(items), (exhibit,))
 
 
@@ -86,12 +113,21 @@ def _speed(runs: Runs) -> list[Item]:
     stiffness = 0.5 / (1.0 / par.heart.K_S + 1.0 / par.heart.K_W)
     per_angle = stiffness * roller_screw.slope(par.screw)
     return [
-        compared("force_fight.speed", facts.FASTER_FIGHTS, swings[1] / swings[0], ">=",
-                 f"swings of {1e3 * swings[0]:.3g} mrad at {rate:g} rad/s, {1e3 * swings[1]:.3g} "
-                 f"mrad at {2 * rate:g} rad/s; torque constant of motor 2 {WEAKER:g} times"),
-        found("force_fight.force_per_angle", "N/rad", per_angle,
-              "force through the wedge per angle between the motors: the drive train is stiff"),
-    ]  # fmt: skip
+        compared(
+            "force_fight.speed",
+            facts.FASTER_FIGHTS,
+            swings[1] / swings[0],
+            ">=",
+            f"swings of {1e3 * swings[0]:.3g} mrad at {rate:g} rad/s, {1e3 * swings[1]:.3g} "
+            f"mrad at {2 * rate:g} rad/s; torque constant of motor 2 {WEAKER:g} times",
+        ),
+        found(
+            "force_fight.force_per_angle",
+            "N/rad",
+            per_angle,
+            "force through the wedge per angle between the motors: the drive train is stiff",
+        ),
+    ]
 
 
 def _swing(run: xr.Dataset) -> float:

@@ -23,13 +23,22 @@ def current_loop(runs: Runs) -> Part:
     bandwidths = [value for name, value in values.items() if name.startswith("bandwidth")]
     usual, position = values["bandwidth_parallel_usual"], parameters().control.position.f_n
     items = [
-        compared("current_loop.bandwidth", facts.FAST_CURRENT, usual / position, ">=",
-                 f"{usual:.0f} Hz against {position:g} Hz of the high-bandwidth position control; "
-                 "both are ours"),
-        found("current_loop.slowest", "Hz", min(bandwidths),
-              "over stators in parallel, alone and in series, and half to twice the gains"),
+        compared(
+            "current_loop.bandwidth",
+            facts.FAST_CURRENT,
+            usual / position,
+            ">=",
+            f"{usual:.0f} Hz against {position:g} Hz of the high-bandwidth position control; "
+            "both are ours",
+        ),
+        found(
+            "current_loop.slowest",
+            "Hz",
+            min(bandwidths),
+            "over stators in parallel, alone and in series, and half to twice the gains",
+        ),
         found("current_loop.fastest", "Hz", max(bandwidths), "over the same"),
-    ]  # fmt: skip
+    ]
     text = (
         "As in the paper, steps with the shaft clamped for several windings and gains. The data "
         "of the drive are the manufacturer's and not printed."
@@ -45,31 +54,59 @@ def efficiency(runs: Runs) -> Part:
     allowed = RECOVERED
     bearing = f"{kpis(result)['bearing_torque']:.3g} N m"
     items = [
-        compared("efficiency.driving", facts.ETA, values["eta_f"], None,
-                 "as the rig measures it", tuned="an input"),
-        compared("efficiency.recovered", put_in, values["eta_f"], allowed,
-                 f"with the bearings' torque, {bearing} without load and its growth with the "
-                 "force, taken off"),
-        compared("efficiency.no_load", put_in, values["eta_f_no_load"], allowed,
-                 "with the torque without load alone taken off: what grows with the square of the "
-                 "force counts as loss of the screw"),
-        compared("efficiency.raw", put_in, values["eta_f_raw"], allowed,
-                 "motor torque and force alone"),
-        found("efficiency.back_driven", "%", values["eta_b"],
-              f"the same for a screw that is driven back; {values['eta_b_true']:.3g} % put in, "
-              f"{values['eta_b_no_load']:.3g} % with the torque without load alone"),
-        found("efficiency.back_driven.raw", "%", values["eta_b_raw"],
-              "motor torque and force alone"),
-        found("efficiency.both", "%", values["eta_f_true"] * values["eta_b_true"] / 100.0,
-              "of one motor's torque arrive at the other: at full current neither moves the other"),
-    ]  # fmt: skip
+        compared(
+            "efficiency.driving",
+            facts.ETA,
+            values["eta_f"],
+            None,
+            "as the rig measures it",
+            tuned="an input",
+        ),
+        compared(
+            "efficiency.recovered",
+            put_in,
+            values["eta_f"],
+            allowed,
+            f"with the bearings' torque, {bearing} without load and its growth with the "
+            "force, taken off",
+        ),
+        compared(
+            "efficiency.no_load",
+            put_in,
+            values["eta_f_no_load"],
+            allowed,
+            "with the torque without load alone taken off: what grows with the square of the "
+            "force counts as loss of the screw",
+        ),
+        compared(
+            "efficiency.raw", put_in, values["eta_f_raw"], allowed, "motor torque and force alone"
+        ),
+        found(
+            "efficiency.back_driven",
+            "%",
+            values["eta_b"],
+            f"the same for a screw that is driven back; {values['eta_b_true']:.3g} % put in, "
+            f"{values['eta_b_no_load']:.3g} % with the torque without load alone",
+        ),
+        found(
+            "efficiency.back_driven.raw", "%", values["eta_b_raw"], "motor torque and force alone"
+        ),
+        found(
+            "efficiency.both",
+            "%",
+            values["eta_f_true"] * values["eta_b_true"] / 100.0,
+            "of one motor's torque arrive at the other: at full current neither moves the other",
+        ),
+    ]
     text = (
         "One motor in current control against the other in position control, a force sensor "
         "between their screws, in slow motion."
     )
-    exhibit = Exhibit("screw-efficiency", lambda: time_traces(result.recordings["driving"]),
-                      "Screw efficiency: motor 1 drives with constant current while motor 2 gives "
-                      "way.")  # fmt: skip
+    exhibit = Exhibit(
+        "screw-efficiency",
+        lambda: time_traces(result.recordings["driving"]),
+        "Screw efficiency: motor 1 drives with constant current while motor 2 gives way.",
+    )
     return Part("Roller-screw efficiency", text, tuple(items), (exhibit,))
 
 
@@ -113,10 +150,24 @@ def _directions(values: dict[str, float]) -> list[Item]:
     same = reading(line / MICRON, "N/um", facts.SAME_COMPRESSION)
     compression = values["K_heart_compression"]
     return [
-        compared("stiffness.compression", same, compression / MICRON,
-                 RECOVERED, "tip to tip, the force by the motors' current"),
-        compared("stiffness.tension", facts.SOFTER_TENSION,
-                 values["K_heart_tension"] / compression, "<=", "tension over compression"),
-        found("stiffness.force_per_current", "N/A", values["force_per_current"],
-              "the calibration that the second stage needs, for rising current"),
-    ]  # fmt: skip
+        compared(
+            "stiffness.compression",
+            same,
+            compression / MICRON,
+            RECOVERED,
+            "tip to tip, the force by the motors' current",
+        ),
+        compared(
+            "stiffness.tension",
+            facts.SOFTER_TENSION,
+            values["K_heart_tension"] / compression,
+            "<=",
+            "tension over compression",
+        ),
+        found(
+            "stiffness.force_per_current",
+            "N/A",
+            values["force_per_current"],
+            "the calibration that the second stage needs, for rising current",
+        ),
+    ]

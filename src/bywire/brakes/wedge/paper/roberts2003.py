@@ -30,7 +30,9 @@ SOURCE = Source(
     summary="self-reinforcing wedge brake with two motors, SAE 2003",
     reproduce=lambda progress: reproduced(
         Reproduction(MAIN, CITATION, allowances=ALLOWANCES, sets={"": "Our parameter set"}),
-        Runs(progress), PARTS, causes,
+        Runs(progress),
+        PARTS,
+        causes,
     ),
-)  # fmt: skip
+)
 reproduce = SOURCE.reproduce

@@ -32,8 +32,10 @@ LOWEST, HIGHEST = 0.32, 0.62
 GROWN = 1.05
 """moment over that at power-off from which the brake has run away"""
 VARIANTS = (
-    ("", "fixed", "kept"), (".frictionless", "fixed", "none"), (".known", "known", "kept"),
-)  # fmt: skip
+    ("", "fixed", "kept"),
+    (".frictionless", "fixed", "none"),
+    (".known", "known", "kept"),
+)
 """ids' endings, whether the controller knows mu_B, and the brake's friction"""
 FREE = {"control.offset.delta_preload": 0.0}
 HOLD = (0.1, 0.5)
@@ -53,11 +55,15 @@ def part(runs: Runs) -> Part:
         "friction the model obeys both. With it the neutral point is a band: what friction holds "
         "does not run away, and the more load the less of it."
     )
+
     def pulses() -> Figure:
         return stacked(runs.bench("moment-pulses", MAIN, _at(0.6, {})).recordings["run"])
 
-    exhibit = Exhibit("unstable-region", pulses, "Fig. 7's test in the unstable region, at "
-                      "mu_B = 0.6: the motors pull the wedge back.")  # fmt: skip
+    exhibit = Exhibit(
+        "unstable-region",
+        pulses,
+        "Fig. 7's test in the unstable region, at mu_B = 0.6: the motors pull the wedge back.",
+    )
     return Part("Neutral point and stability", text, tuple(items), (_figure(runs), exhibit))
 
 
@@ -76,20 +82,31 @@ def _static(runs: Runs) -> list[Item]:
             "section 'Introduction': C* = 2 mu_B/(tan(alpha) - mu_B), read as its value at our "
             "wedge angle"
         )
-        items.append(compared(f"stability.C.{tag(mu_B)}", reading(stated, "1", where),
-                              values[f"C_star_{tag(mu_B)}"], FORMULA, f"mu_B = {mu_B:g}, simulated "
-                              f"without friction, F_M = {values[f'F_M_{tag(mu_B)}']:.4g} N at 500 "
-                              f"Nm; with friction {values[f'C_star_rising_{tag(mu_B)}']:.3g} "
-                              f"rising, {values[f'C_star_falling_{tag(mu_B)}']:.3g} falling"
-        ))  # fmt: skip
+        items.append(
+            compared(
+                f"stability.C.{tag(mu_B)}",
+                reading(stated, "1", where),
+                values[f"C_star_{tag(mu_B)}"],
+                FORMULA,
+                f"mu_B = {mu_B:g}, simulated "
+                f"without friction, F_M = {values[f'F_M_{tag(mu_B)}']:.4g} N at 500 "
+                f"Nm; with friction {values[f'C_star_rising_{tag(mu_B)}']:.3g} "
+                f"rising, {values[f'C_star_falling_{tag(mu_B)}']:.3g} falling",
+            )
+        )
     neutral = "coefficient without actuation force, with friction, while the moment"
     return [
         *items,
-        compared("stability.F_M.neutral", facts.NEUTRAL_FORCE, values[f"F_M_{tag(tan_alpha())}"],
-                 FORCE, "simulated at mu_B = tan(alpha) without friction, at 500 Nm"),
+        compared(
+            "stability.F_M.neutral",
+            facts.NEUTRAL_FORCE,
+            values[f"F_M_{tag(tan_alpha())}"],
+            FORCE,
+            "simulated at mu_B = tan(alpha) without friction, at 500 Nm",
+        ),
         found("stability.neutral.falling", "1", values["neutral_mu_falling"], f"{neutral} falls"),
         found("stability.neutral.rising", "1", values["neutral_mu_rising"], f"{neutral} rises"),
-    ]  # fmt: skip
+    ]
 
 
 def _sweep() -> dict[str, Any]:
@@ -107,9 +124,11 @@ def _figure(runs: Runs) -> Exhibit:
         for name in ("F_M", "F_M_rising", "F_M_falling")
     }
     forces = WedgeForces(tried, *ratios.values())
-    return Exhibit("brake-factor", lambda: brake_factor(forces, tan_alpha()),
-                   "Actuation force and brake factor at 500 Nm over the pads' friction "
-                   "coefficient.")  # fmt: skip
+    return Exhibit(
+        "brake-factor",
+        lambda: brake_factor(forces, tan_alpha()),
+        "Actuation force and brake factor at 500 Nm over the pads' friction coefficient.",
+    )
 
 
 def _runaway(runs: Runs) -> list[Item]:
@@ -119,13 +138,27 @@ def _runaway(runs: Runs) -> list[Item]:
     note = "lowest mu_B tried at which the moment grows by itself when the power goes off at"
     high = facts.PULSE.value
     return [
-        compared("stability.runaway", stated, _lowest(runs, IDEAL, 500.0), GRID,
-                 f"{note} 500 Nm; without friction"),
-        compared("stability.runaway.friction", stated, _lowest(runs, {"flywheel.runout": 0.0},
-                 500.0), GRID, f"{note} 500 Nm; with friction"),
-        found("stability.runaway.friction.950", "1", _lowest(runs, {"flywheel.runout": 0.0}, high),
-              f"{note} {high:g} Nm; with friction"),
-    ]  # fmt: skip
+        compared(
+            "stability.runaway",
+            stated,
+            _lowest(runs, IDEAL, 500.0),
+            GRID,
+            f"{note} 500 Nm; without friction",
+        ),
+        compared(
+            "stability.runaway.friction",
+            stated,
+            _lowest(runs, {"flywheel.runout": 0.0}, 500.0),
+            GRID,
+            f"{note} 500 Nm; with friction",
+        ),
+        found(
+            "stability.runaway.friction.950",
+            "1",
+            _lowest(runs, {"flywheel.runout": 0.0}, high),
+            f"{note} {high:g} Nm; with friction",
+        ),
+    ]
 
 
 def _lowest(runs: Runs, changes: dict[str, Any], M_hold: float) -> float:
@@ -159,13 +192,26 @@ def _closed_loop(runs: Runs) -> list[Item]:
         belief = "knows" if slope == "known" else "does not know"
         note = f"200 Nm, friction {friction}; the controller {belief} mu_B"
         items += [
-            compared(f"stability.unstable{suffix}", facts.STABLE, values["unstable"], "<=",
-                     f"coefficients without a settled hold; {note}"),
-            found(f"stability.overshoot{suffix}", "%", values["overshoot_max"],
-                  f"largest over all coefficients; {note}"),
-            found(f"stability.hold_power{suffix}", "W", values["hold_power_max"],
-                  f"largest over all coefficients, standby included; {note}"),
-        ]  # fmt: skip
+            compared(
+                f"stability.unstable{suffix}",
+                facts.STABLE,
+                values["unstable"],
+                "<=",
+                f"coefficients without a settled hold; {note}",
+            ),
+            found(
+                f"stability.overshoot{suffix}",
+                "%",
+                values["overshoot_max"],
+                f"largest over all coefficients; {note}",
+            ),
+            found(
+                f"stability.hold_power{suffix}",
+                "W",
+                values["hold_power_max"],
+                f"largest over all coefficients, standby included; {note}",
+            ),
+        ]
     return items
 
 
@@ -182,16 +228,29 @@ def _free_play(runs: Runs) -> list[Item]:
     }
     note = "changes of contact seen at the rows of 0.4 s of a hold at tan(alpha), without friction"
     return [
-        compared("stability.contact_changes", facts.NO_PLAY, float(changes["preload"]), FEW,
-                 f"{note}, preload of the parameter set"),
-        found("stability.contact_changes.free_play", "1", float(changes["free_play"]),
-              f"{note}, no preload"),
+        compared(
+            "stability.contact_changes",
+            facts.NO_PLAY,
+            float(changes["preload"]),
+            FEW,
+            f"{note}, preload of the parameter set",
+        ),
+        found(
+            "stability.contact_changes.free_play",
+            "1",
+            float(changes["free_play"]),
+            f"{note}, no preload",
+        ),
         *(
-            found(f"stability.ripple.{name}", "N*m", swing(run, "M_B", *HOLD),
-                  "peak to peak of the moment meanwhile")
+            found(
+                f"stability.ripple.{name}",
+                "N*m",
+                swing(run, "M_B", *HOLD),
+                "peak to peak of the moment meanwhile",
+            )
             for name, run in held.items()
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _poles() -> list[Item]:
@@ -199,14 +258,29 @@ def _poles() -> list[Item]:
     note = "linear model at constant currents, without friction and cogging, mu_B ="
     below, neutral, above = (slow_pole(mu_B) for mu_B in (BELOW, tan_alpha(), ABOVE))
     return [
-        compared("stability.pole.neutral", facts.NEUTRAL_POLE, neutral.real, NEUTRAL,
-                 f"largest growth rate, {note} tan(alpha)"),
-        compared("stability.pole.above", facts.UNSTABLE_POLE, above.real, ">=",
-                 f"largest growth rate, {note} {ABOVE:g}"),
-        compared("stability.pole.below", facts.STABLE_POLE, below.real, "<=",
-                 f"largest growth rate, {note} {BELOW:g}"),
+        compared(
+            "stability.pole.neutral",
+            facts.NEUTRAL_POLE,
+            neutral.real,
+            NEUTRAL,
+            f"largest growth rate, {note} tan(alpha)",
+        ),
+        compared(
+            "stability.pole.above",
+            facts.UNSTABLE_POLE,
+            above.real,
+            ">=",
+            f"largest growth rate, {note} {ABOVE:g}",
+        ),
+        compared(
+            "stability.pole.below",
+            facts.STABLE_POLE,
+            below.real,
+            "<=",
+            f"largest growth rate, {note} {BELOW:g}",
+        ),
         found("stability.swing.below", "rad/s", below.imag, f"of the slow pair, {note} {BELOW:g}"),
-    ]  # fmt: skip
+    ]
 
 
 def slow_pole(mu_B: float) -> complex:

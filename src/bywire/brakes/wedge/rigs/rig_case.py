@@ -59,9 +59,16 @@ def _case(
 ) -> Case:
     state, memory = zeros(model.State), zeros(model.Memory)
     return Case(
-        label, model, par, state, memory, stimulus, duration, start=lambda _: (state, memory),
+        label,
+        model,
+        par,
+        state,
+        memory,
+        stimulus,
+        duration,
+        start=lambda _: (state, memory),
         **timing,
-    )  # fmt: skip
+    )
 
 
 def heart_case(par: WedgeParameters, stimulus: Stimuli, duration: float, mode: str) -> Case:

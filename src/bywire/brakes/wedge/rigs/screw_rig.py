@@ -80,19 +80,45 @@ class ScrewRig(Assembly[WedgeParameters, Memory]):
     E_source = Shown("J", "electrical energy into the motors", role=Role("source", "source"))
 
     records: ClassVar[tuple[str, ...]] = (
-        "theta_1_ref", "theta_2_ref", "theta_1", "theta_2", "q_1", "q_2", "omega_1", "omega_2",
-        "i_1_ref", "i_2_ref", "i_1", "i_2", "voltage_1", "voltage_2", "F", "y_F", "T_fr_1",
-        "T_fr_2", "stuck", "P_el", "E_source", "E_copper", "E_damping", "E_shaft", "E_line",
-        "E_stored", "t_stuck",
-    )  # fmt: skip
+        "theta_1_ref",
+        "theta_2_ref",
+        "theta_1",
+        "theta_2",
+        "q_1",
+        "q_2",
+        "omega_1",
+        "omega_2",
+        "i_1_ref",
+        "i_2_ref",
+        "i_1",
+        "i_2",
+        "voltage_1",
+        "voltage_2",
+        "F",
+        "y_F",
+        "T_fr_1",
+        "T_fr_2",
+        "stuck",
+        "P_el",
+        "E_source",
+        "E_copper",
+        "E_damping",
+        "E_shaft",
+        "E_line",
+        "E_stored",
+        "t_stuck",
+    )
 
     def wire(self, w: Self) -> None:
         """Say what the line between the screws and both drives and motors feel."""
         k, left, right = roller_screw.slope(w.par.screw), w.motor_1.x, w.motor_2.x
         w.line.u = force_sensor.Input(
-            k * left.theta, k * right.theta, k * left.omega, k * right.omega,
+            k * left.theta,
+            k * right.theta,
+            k * left.omega,
+            k * right.omega,
             screws_compliance(w.par),
-        )  # fmt: skip
+        )
         w.F = force_sensor.force(w.line.u, w.line.par)
         drive_train.wire(w.drive_1, w.motor_1, w.m.i_1_ref, ON, -w.F, w.par)
         drive_train.wire(w.drive_2, w.motor_2, w.m.i_2_ref, ON, w.F, w.par)

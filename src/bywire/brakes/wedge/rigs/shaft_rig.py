@@ -73,10 +73,24 @@ class ShaftRig(Assembly[WedgeParameters, Memory]):
     E_source = Shown("J", "electrical energy into the motor", role=Role("source", "source"))
 
     records: ClassVar[tuple[str, ...]] = (
-        "theta_1_ref", "theta_1", "q_1", "omega_1", "i_1_ref", "i_1", "sat_current", "voltage_1",
-        "T_fr_1", "stuck", "P_el", "E_source", "E_copper", "E_damping", "E_shaft", "E_stored",
+        "theta_1_ref",
+        "theta_1",
+        "q_1",
+        "omega_1",
+        "i_1_ref",
+        "i_1",
+        "sat_current",
+        "voltage_1",
+        "T_fr_1",
+        "stuck",
+        "P_el",
+        "E_source",
+        "E_copper",
+        "E_damping",
+        "E_shaft",
+        "E_stored",
         "t_stuck",
-    )  # fmt: skip
+    )
 
     def wire(self, w: Self) -> None:
         """Say what drive and motor feel."""

@@ -53,11 +53,36 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
     )
 
     records: ClassVar[tuple[str, ...]] = (
-        "s", "v_x", "v_tread", "a", "slip", "sliding", "u", "F_x", "N_x", "t_locked", "E_body",
-        "E_wheel", "E_tyre", "E_brake", "W_slope", "T_disc", "T_pads", "T_fluid", "E_friction",
-        "E_discs", "E_pads", "E_fluid", "E_air", "M_most", "v_hat", "slip_hat", "abs", "phase_x",
+        "s",
+        "v_x",
+        "v_tread",
+        "a",
+        "slip",
+        "sliding",
+        "u",
+        "F_x",
+        "N_x",
+        "t_locked",
+        "E_body",
+        "E_wheel",
+        "E_tyre",
+        "E_brake",
+        "W_slope",
+        "T_disc",
+        "T_pads",
+        "T_fluid",
+        "E_friction",
+        "E_discs",
+        "E_pads",
+        "E_fluid",
+        "E_air",
+        "M_most",
+        "v_hat",
+        "slip_hat",
+        "abs",
+        "phase_x",
         *WedgeBrake.records,
-    )  # fmt: skip
+    )
 
     def wheel(self, w: Self) -> WheelSpeed:
         """Return how fast the disc turns, and the wheel with it."""
@@ -100,9 +125,14 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
         """Return where a slip is held that is far below that of the largest adhesion."""
         if par.ecu.abs != "pi":
             return []
-        return far_from_peak(recording["s"].values, recording["abs"].values,
-                             par.ecu.slip.slip_set, "ecu.slip.slip_set", par.corner.tyre,
-                             par.corner.road)  # fmt: skip
+        return far_from_peak(
+            recording["s"].values,
+            recording["abs"].values,
+            par.ecu.slip.slip_set,
+            "ecu.slip.slip_set",
+            par.corner.tyre,
+            par.corner.road,
+        )
 
     def rest(self, par: Any) -> tuple[Any, Any]:
         """Return the vehicle standing, the brake parked."""
@@ -116,9 +146,13 @@ def _slip(x: Any, m: Any, u: control.Stimulus, par: WedgeCornerParameters) -> An
     )
     sine = road.slope(x.s, par.corner.road).sine
     seen = corner_slip.Readings(
-        x.v_x, x.Omega * par.corner.r, edge.angle, edge.age, par.corner.body.g * sine,
+        x.v_x,
+        x.Omega * par.corner.r,
+        edge.angle,
+        edge.age,
+        par.corner.body.g * sine,
         ops.where((m.mode - moment_control.MOMENT) ** 2 < 0.25, 1.0, 0.0),
-    )  # fmt: skip
+    )
     return corner_slip.tick(seen, m, u.M_set, par.ecu)
 
 
@@ -136,9 +170,7 @@ def _contact_tracked(x: Any, m: Any, par: WedgeCornerParameters) -> Any:
     return m._replace(theta_c=ops.where(braked > 0.5, contact, m.theta_c))
 
 
-def at_speed(
-    v: float, par: WedgeCornerParameters, T_disc: float | None = None
-) -> tuple[Any, Any]:
+def at_speed(v: float, par: WedgeCornerParameters, T_disc: float | None = None) -> tuple[Any, Any]:
     """Return the corner rolling at a speed [m/s], its brake parked.
 
     ``T_disc``: temperature of the disc [K], that of the air by default.

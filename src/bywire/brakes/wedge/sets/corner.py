@@ -41,11 +41,24 @@ _HEAT = {
 
 _RULES_FROM = "as tuned for pressure loops of 10 Hz on a motorcycle, none for this brake"
 _RULES = {
-    "slip_keep": 0.345, "slip_dump": 0.51, "slip_back": 0.224, "t_lead": 0.133, "a_hold": 13.7,
-    "t_hold": 0.0265, "t_most": 0.47, "dump": 100.0, "depth": 0.935, "back": 1.015,
+    "slip_keep": 0.345,
+    "slip_dump": 0.51,
+    "slip_back": 0.224,
+    "t_lead": 0.133,
+    "a_hold": 13.7,
+    "t_hold": 0.0265,
+    "t_most": 0.47,
+    "dump": 100.0,
+    "depth": 0.935,
+    "back": 1.015,
     "t_step": 0.0183,
-    "step": 0.0425, "growth": 1.12, "tau_a": 0.0055, "tau_p": 0.025, "v_off": 2.0, "v_fall": 4.85,
-}  # fmt: skip
+    "step": 0.0425,
+    "growth": 1.12,
+    "tau_a": 0.0055,
+    "tau_p": 0.025,
+    "v_off": 2.0,
+    "v_fall": 4.85,
+}
 
 CORNER = CitedSet(
     name="roberts2003-corner",

@@ -45,7 +45,6 @@ def _travel(par: Any) -> float:
     return travel
 
 
-
 def _grease(bearing: Any) -> float:
     """Return the viscous friction of a bearing at the speed and the viscosity it is stated at."""
     torque: float = 1.2e-4 * (bearing.omega_ref * (bearing.nu_ref / _MICRO)) ** bearing.k_nu

@@ -30,9 +30,17 @@ Efficiency = Literal["friction-angle", "as-given"]
 SPEEDS = ("omega_gap", "a_gap", "omega_creep", "rate_max")
 """parameters of the moment control that set how fast the reference moves"""
 SIGNALS = (
-    "y_M", "P_in", "P_meas", "i_1_ref", "i_2_ref", "F_end", "omega_1", "omega_2",
-    "E_copper", "E_shaft",
-)  # fmt: skip
+    "y_M",
+    "P_in",
+    "P_meas",
+    "i_1_ref",
+    "i_2_ref",
+    "F_end",
+    "omega_1",
+    "omega_2",
+    "E_copper",
+    "E_shaft",
+)
 _FASTEST = 8.0  # closing speeds are looked for up to so many times the least
 _ROUNDS, _TRIED = 2, 8  # rounds, and speeds tried in each between too slow and fast enough
 _SETTLE, _RECORD, _STEP = 0.05, 2e-4, 20e-6

@@ -78,17 +78,26 @@ def around(grids: Sequence[xr.Dataset], best: xr.Dataset, options: Options) -> l
     tan_alpha, lead = float(best["tan_alpha"]), float(best["lead"])
     power, texts = float(best[f"worst_{options.power}"]), []
     grid = [g for g in grids if tan_alpha in g["tan_alpha"].values and lead in g["lead"].values][-1]
-    i, j = (int(np.flatnonzero(grid[name].values == value)[0])
-            for name, value in (("tan_alpha", tan_alpha), ("lead", lead)))  # fmt: skip
-    steps = {"flatter wedge": (-1, 0), "steeper wedge": (1, 0),
-             "shorter lead": (0, -1), "longer lead": (0, 1)}  # fmt: skip
+    i, j = (
+        int(np.flatnonzero(grid[name].values == value)[0])
+        for name, value in (("tan_alpha", tan_alpha), ("lead", lead))
+    )
+    steps = {
+        "flatter wedge": (-1, 0),
+        "steeper wedge": (1, 0),
+        "shorter lead": (0, -1),
+        "longer lead": (0, 1),
+    }
     for label, (di, dj) in steps.items():
         k, m = i + di, j + dj
         if not (0 <= k < grid.sizes["tan_alpha"] and 0 <= m < grid.sizes["lead"]):
             continue
         neighbor = grid.isel(tan_alpha=k, lead=m)
-        value = (f"tan(alpha) = {float(neighbor['tan_alpha']):.4g}" if di
-                 else f"lead = {1e3 * float(neighbor['lead']):.4g} mm")  # fmt: skip
+        value = (
+            f"tan(alpha) = {float(neighbor['tan_alpha']):.4g}"
+            if di
+            else f"lead = {1e3 * float(neighbor['lead']):.4g} mm"
+        )
         reasons = failures(neighbor, options)
         more = 100.0 * (float(neighbor[options.power].max()) / power - 1.0)
         outcome = f"{more:+.2g} % power, at mu_B = {_where(neighbor[options.power]):g}"

@@ -47,10 +47,15 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
         When a design does not exist.
     """
     demand = Demand(
-        options.moment, options.t_90, options.t_hold, options.t_release, options.mu_B,
-        options.believed == "known", options.response == "enforced",
+        options.moment,
+        options.t_90,
+        options.t_hold,
+        options.t_release,
+        options.mu_B,
+        options.believed == "known",
+        options.response == "enforced",
         options.counted == "whole-pulse",
-    )  # fmt: skip
+    )
     par = par.replace({"control.moment.omega_gap": options.omega_gap})
     given = answer(par, demand)  # first and alone: it also builds the kernels
     slopes = np.linspace(options.tan_alpha_min, options.tan_alpha_max, options.slopes)
@@ -71,12 +76,15 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
     marks = (Mark("optimum", best.lead, best.tan_alpha), here)
     maps = {
         kind: Map(
-            f"worst_{kind}", "lead", "tan_alpha",
+            f"worst_{kind}",
+            "lead",
+            "tan_alpha",
             f"Largest {kind} power of the stop at the worst friction coefficient.",
-            marks if kind == options.power else (here,), {"infeasible": ("infeasible", _BORDER)},
+            marks if kind == options.power else (here,),
+            {"infeasible": ("infeasible", _BORDER)},
         )
         for kind in (options.power, _other(options.power))
-    }  # fmt: skip
+    }
     kpis = (*_optimum(best, grids, options), *_given(given, options))
     limits = (*active(best.at, par, options), *around(grids, best.at, options))
     return Findings(
@@ -115,28 +123,60 @@ def _optimum(best: Best, grids: Sequence[xr.Dataset], options: Options) -> tuple
     return (
         Kpi("optimum_tan_alpha", best.tan_alpha, "1", "Slope of the wedge of least power."),
         Kpi("optimum_lead", best.lead, "m", "Lead of the screws of least power."),
-        Kpi("optimum_power", best.power, "W",
-            f"Largest {options.power} power of the stop, worst friction coefficient."),
-        Kpi("optimum_mu_B", float(best.at[f"mu_B_{options.power}"]), "1",
-            "Friction coefficient that needs this power."),
-        Kpi("optimum_release", float(best.at["release"].max()), "W",
-            "Largest power of its release, filtered."),
-        Kpi("optimum_t_90", float(best.at["t_90"].max()), "s",
-            "Time to 90 % of the demand reached, slowest friction coefficient."),
-        Kpi("optimum_closing_speed", float(best.at["closing_speed"]), "m/s",
-            "Largest speed at which its reference closes the pads."),
+        Kpi(
+            "optimum_power",
+            best.power,
+            "W",
+            f"Largest {options.power} power of the stop, worst friction coefficient.",
+        ),
+        Kpi(
+            "optimum_mu_B",
+            float(best.at[f"mu_B_{options.power}"]),
+            "1",
+            "Friction coefficient that needs this power.",
+        ),
+        Kpi(
+            "optimum_release",
+            float(best.at["release"].max()),
+            "W",
+            "Largest power of its release, filtered.",
+        ),
+        Kpi(
+            "optimum_t_90",
+            float(best.at["t_90"].max()),
+            "s",
+            "Time to 90 % of the demand reached, slowest friction coefficient.",
+        ),
+        Kpi(
+            "optimum_closing_speed",
+            float(best.at["closing_speed"]),
+            "m/s",
+            "Largest speed at which its reference closes the pads.",
+        ),
         Kpi("optimum_current", float(best.at["current"].max()), "A", "Largest current demand."),
         Kpi("flat_tan_alpha_min", min(slopes), "1", f"Smallest slope {share}."),
         Kpi("flat_tan_alpha_max", max(slopes), "1", f"Largest slope {share}."),
         Kpi("flat_lead_min", min(leads), "m", f"Smallest lead {share}."),
         Kpi("flat_lead_max", max(leads), "m", f"Largest lead {share}."),
-        Kpi("other_tan_alpha", other.tan_alpha, "1",
-            f"Slope on the map of least {_other(options.power)} power."),
-        Kpi("other_lead", other.lead, "m",
-            f"Lead on the map of least {_other(options.power)} power."),
-        Kpi("other_power", other.power, "W",
-            f"Largest {_other(options.power)} power there, worst friction coefficient."),
-    )  # fmt: skip
+        Kpi(
+            "other_tan_alpha",
+            other.tan_alpha,
+            "1",
+            f"Slope on the map of least {_other(options.power)} power.",
+        ),
+        Kpi(
+            "other_lead",
+            other.lead,
+            "m",
+            f"Lead on the map of least {_other(options.power)} power.",
+        ),
+        Kpi(
+            "other_power",
+            other.power,
+            "W",
+            f"Largest {_other(options.power)} power there, worst friction coefficient.",
+        ),
+    )
 
 
 def _given(given: Answer, options: Options) -> tuple[Kpi, ...]:
@@ -144,17 +184,35 @@ def _given(given: Answer, options: Options) -> tuple[Kpi, ...]:
     k, t_90 = int(np.argmax(sizes)), float(given.t_90.max())
     note = "" if math.isfinite(t_90) else "a case never gets there"
     return (
-        Kpi("given_power", float(sizes[k]), "W",
-            f"Largest {options.power} power of the given drive train, worst coefficient."),
-        Kpi("given_mu_B", float(options.mu_B[k]), "1",
-            "Friction coefficient that needs this power."),
-        Kpi("given_release", float(given.release.max()), "W",
-            "Largest power of its release, filtered."),
-        Kpi("given_t_90", t_90, "s",
-            "Time to 90 % of the demand reached by it, slowest coefficient.", note),
-        Kpi("given_closing_speed", given.closing_speed, "m/s",
-            "Largest speed at which its reference closes the pads."),
-    )  # fmt: skip
+        Kpi(
+            "given_power",
+            float(sizes[k]),
+            "W",
+            f"Largest {options.power} power of the given drive train, worst coefficient.",
+        ),
+        Kpi(
+            "given_mu_B", float(options.mu_B[k]), "1", "Friction coefficient that needs this power."
+        ),
+        Kpi(
+            "given_release",
+            float(given.release.max()),
+            "W",
+            "Largest power of its release, filtered.",
+        ),
+        Kpi(
+            "given_t_90",
+            t_90,
+            "s",
+            "Time to 90 % of the demand reached by it, slowest coefficient.",
+            note,
+        ),
+        Kpi(
+            "given_closing_speed",
+            given.closing_speed,
+            "m/s",
+            "Largest speed at which its reference closes the pads.",
+        ),
+    )
 
 
 def _cuts(data: xr.Dataset, best: Best) -> tuple[Cut, ...]:

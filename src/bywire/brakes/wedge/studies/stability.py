@@ -86,10 +86,16 @@ class Options(ParameterSet):
 
 
 DEFAULTS = Options(
-    mu_B_min=0.1, mu_B_max=0.8, coefficients=21,
-    tan_alpha_min=0.2, tan_alpha_max=0.6, slopes=13,
-    force=1e3, moment=200.0, believed="as-given",
-)  # fmt: skip
+    mu_B_min=0.1,
+    mu_B_max=0.8,
+    coefficients=21,
+    tan_alpha_min=0.2,
+    tan_alpha_max=0.6,
+    slopes=13,
+    force=1e3,
+    moment=200.0,
+    believed="as-given",
+)
 """around the catalog's wedge and the pads of Roberts et al. (2003)"""
 
 
@@ -107,10 +113,12 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
     known = options.believed == "known"
     for k, slope in enumerate(map(float, tan)):
         cases = [brake(par, float(mu_B), slope, known) for mu_B in mu]
-        rows.append([
-            (*motion(design, options.force), *controlled(design, options.moment))
-            for design in cases
-        ])  # fmt: skip
+        rows.append(
+            [
+                (*motion(design, options.force), *controlled(design, options.moment))
+                for design in cases
+            ]
+        )
         borders.append(neutral(cases[0], options.force))
         progress("stability", (k + 1) / tan.size)
     data = _dataset(mu, tan, np.array(rows), np.array(borders))
@@ -140,18 +148,26 @@ def _maps(data: xr.Dataset, given: Mark) -> dict[str, Map]:
     closed = {"tan(alpha) = mu_B": ((low, high), (low, high))} if low < high else {}
     return {
         "uncontrolled": Map(
-            "growth_open", "mu_B", "tan_alpha",
+            "growth_open",
+            "mu_B",
+            "tan_alpha",
             "Largest growth rate of the wedge without control, motors at constant currents; dashed "
             "the closed form of the neutral point. The hatched border is computed; colors are "
             "interpolated between designs, and the rate jumps there.",
-            (given,), {"unstable without control": ("beyond_open", 0.0)}, closed,
+            (given,),
+            {"unstable without control": ("beyond_open", 0.0)},
+            closed,
         ),
         "moment-loop": Map(
-            "disk_moment", "mu_B", "tan_alpha",
+            "disk_moment",
+            "mu_B",
+            "tan_alpha",
             "Disk margin of the closed moment loop; dashed the neutral point of the wedge.",
-            (given,), {"unstable in the moment loop": ("unstable_moment", 0.5)}, closed,
+            (given,),
+            {"unstable in the moment loop": ("unstable_moment", 0.5)},
+            closed,
         ),
-    }  # fmt: skip
+    }
 
 
 def _cut(data: xr.Dataset, given: Mark) -> Cut:
@@ -167,17 +183,32 @@ def _uncontrolled(par: WedgeParameters, data: xr.Dataset, options: Options) -> t
     apart = np.abs(data["border_open"].values - data["tan_alpha"].values)
     error = float(np.max(np.abs(growth[fast] / rigid[fast] - 1.0))) if fast.any() else math.nan
     return (
-        Kpi("neutral_mu_B", neutral(par, options.force), "1",
-            "Friction coefficient from which the given wedge runs away without control."),
-        Kpi("neutral_deviation", float(apart.max()), "1",
-            "Largest distance of the neutral point from its closed form tan(alpha)."),
-        Kpi("growth_max", float(growth.max()), "1/s",
-            "Largest growth rate without control."),
-        Kpi("rigid_error", 100.0 * error, "%",
-            f"Largest deviation of rates above {_FAST:g} 1/s from the closed form."),
-        Kpi("locked_growth_max", float(data["growth_locked"].max()), "1/s",
-            "Largest growth rate with locked motors; below 0 where they hold the wedge."),
-    )  # fmt: skip
+        Kpi(
+            "neutral_mu_B",
+            neutral(par, options.force),
+            "1",
+            "Friction coefficient from which the given wedge runs away without control.",
+        ),
+        Kpi(
+            "neutral_deviation",
+            float(apart.max()),
+            "1",
+            "Largest distance of the neutral point from its closed form tan(alpha).",
+        ),
+        Kpi("growth_max", float(growth.max()), "1/s", "Largest growth rate without control."),
+        Kpi(
+            "rigid_error",
+            100.0 * error,
+            "%",
+            f"Largest deviation of rates above {_FAST:g} 1/s from the closed form.",
+        ),
+        Kpi(
+            "locked_growth_max",
+            float(data["growth_locked"].max()),
+            "1/s",
+            "Largest growth rate with locked motors; below 0 where they hold the wedge.",
+        ),
+    )
 
 
 def _controlled(par: WedgeParameters, data: xr.Dataset, options: Options) -> tuple[Kpi, ...]:
@@ -186,20 +217,32 @@ def _controlled(par: WedgeParameters, data: xr.Dataset, options: Options) -> tup
     if np.isfinite(disk).any():
         i, j = np.unravel_index(int(np.nanargmin(disk)), disk.shape)
         least = float(disk[i, j])
-        where = (f"at mu_B = {float(data['mu_B'][j]):.3g}, "
-                 f"tan(alpha) = {float(data['tan_alpha'][i]):.3g}")  # fmt: skip
+        where = (
+            f"at mu_B = {float(data['mu_B'][j]):.3g}, "
+            f"tan(alpha) = {float(data['tan_alpha'][i]):.3g}"
+        )
     between = (options.mu_B_min, HIGHEST)
-    border = [b.value for b in moment_borders(par, options.moment, between, _SEARCHED)
-             if not b.above]  # fmt: skip
+    border = [
+        b.value for b in moment_borders(par, options.moment, between, _SEARCHED) if not b.above
+    ]
     note = "" if border else f"stable up to {HIGHEST:g}"
     return (
         Kpi("moment_disk_min", least, "1", "Least disk margin of the moment loop.", where),
-        Kpi("moment_unstable", float(np.nansum(unstable)), "1",
-            "Designs whose moment loop is unstable."),
-        Kpi("moment_mu_B", border[0] if border else math.nan, "1",
+        Kpi(
+            "moment_unstable",
+            float(np.nansum(unstable)),
+            "1",
+            "Designs whose moment loop is unstable.",
+        ),
+        Kpi(
+            "moment_mu_B",
+            border[0] if border else math.nan,
+            "1",
             "Friction coefficient from which the given wedge's moment loop is unstable, its "
-            "controller as given.", note),
-    )  # fmt: skip
+            "controller as given.",
+            note,
+        ),
+    )
 
 
 STUDY = Study(

@@ -46,7 +46,7 @@ TARGETS = (
         ("-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-d16"),
         "mps2-an500",
     ),
-)  # fmt: skip
+)
 
 
 def missing_tools() -> str:

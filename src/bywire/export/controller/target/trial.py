@@ -69,9 +69,16 @@ def host_trial(program: Program, folder: Path, compiler: Compiler, scratch: Path
     """
     made = scratch / "host"
     _call(
-        [*compiler.command, *FLAGS, *map(str, _sources(program, folder)),
-         str(folder / f"{program.name}_harness.c"), "-o", str(made), "-lm"],
-    )  # fmt: skip
+        [
+            *compiler.command,
+            *FLAGS,
+            *map(str, _sources(program, folder)),
+            str(folder / f"{program.name}_harness.c"),
+            "-o",
+            str(made),
+            "-lm",
+        ],
+    )
     said = _call([str(made)], may_fail=True)
     match = re.search(r"(\d+) values differ, bits ([0-9a-f]+)\n(\d+) breaches", said)
     if match is None:
@@ -95,11 +102,24 @@ def target_trial(
         _call([CROSS, *SMALL_FLAGS, *target.flags, "-c", str(source), "-o", objects[-1]])
     rom, ram = _sizes(program, objects, target, scratch)
     image = _image(program, every, objects, target, folder, scratch)
-    said = _call([
-        EMULATOR, "-machine", target.machine, "-nographic", "-monitor", "none", "-serial", "none",
-        "-semihosting-config", "enable=on,target=native", "-icount", "shift=0",
-        "-kernel", str(image),
-    ])  # fmt: skip
+    said = _call(
+        [
+            EMULATOR,
+            "-machine",
+            target.machine,
+            "-nographic",
+            "-monitor",
+            "none",
+            "-serial",
+            "none",
+            "-semihosting-config",
+            "enable=on,target=native",
+            "-icount",
+            "shift=0",
+            "-kernel",
+            str(image),
+        ]
+    )
     match = re.search(r"differ (\d+)\nbits (\d+)\nbreaches (\d+)\n", said)
     if match is None:
         raise CompilerError(f"the ECU of {program.name} on {target.name} said {said[:200]!r}")
@@ -117,29 +137,55 @@ def _sizes(
     """Return read-only and other memory of the ECU, with what its compiler's library brings."""
     parts = scratch / "parts.elf"
     steps = [f"-Wl,-u,{step.name}" for step in program.steps]
-    _call([
-        CROSS, *target.flags, *objects, "-nostartfiles", "-Wl,--gc-sections", *steps,
-        f"-Wl,-e,{program.name}_ecu_init", "-o", str(parts), "-lm",
-    ])  # fmt: skip
+    _call(
+        [
+            CROSS,
+            *target.flags,
+            *objects,
+            "-nostartfiles",
+            "-Wl,--gc-sections",
+            *steps,
+            f"-Wl,-e,{program.name}_ecu_init",
+            "-o",
+            str(parts),
+            "-lm",
+        ]
+    )
     said = _call(["arm-none-eabi-size", str(parts)])
     text, data, bss = map(int, said.splitlines()[1].split()[:3])
     return text + data, data + bss + program.memory_size
 
 
 def _image(
-    program: Program, every: Sequence[Vectors], objects: Sequence[str], target: Target,
-    folder: Path, scratch: Path,
-) -> Path:  # fmt: skip
+    program: Program,
+    every: Sequence[Vectors],
+    objects: Sequence[str],
+    target: Target,
+    folder: Path,
+    scratch: Path,
+) -> Path:
     """Return a program for the emulator: the ECU, its vectors, and our start of the processor."""
     for name in RUNTIME:
         shutil.copyfile(HERE / name, scratch / name)
     harness, image = scratch / "target_harness.c", scratch / "target.elf"
     harness.write_text(target_harness(program, every), encoding="utf-8")
-    _call([
-        CROSS, *SMALL_FLAGS, *target.flags, f"-I{folder}", f"-I{scratch}", str(harness),
-        str(scratch / "startup.c"), *objects, "-nostartfiles", f"-T{scratch / 'target.ld'}",
-        "-o", str(image), "-lm",
-    ])  # fmt: skip
+    _call(
+        [
+            CROSS,
+            *SMALL_FLAGS,
+            *target.flags,
+            f"-I{folder}",
+            f"-I{scratch}",
+            str(harness),
+            str(scratch / "startup.c"),
+            *objects,
+            "-nostartfiles",
+            f"-T{scratch / 'target.ld'}",
+            "-o",
+            str(image),
+            "-lm",
+        ]
+    )
     return image
 
 

@@ -47,10 +47,11 @@ def curves_of(
                 f"{region.name}-step" if len(region.steps) == 1 else f"{region.name}-step-{k + 1}",
                 f"Step of the current at {region.name} pressure, dither averaged: measured, "
                 "identified, and eq. (15).",
-                _step(step, estimate, par, region.pressure), "time",
+                _step(step, estimate, par, region.pressure),
+                "time",
             )
             for k, step in enumerate(region.steps)
-        ]  # fmt: skip
+        ]
     return tuple(curves)
 
 
@@ -64,12 +65,14 @@ def _bode(region: Region, estimate: Estimate, par: MotorcycleParameters) -> list
     axis = {"frequency": ("frequency", f, {"units": "Hz", "long_name": "frequency"})}
     magnitude, phase = (
         xr.Dataset(
-            {name: ("frequency", part(G), {"units": unit, "long_name": label})
-             for name, G in parts.items()},
+            {
+                name: ("frequency", part(G), {"units": unit, "long_name": label})
+                for name, G in parts.items()
+            },
             axis,
         )
         for part, unit, label in ((np.abs, "Pa/A", "gain"), (_degrees, "degree", "phase"))
-    )  # fmt: skip
+    )
     return [
         Curve(f"{region.name}-gain", caption, magnitude, "frequency"),
         Curve(f"{region.name}-phase", caption, phase, "frequency"),
@@ -80,9 +83,7 @@ def _degrees(G: NDArray[np.complex128]) -> Array:
     return np.degrees(np.unwrap(np.angle(G)))
 
 
-def _step(
-    step: StepRecord, estimate: Estimate, par: MotorcycleParameters, p: float
-) -> xr.Dataset:
+def _step(step: StepRecord, estimate: Estimate, par: MotorcycleParameters, p: float) -> xr.Dataset:
     rest = estimate[f"{step.label or 'step'}:p_rest"]
     y, _ = response(np.array(list(five_of(estimate).values())), step.u, step.interval, step.block)
     middle = np.arange(y.size) * step.block + 0.5 * (step.block - 1)

@@ -49,9 +49,13 @@ def _sine(amplitude: float, f: float, t: Array) -> Array:
 
 
 def of_brake(
-    par: MotorcycleParameters, pressures: Mapping[str, float],
-    changes: Mapping[str, tuple[Demand, float, float]], sigma_p: float, sigma_i: float, seed: int,
-) -> dict[str, xr.Dataset]:  # fmt: skip
+    par: MotorcycleParameters,
+    pressures: Mapping[str, float],
+    changes: Mapping[str, tuple[Demand, float, float]],
+    sigma_p: float,
+    sigma_i: float,
+    seed: int,
+) -> dict[str, xr.Dataset]:
     """Return measured current and pressure of the whole brake, friction and dither included.
 
     Both go through the same filter and converter, whose lag therefore cancels between them.
@@ -93,14 +97,24 @@ def of_brake(
 
 
 def _case(
-    par: MotorcycleParameters, start: float, hold: float, change: Demand, before: float,
+    par: MotorcycleParameters,
+    start: float,
+    hold: float,
+    change: Demand,
+    before: float,
     after: float,
-) -> Case:  # fmt: skip
+) -> Case:
     settle = _SETTLE + before if before else _SETTLE_SINE
     return case_from_rest(
-        "run", par, "current", start, lambda t: {"i_set": hold + change(t)}, after, settle=settle,
+        "run",
+        par,
+        "current",
+        start,
+        lambda t: {"i_set": hold + change(t)},
+        after,
+        settle=settle,
         keep=before,
-    )  # fmt: skip
+    )
 
 
 def _scaled(run: Run, shares: Mapping[str, float]) -> Demand:
@@ -117,9 +131,13 @@ def _scaled(run: Run, shares: Mapping[str, float]) -> Demand:
 
 
 def of_eq22(
-    models: Mapping[str, tuple[float, Rational]], par: MotorcycleParameters,
-    changes: Mapping[str, tuple[Demand, float, float]], sigma_p: float, sigma_i: float, seed: int,
-) -> dict[str, xr.Dataset]:  # fmt: skip
+    models: Mapping[str, tuple[float, Rational]],
+    par: MotorcycleParameters,
+    changes: Mapping[str, tuple[Demand, float, float]],
+    sigma_p: float,
+    sigma_i: float,
+    seed: int,
+) -> dict[str, xr.Dataset]:
     """Return the same of a linear brake that is eq. (22) exactly, with dither on its current.
 
     ``models``: pressure at rest [Pa] and transfer function [Pa/A] by region.
@@ -149,9 +167,7 @@ def sampled(model: Rational, interval: float) -> tuple[Array, Array]:
     """Return numerator and denominator for samples between which the input runs straight."""
     from scipy import signal
 
-    num, den, _ = signal.cont2discrete(
-        (np.array(model.num), np.array(model.den)), interval, "foh"
-    )
+    num, den, _ = signal.cont2discrete((np.array(model.num), np.array(model.den)), interval, "foh")
     return np.ravel(num), np.asarray(den)
 
 
@@ -166,7 +182,9 @@ def eq22_of(par: MotorcycleParameters, p: float, f_zero: float, f_pole: float) -
 def _dataset(i: Array, p: Array) -> xr.Dataset:
     time = np.round(np.arange(i.size) * _INTERVAL, 9)
     return xr.Dataset(
-        {"i": ("time", i, {"units": "A", "long_name": "measured current"}),
-         "p_mc": ("time", p, {"units": "Pa", "long_name": "measured pressure"})},
+        {
+            "i": ("time", i, {"units": "A", "long_name": "measured current"}),
+            "p_mc": ("time", p, {"units": "Pa", "long_name": "measured pressure"}),
+        },
         {"time": ("time", time, {"units": "s", "long_name": "time"})},
-    )  # fmt: skip
+    )

@@ -55,9 +55,15 @@ class Whitening:
     """
 
     def __init__(
-        self, values: Array, blocks: int, block: int, rest: int, sigma: float, sigma_u: float,
+        self,
+        values: Array,
+        blocks: int,
+        block: int,
+        rest: int,
+        sigma: float,
+        sigma_u: float,
         interval: float,
-    ) -> None:  # fmt: skip
+    ) -> None:
         n = blocks * block
         h = impulse(values, n, interval)
         means = np.convolve(h, np.ones(block) / block)[:n]
@@ -95,15 +101,27 @@ def starts_of(par: MotorcycleParameters, p: float) -> dict[str, float]:
 def unknowns_of(region: Region, starts: dict[str, float]) -> tuple[Unknown, ...]:
     """Return the five of eq. (22), and the pressure at rest before every step."""
     five = [
-        Unknown(name, starts[name], starts[name] / _FAR, starts[name] * _FAR, starts[name],
-                _UNITS.get(name, "s"), trial=region.name)
+        Unknown(
+            name,
+            starts[name],
+            starts[name] / _FAR,
+            starts[name] * _FAR,
+            starts[name],
+            _UNITS.get(name, "s"),
+            trial=region.name,
+        )
         for name in NAMES
-    ]  # fmt: skip
+    ]
     rests = [
-        Unknown("p_rest", step.rest, scale=max(abs(step.rest), 1e4), unit="Pa",
-                trial=step.label or "step")
+        Unknown(
+            "p_rest",
+            step.rest,
+            scale=max(abs(step.rest), 1e4),
+            unit="Pa",
+            trial=step.label or "step",
+        )
         for step in region.steps
-    ]  # fmt: skip
+    ]
     return (*five, *rests)
 
 
@@ -114,10 +132,17 @@ def over_time(region: Region, unknowns: tuple[Unknown, ...], near: Array) -> Pro
     (5,).
     """
     whitenings = [
-        Whitening(near, step.pressure.size, step.block, step.before, step.sigma, step.sigma_i,
-                  step.interval)
+        Whitening(
+            near,
+            step.pressure.size,
+            step.block,
+            step.before,
+            step.sigma,
+            step.sigma_i,
+            step.interval,
+        )
         for step in region.steps
-    ]  # fmt: skip
+    ]
 
     def evaluate(values: Array) -> tuple[Array, Array]:
         residuals, jacobians = [], []

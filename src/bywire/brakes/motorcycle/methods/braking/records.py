@@ -168,9 +168,7 @@ def step_at(means: Array) -> int | None:
     return best + 1 if moves and between[best] > _STEP * total else None
 
 
-def _step(
-    label: str, i: Array, p: Array, interval: float, block: int, onset: int
-) -> StepRecord:
+def _step(label: str, i: Array, p: Array, interval: float, block: int, onset: int) -> StepRecord:
     rest = onset - 1  # the block in which it steps belongs to neither level
     if rest < _REST:
         raise ParameterError(
@@ -182,9 +180,16 @@ def _step(
     means = averaged(p, block)
     noise = _around_line(averaged(i[before], block)) * math.sqrt(block)
     return StepRecord(
-        label, moving_average(i - float(i[before].mean()), block), interval, block, means,
-        float(p[before].mean()), _scatter(means), noise, rest * block,
-    )  # fmt: skip
+        label,
+        moving_average(i - float(i[before].mean()), block),
+        interval,
+        block,
+        means,
+        float(p[before].mean()),
+        _scatter(means),
+        noise,
+        rest * block,
+    )
 
 
 def _scatter(means: Array) -> float:

@@ -101,13 +101,16 @@ def _apart(problems: tuple[Problem, Problem], parts: Sequence[Estimate]) -> Esti
         covariance[span, span], spectrum[span] = part.covariance, part.singular_values
     return replace(
         parts[0],
-        unknowns=_original(problems[0], parts), covariance=covariance,
+        unknowns=_original(problems[0], parts),
+        covariance=covariance,
         values=np.concatenate([part.values for part in parts]),
         singular_values=np.sort(spectrum)[::-1],
         residuals=np.concatenate([part.residuals for part in parts]),
         freedom=min(part.freedom for part in parts),
-        colored=any(part.colored for part in parts), kept=_kept(problems[0], parts), notes=(),
-    )  # fmt: skip
+        colored=any(part.colored for part in parts),
+        kept=_kept(problems[0], parts),
+        notes=(),
+    )
 
 
 def _original(problem: Problem, parts: Sequence[Estimate]) -> tuple[Unknown, ...]:
@@ -145,9 +148,12 @@ def _combined(
     scale = np.array([u.scale for u in unknowns])
     sure = uncertainty(J * scale, r, Z * scale)
     return Estimate(
-        unknowns=unknowns, values=values[columns],
+        unknowns=unknowns,
+        values=values[columns],
         covariance=sure.covariance * np.outer(scale, scale),
         singular_values=np.asarray(np.linalg.svd(J * scale, compute_uv=False), dtype=float),
         residuals=np.concatenate([part.residuals for part in parts]),
-        freedom=sure.freedom, colored=sure.colored, kept=_kept(problems[0], parts),
-    )  # fmt: skip
+        freedom=sure.freedom,
+        colored=sure.colored,
+        kept=_kept(problems[0], parts),
+    )

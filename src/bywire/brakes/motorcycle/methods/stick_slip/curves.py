@@ -55,11 +55,16 @@ def stribeck_band(
     axes = ("pressure", "omega")
     attrs = {"units": "N*m", "long_name": "friction torque"}
     return xr.Dataset(
-        {"value": (axes, value, attrs), "low": (axes, value - reach, attrs),
-         "high": (axes, value + reach, attrs)},
-        {"pressure": ("pressure", np.array(pressures), {"units": "Pa", "long_name": "pressure"}),
-         "omega": ("omega", omega, {"units": "rad/s", "long_name": "motor speed"})},
-    )  # fmt: skip
+        {
+            "value": (axes, value, attrs),
+            "low": (axes, value - reach, attrs),
+            "high": (axes, value + reach, attrs),
+        },
+        {
+            "pressure": ("pressure", np.array(pressures), {"units": "Pa", "long_name": "pressure"}),
+            "omega": ("omega", omega, {"units": "rad/s", "long_name": "motor speed"}),
+        },
+    )
 
 
 def _torque(par: seal_friction.Parameters, omega: float, p: float) -> float:
@@ -77,9 +82,15 @@ def replayed(data: xr.Dataset, par: MotorcycleParameters, step: float) -> xr.Dat
     driven_par = par.replace({"drive.mode": "current-source"})
     start = max(float(data["p_mc"][0]), 0.0)
     whole = trial(
-        MotorcycleBrake(), driven_par, data, {"i_set": "i"}, {"p_mc": 1.0},
-        state=state_at(start, driven_par), memory=memory_at(start, driven_par), step=step,
-    )  # fmt: skip
+        MotorcycleBrake(),
+        driven_par,
+        data,
+        {"i_set": "i"},
+        {"p_mc": 1.0},
+        state=state_at(start, driven_par),
+        memory=memory_at(start, driven_par),
+        step=step,
+    )
     modeled = simulate(whole.run, ("p_mc",))["p_mc"]
     attrs = {"units": "Pa", "long_name": "master-cylinder pressure"}
     return xr.Dataset(

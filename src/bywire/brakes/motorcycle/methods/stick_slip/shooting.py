@@ -75,9 +75,13 @@ class Shooting:
         step: float = 20e-6,
     ) -> None:
         self.par = par.replace(
-            {"drive.mode": "current", "ecu.dither.waveform": "off",
-             "adc.law": "ideal", "adc.noise": 0.0}
-        )  # fmt: skip
+            {
+                "drive.mode": "current",
+                "ecu.dither.waveform": "off",
+                "adc.law": "ideal",
+                "adc.noise": 0.0,
+            }
+        )
         self._source = par.replace({"drive.mode": "current-source"})
         self.names = tuple(u.name for u in unknowns)
         self.count = len(self.names)
@@ -92,8 +96,10 @@ class Shooting:
         """
         columns = self._error.at(
             state_at(max(rest, 0.0), self._source)._replace(omega=direction * 1e-12),
-            memory_at(max(rest, 0.0), self._source), "i_source", (0.0, 1.0),
-        )  # fmt: skip
+            memory_at(max(rest, 0.0), self._source),
+            "i_source",
+            (0.0, 1.0),
+        )
         e, slopes = self._error(columns, values)
         per_ampere = e[1] - e[0]
         return -e[0] / per_ampere, -slopes[0] / per_ampere
@@ -111,9 +117,15 @@ class Shooting:
         demand = current + shot.rate * after
         rest, start = max(slip.rest, 0.0), float(demand[0])
         run = Run(
-            self.model, par, state_at(rest, par, start), memory_at(rest, par, start),
-            partial(held, demand, interval), (demand.size - 1) * interval, self.step, interval,
-        )  # fmt: skip
+            self.model,
+            par,
+            state_at(rest, par, start),
+            memory_at(rest, par, start),
+            partial(held, demand, interval),
+            (demand.size - 1) * interval,
+            self.step,
+            interval,
+        )
         return run, current, current_slopes
 
     def fit(self, shot: Shot, values: Array, zero: float | None = None) -> Fitted:
@@ -154,10 +166,14 @@ class Shooting:
         onset = shift + (BEFORE if driven is None else driven.onset)
         level, rate = onset_of(shot, onset)
         return Fitted(
-            residuals=r, slopes=J[:, :-1], by_current=J[:, -1], answer=kept[:, -1], speed=v,
+            residuals=r,
+            slopes=J[:, :-1],
+            by_current=J[:, -1],
+            answer=kept[:, -1],
+            speed=v,
             breakaway=level - current,
             breakaway_slopes=rate * shift_slopes[:-1] - current_slopes,
-        )  # fmt: skip
+        )
 
     def _start_slopes(self, run: Run, shot: Shot) -> tuple[Array, Array]:
         """Return derivatives of the start by the unknowns, and by an offset of the demand."""

@@ -110,9 +110,17 @@ def cut_out(
             continue
         from_rest = replace(slip, rest=float(pressure[rest].mean()))
         shot = Shot(
-            from_rest, time[rows], pressure[rows], current[rows], rate, unrest, level,
-            slope / interval, seen, min(half, last) - first,
-        )  # fmt: skip
+            from_rest,
+            time[rows],
+            pressure[rows],
+            current[rows],
+            rate,
+            unrest,
+            level,
+            slope / interval,
+            seen,
+            min(half, last) - first,
+        )
         shots.append(shot)
     if not shots:
         raise ParameterError(

@@ -80,8 +80,16 @@ def _driven(
     par: Par, p: float, demand: Callable[[Array], Array], duration: float, settle: float
 ) -> Run:
     """Return a run from rest at ``p`` [Pa] under a current demand [A]."""
-    case = case_from_rest("run", par, "current", p, lambda t: {"i_set": demand(t)}, duration,
-                          settle=settle, keep=settle)  # fmt: skip
+    case = case_from_rest(
+        "run",
+        par,
+        "current",
+        p,
+        lambda t: {"i_set": demand(t)},
+        duration,
+        settle=settle,
+        keep=settle,
+    )
     return as_run(case, _SUBSTEP)
 
 
@@ -96,9 +104,11 @@ def _settled(brakes: Sequence[Par], p: float) -> list[float]:
         runs = [
             _driven(par, start, partial(_sine, i, 0.0), _SETTLE, 0.0)
             for par, start, i in zip(brakes, starts, holds, strict=True)
-        ]  # fmt: skip
-        means = [run["p_mc"][run.time >= _SETTLE - _LATE - 1e-9][:-1].mean()
-                 for run in _together(runs, ("p_mc",))]  # fmt: skip
+        ]
+        means = [
+            run["p_mc"][run.time >= _SETTLE - _LATE - 1e-9][:-1].mean()
+            for run in _together(runs, ("p_mc",))
+        ]
         starts = starts * p / np.array(means)
     return [float(start) for start in starts]
 
@@ -110,21 +120,32 @@ def _region(brakes: Sequence[Par], name: str) -> list[dict[str, float]]:
     holds = [holding_current(start, par) for par, start in zip(brakes, starts, strict=True)]
     every = list(zip(brakes, starts, holds, strict=True))
     steps = _together(
-        [_driven(par, start, partial(_step, i, i + height), _AFTER, _SETTLE)
-         for par, start, i in every], ("p_mc",),
-    )  # fmt: skip
+        [
+            _driven(par, start, partial(_step, i, i + height), _AFTER, _SETTLE)
+            for par, start, i in every
+        ],
+        ("p_mc",),
+    )
     sines = _together(
-        [_driven(par, start, partial(_sine, i, f), _WINDOW, _WINDOW)
-         for par, start, i in every for f in FREQUENCIES], ("i", "p_mc"),
-    )  # fmt: skip
+        [
+            _driven(par, start, partial(_sine, i, f), _WINDOW, _WINDOW)
+            for par, start, i in every
+            for f in FREQUENCIES
+        ],
+        ("i", "p_mc"),
+    )
     rows = []
     for k, (par, step) in enumerate(zip(brakes, steps, strict=True)):
         mine = zip(sines[k * len(FREQUENCIES) :], FREQUENCIES, strict=False)
         before, after, peak = _levels(step, par)
         K = (after - before) / height
         T1, T2 = _time_constants(K, np.array([_line(sine, f) for sine, f in mine]))
-        row = {"K": K / _BAR, "T1": 1e3 * T1, "T2": 1e3 * T2,
-               "overshoot": 100.0 * (peak - after) / (after - before)}  # fmt: skip
+        row = {
+            "K": K / _BAR,
+            "T1": 1e3 * T1,
+            "T2": 1e3 * T2,
+            "overshoot": 100.0 * (peak - after) / (after - before),
+        }
         rows.append({f"table4.{name}.{key}": float(value) for key, value in row.items()})
         if name == "medium":
             rows[-1]["fig6.peak"] = float(facts.FIG6_START.value + (peak - before) / _BAR)
@@ -186,15 +207,20 @@ def _ramps(brakes: Sequence[Par]) -> list[dict[str, float]]:
     for par, *runs in zip(brakes, *both, strict=True):
         currents = [_low_passed(run, options.f_filter) for run in runs]
         without, dithered = (
-            loop_area(Loop(run.time, smoothed(run.time, i, 1.0 / par.ecu.dither.f_dit),
-                           _averaged(run, par))).value
+            loop_area(
+                Loop(
+                    run.time, smoothed(run.time, i, 1.0 / par.ecu.dither.f_dit), _averaged(run, par)
+                )
+            ).value
             for run, i in zip(runs, currents, strict=True)
-        )  # fmt: skip
-        rows.append({
-            "fig5.p_max": max(float(run["p_mc"].max()) for run in runs) / _BAR,
-            "fig5.i_max": max(float(i.max()) for i in currents),
-            "fig5.loop_area_ratio": 100.0 * dithered / without,
-        })  # fmt: skip
+        )
+        rows.append(
+            {
+                "fig5.p_max": max(float(run["p_mc"].max()) for run in runs) / _BAR,
+                "fig5.i_max": max(float(i.max()) for i in currents),
+                "fig5.loop_area_ratio": 100.0 * dithered / without,
+            }
+        )
     return rows
 
 
@@ -222,8 +248,10 @@ def _braking(brakes: Sequence[Par]) -> list[dict[str, float]]:
     rows = []
     for par, run in zip(brakes, runs, strict=True):
         late = run.time >= run.time[-1] - _END + 1e-9
-        rows.append({
-            "fig7.peak": float(_averaged(run, par).max()) / _BAR,
-            "fig7.steady_state_error": float(run["p_mc"][late].mean() - options.p_to) / _BAR,
-        })  # fmt: skip
+        rows.append(
+            {
+                "fig7.peak": float(_averaged(run, par).max()) / _BAR,
+                "fig7.steady_state_error": float(run["p_mc"][late].mean() - options.p_to) / _BAR,
+            }
+        )
     return rows

@@ -89,9 +89,7 @@ def problem(free: tuple[Unknown, ...] | None = None, step: float = STEP) -> Prob
     return Problem(free, evaluate, parts=PARTS, resolved=_RESOLVED)
 
 
-def slopes(
-    values: Array, r: Array, lower: Array, upper: Array, ends: tuple[Array, Array]
-) -> Array:
+def slopes(values: Array, r: Array, lower: Array, upper: Array, ends: tuple[Array, Array]) -> Array:
     """Return how residuals change, shape (statements, unknowns): by both sides.
 
     Where one side does not have what a statement is of, such as a loop of a piston that sticks, the

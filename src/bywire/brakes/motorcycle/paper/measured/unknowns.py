@@ -84,10 +84,16 @@ def unknowns() -> tuple[Unknown, ...]:
     """Return the free parameters as unknowns, within their bounds, from Table 1."""
     known, fields = prior().leaves(), leaf_fields(Par)
     return tuple(
-        Unknown(name, known[name], free.low, free.high, free.scale or known[name],
-                fields[name].unit.symbol)
+        Unknown(
+            name,
+            known[name],
+            free.low,
+            free.high,
+            free.scale or known[name],
+            fields[name].unit.symbol,
+        )
         for name, free in FREE.items()
-    )  # fmt: skip
+    )
 
 
 def brake(values: Mapping[str, float], base: Par | None = None) -> Par:

@@ -173,11 +173,13 @@ def _speed_effect(F: Array, speed: Array, stated: float, par: WedgeParameters) -
     friction of bearings and motors changes with the speed, and the line would turn by it.
     """
     motor = par.motor_1
-    bearing = np.array([
-        axial_bearing.friction(axial_bearing.Input(float(f), float(w)), par.bearing)
-        - axial_bearing.friction(axial_bearing.Input(float(f), stated), par.bearing)
-        for f, w in zip(F, speed, strict=True)
-    ])  # fmt: skip
+    bearing = np.array(
+        [
+            axial_bearing.friction(axial_bearing.Input(float(f), float(w)), par.bearing)
+            - axial_bearing.friction(axial_bearing.Input(float(f), stated), par.bearing)
+            for f, w in zip(F, speed, strict=True)
+        ]
+    )
     return (bearing + motor.D_M * (speed - stated)) / servo_motor.torque_constant(motor)
 
 

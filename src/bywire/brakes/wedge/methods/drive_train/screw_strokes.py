@@ -57,7 +57,10 @@ def fits(strokes_read: list[Stroke], best: Estimate) -> Check:
         k: np.sqrt(np.mean([s.error**2 for s in strokes_read if s.side == k])) for k in (1, 2)
     }
     return lack_of_fit(
-        "torque_left_over", e, np.array([1.0 / scatter[s.side] for s in strokes_read]),
-        np.column_stack([g * F**power for g in groups for power in (0, 1, 2)]), len(best.values),
+        "torque_left_over",
+        e,
+        np.array([1.0 / scatter[s.side] for s in strokes_read]),
+        np.column_stack([g * F**power for g in groups for power in (0, 1, 2)]),
+        len(best.values),
         "whether torque over force curves or shifts in a way that the laws do not have",
-    )  # fmt: skip
+    )

@@ -196,6 +196,10 @@ class TwoStages:
             row, column = row + e.size, column + A.shape[1]
             weights.append(np.full(e.size, 1.0 / max(float(np.sqrt(np.mean(e**2))), 1e-300)))
         return lack_of_fit(
-            "left_over", np.concatenate(left), np.concatenate(weights), table, count,
+            "left_over",
+            np.concatenate(left),
+            np.concatenate(weights),
+            table,
+            count,
             "whether force over travel or current over force bends or shifts otherwise",
-        )  # fmt: skip
+        )
