@@ -51,7 +51,7 @@ overshoot = "<= 15 % with 99.9 %"
     assert (plan.design, plan.seed, plan.confidence) == ("latin-hypercube", 3, 0.99)
     assert (plan.cases, plan.chunks, plan.total) == (100, 2, 128)  # whole hypercubes
     assert plan.bench.requirements == {"peak_current": "<= 25 A", "overshoot": "<= 15 %"}
-    assert [d.text for d in plan.demands][1] == "overshoot <= 15 % with 99.9 %"
+    assert str(plan.demands[1]) == "overshoot <= 15 % with 99.9 %"
     values = plan.values(0)
     ratio = values["ecu.est_par.K_e"] / plan.bench.par.ecu.est_par.K_e
     np.testing.assert_allclose(ratio, values["motor.K_e"] / plan.bench.par.motor.K_e)

@@ -179,7 +179,7 @@ def study_surrogates(
     surrogates: dict[str, Surrogate] = {}
     refused: dict[str, str] = {}
     wanted = [kpis] if isinstance(kpis, str) else kpis
-    required = [each.kpi for each in report.plan.demands]
+    required = [each.figure for each in report.plan.demands]
     for kpi in wanted or shown_figures(findings) or required:
         try:
             surrogates[kpi] = surrogate_of(findings, kpi)

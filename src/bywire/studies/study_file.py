@@ -62,7 +62,7 @@ def _plan(content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]) 
         raise ParameterError(f"name = {quoted(name)}: a text is wanted")
     bench = read_bench(content, file.parent, overrides)
     demands = tuple(read_demands(bench, content.get("requirements", {})))
-    limits = {demand.kpi: demand.limit for demand in demands}
+    limits = {demand.figure: demand.text for demand in demands}
     bench = replace(bench, requirements=limits, name=bench.name or name)
     varied, measured = read_all_varied(bench, content, file.parent)
     if not varied:
