@@ -21,7 +21,6 @@ from bywire.bench.relative_changes import settled
 from bywire.bench.requirements import Limit, read_limits
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.bench.stimulus_sections import stimulus_of, stimulus_sections
-from bywire.bench.values import parsed
 from bywire.core.catalog import PARAMETER_SETS, outdated_values
 from bywire.core.errors import (
     InputError,
@@ -33,6 +32,7 @@ from bywire.core.errors import (
 )
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.units import shown
+from bywire.core.values import parsed
 from bywire.simulation.engine import engine_names
 from bywire.simulation.run import Run
 

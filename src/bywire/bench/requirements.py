@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.values import number
 from bywire.core import units
 from bywire.core.errors import ParameterError, UnitError, quoted, unknown_name
 from bywire.core.undefined import EqualWhereUndefined
+from bywire.core.values import number
 
 Comparison = Literal["<=", ">=", "<", ">"]
 COMPARE: Mapping[str, Callable[[Any, Any], Any]] = {
