@@ -109,7 +109,8 @@ def marks(folder: Path) -> str:
 def test_marks_are_left_by_what_is_run(planted: Path) -> None:
     subprocess.run([sys.executable, "-c", "import ziglang"], capture_output=True, check=False)
     subprocess.run(["cc"], check=False)
-    assert marks(planted).split() == ["ziglang", "program", "cc"]
+    # From Python 3.13 on, -c loads linecache first.
+    assert marks(planted).split()[-3:] == ["ziglang", "program", "cc"]
 
 
 @posix
