@@ -50,10 +50,10 @@ def number(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
     return _quantity(value, symbol, name, nominal)
 
 
-def written(value: Any, symbol: str, name: str) -> float:
+def written(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
     """Return one value of a file, where a plain number is refused if a unit is wanted."""
-    require_unit(value, symbol, name)
-    return number(value, symbol, name)
+    require_unit(value, symbol, name, nominal)
+    return number(value, symbol, name, nominal)
 
 
 def nodes(value: Any, symbol: str, name: str, nominal: float = 1.0) -> tuple[float, ...]:
