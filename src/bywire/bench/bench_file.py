@@ -37,7 +37,7 @@ class SimulationSection(Section):
     engine: Any = Bench.engine
 
     @classmethod
-    def _long_form(cls, content: Any) -> Any:
+    def written_out(cls, content: Any) -> Any:
         """Return the section with a seed that ``--set`` gives as a text as a number."""
         seed = content.get("seed") if isinstance(content, Mapping) else None
         if isinstance(seed, str) and seed.isdecimal() and len(seed) < 20:
