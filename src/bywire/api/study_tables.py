@@ -127,8 +127,9 @@ def spread_table(findings: Findings) -> Table:
         values = [each.nominal, *middle, each.least, each.largest]
         name = clean(each.name)
         name += f" (not defined in {each.undefined})" if each.undefined else ""
-        texts = (figure_text(findings, each.name, v) for v in values)
-        rows.append((Cell(name), *(Cell(t, value=v) for t, v in zip(texts, values, strict=True))))
+        unit = findings.units[each.name]
+        cells = (Cell(figure_text(findings, each.name, v), value=v, unit=unit) for v in values)
+        rows.append((Cell(name), *cells))
     return Table((Column("name"), *(Column(h, numeric=True) for h in heads)), tuple(rows))
 
 
