@@ -16,8 +16,7 @@ from bywire.core.typing import silent
 from bywire.core.units import shown
 from bywire.export.fmu.archive import unit_of, write_unit
 from bywire.export.fmu.binaries import PLATFORMS, this_platform
-from bywire.export.interface import KINDS, PARTS
-from bywire.export.variables import Causality
+from bywire.export.interface import KINDS, PARTS, Causality
 from bywire.report.answer import Answer, use_case
 from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Paragraph, Section, TableBlock

@@ -101,8 +101,7 @@ def page(
     import gzip
 
     from bywire.bench.running import run
-    from bywire.export.exported import exported
-    from bywire.export.initial_values import start_source
+    from bywire.export.exported import exported, start_source
     from bywire.export.interface import interface
     from bywire.report.files import write_bytes
     from bywire.report.live_page.content import page_text
