@@ -65,7 +65,7 @@ class Section(BaseModel):
         """
         fields = cls.model_fields
         place, within = (f"{where} ", f"{where[1:-1]}.") if where.startswith("[") else ("", "")
-        content = _table(cls.spread(content), where)
+        content = _table(cls.written_out(content), where)
         for key in content:
             if key not in fields:
                 raise unknown_of_few(f"key of {where}", key, fields)
@@ -80,7 +80,7 @@ class Section(BaseModel):
             raise _refused(fields[str(key)], content, place, str(key), inner) from None
 
     @classmethod
-    def spread(cls, content: Any) -> Any:
+    def written_out(cls, content: Any) -> Any:
         """Return the table that a short form stands for; here, there is none."""
         return content
 

@@ -41,7 +41,7 @@ class TimeSection(Section):
     start: _Instant = None
 
     @classmethod
-    def spread(cls, content: Any) -> Any:
+    def written_out(cls, content: Any) -> Any:
         """Return the table that a column alone stands for."""
         return {"column": content} if isinstance(content, (str, int)) else content
 
@@ -52,7 +52,7 @@ class _Marked(Section):
     missing: _Missing = ()
 
     @classmethod
-    def spread(cls, content: Any) -> Any:
+    def written_out(cls, content: Any) -> Any:
         """Return the table with its marks as a list."""
         if not isinstance(content, Mapping) or isinstance(content.get("missing", []), list):
             return content
