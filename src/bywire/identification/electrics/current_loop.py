@@ -11,6 +11,7 @@ import xarray as xr
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
+from bywire.data.labeled import labeled
 from bywire.identification.electrics.loop_records import (
     LoopOptions,
     identified_loop,
@@ -105,10 +106,10 @@ class CurrentLoop:
     def record(self, time: Array, demand: Array, current: Array, label: str) -> xr.Dataset:
         """Return a record of demand and current [A]; ``label``: long name of the current."""
         signals = {
-            self.demand: ("time", demand, {"units": "A", "long_name": "current demand"}),
-            self.current: ("time", current, {"units": "A", "long_name": label}),
+            self.demand: (demand, "A", "current demand"),
+            self.current: (current, "A", label),
         }
-        return xr.Dataset(signals, {"time": ("time", time, {"units": "s", "long_name": "time"})})
+        return labeled({"time": (time, "s", "time")}, signals)
 
     def method(self, **declared: Any) -> Method:
         """Return the method that identifies the loop; ``declared``: what only its brake knows."""
