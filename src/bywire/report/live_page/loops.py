@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from bywire.analysis.loop import LOOPS
+from bywire.analysis.margins import MARGINS
 from bywire.export.exported import Exported
 from bywire.export.loop_source import LoopSource, loop_source
 from bywire.report.wording import amount
+
+_SHOWN = {"1": ("", 1.0), "s": ("ms", 1e3)}  # unit and factor of margins, where not as they are
 
 
 def loops_of(made: Exported) -> list[LoopSource]:
@@ -42,5 +45,10 @@ def told(source: LoopSource) -> dict[str, Any]:
         "frame": source.frame,
         "from": loop.band[0],
         "isAnalog": loop.analog,
+        "margins": [
+            [name, figure.heading, *_SHOWN.get(figure.unit, (figure.unit, 1.0))]
+            for name, figure in MARGINS.items()
+            if name != "bandwidth"  # which takes the closed loop
+        ],
         "cut": {"isState": is_state, "at": names.index(loop.cut)},
     }
