@@ -18,6 +18,7 @@ from bywire.bench.stimuli.registry import STIMULI
 from bywire.bench.stimulus_sections import stimulus_sections
 from bywire.bench.values import parsed, require_unit, require_units
 from bywire.core.arguments import checked
+from bywire.core.callers import option
 from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.data.file_kinds import BENCH, require_kind
@@ -225,7 +226,10 @@ def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str
         elif name in SECTIONS:
             raise ParameterError(f"{name} is a section: write {name}.NAME=VALUE")
         elif section == _FAULTS:
-            raise ParameterError("faults are put in by --fault NAME=VALUE@ONSET, not by --set")
+            raise ParameterError(
+                f"faults are put in by {option('faults')} NAME=VALUE@ONSET, not by "
+                f"{option('overrides')}"
+            )
         elif name in _KEYS:
             changed[name] = value
         else:

@@ -11,6 +11,7 @@ from typing import Any
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
 from bywire.bench.bench_source import names_experiment
+from bywire.core.callers import option
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_of_few
 from bywire.data.file_kinds import STUDY, require_kind
 from bywire.data.toml_file import read_toml
@@ -110,6 +111,6 @@ def read_bench(content: Mapping[str, Any], folder: Path, overrides: Mapping[str,
         if not isinstance(value, str):
             raise ParameterError(
                 f"[set] {key} = {quoted(value)}: write the value as a text, "
-                "with its unit, as --set takes it"
+                f"with its unit, as {option('overrides')} takes it"
             )
     return bench_file.read(there, {**changes, **overrides})

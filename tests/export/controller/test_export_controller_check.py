@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 
 from bywire.api import controller_check
 from bywire.api.controller_check import ControllerCheck, figures_of
-from bywire.api.export_controller import export_controller
 from bywire.cli.app import app
 from bywire.core.errors import CompilerError
 from bywire.export.controller.target import targets
 from bywire.export.controller.target.targets import CROSS, INSTALL, TARGETS, missing_tools
 from bywire.export.controller.target.trial import TaskFigures, Trial
+from bywire.usecases.export_controller import export_controller
 
 needs_targets = pytest.mark.skipif(bool(missing_tools()), reason=missing_tools() or "all there")
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from bywire.core.callers import option
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.typing import Array
 from bywire.core.units import parse
@@ -77,7 +78,7 @@ def found_in(demand: xr.DataArray, tolerances: Mapping[str, str]) -> list[Segmen
     if len(merged) - 1 > _MOST:
         raise ParameterError(
             f"the demand {demand.name} holds and moves {len(merged) - 1} times: name the "
-            "stretches that matter in a file, --segments FILE"
+            f"stretches that matter in a file, {option('segments')} FILE"
         )
     counts = {"hold": 0, "move": 0}
     segments = []

@@ -13,6 +13,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
 from bywire.bench.values import number
 from bywire.core import units
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError, UnitError, quoted, unknown_name
 
 SIGNED = ("bias", "lag")
@@ -41,8 +42,8 @@ def read_tolerances(texts: Sequence[str]) -> dict[str, str]:
         name, _, bound = (part.strip() for part in text.partition(sign or "<="))
         if not sign or not name or not bound:
             raise ParameterError(
-                f"--tolerance {text!r} cannot be read: write for instance 'nrmse <= 5 %' or "
-                "'p_mc.max_error <= 2 bar'"
+                f"{option('tolerances')} {text!r} cannot be read: write for instance 'nrmse <= 5 "
+                "%' or 'p_mc.max_error <= 2 bar'"
             )
         limit = f"{sign} {bound}"
         limits[name] = f"{limits[name]} and {limit}" if name in limits else limit

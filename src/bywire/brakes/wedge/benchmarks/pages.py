@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bywire.api.page import page
 from bywire.benchmark.page_latency import page_latency
 from bywire.benchmark.page_size import page_size
 from bywire.benchmark.result import Result
 from bywire.benchmark.suite import Part
+from bywire.usecases.page import page
 
 
 def _written(path: Path) -> tuple[int, int]:
