@@ -14,8 +14,13 @@ from bywire.core.provenance import Cited
 from bywire.export.controller.c_text import PRECISIONS
 from bywire.export.controller.files import files
 from bywire.export.controller.program import program
-from bywire.export.controller.target.targets import TARGETS, missing_tools
-from bywire.export.controller.target.trial import Trial, host_trial, target_trial
+from bywire.export.controller.target.trial import (
+    TARGETS,
+    Trial,
+    host_trial,
+    missing_tools,
+    target_trial,
+)
 from bywire.export.controller.vectors import vectors
 from bywire.report.document import TableBlock
 from bywire.report.tables import Cell, Column, Table, Verdict

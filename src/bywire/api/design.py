@@ -14,9 +14,9 @@ from bywire.api.design_inputs import (
     trial_of,
 )
 from bywire.api.loop_case import loop_case, over_range, spread
+from bywire.bench.requirements import Limit
 from bywire.bench.running import Progress
 from bywire.synthesis.outcome import Across
-from bywire.synthesis.requirement import Requirement
 from bywire.synthesis.schedule_designer import (
     design_schedule,
     frozen,
@@ -31,7 +31,7 @@ def designed_by_region(
     parameters: str,
     at: str,
     overrides: Mapping[str, Any],
-    wanted: tuple[Requirement, ...],
+    wanted: tuple[Limit, ...],
     over: Sequence[str],
     amplitudes: str | None,
     free_derivative: bool,

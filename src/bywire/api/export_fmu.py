@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bywire.core.units import shown
-from bywire.export.variables import Causality
+from bywire.export.interface import Causality
 from bywire.report.answer import Answer
 from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Paragraph, Section, TableBlock

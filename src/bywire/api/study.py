@@ -12,9 +12,9 @@ import xarray as xr
 
 from bywire.api.parameter_choice import set_for
 from bywire.bench.relative_changes import settled
-from bywire.bench.values import parsed
 from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
+from bywire.core.values import parsed
 from bywire.report.answer import Answer
 from bywire.report.changes import defaults_of, value_changes
 from bywire.report.document import (

@@ -37,23 +37,39 @@ _GROUPS: dict[str, dict[str, Any]] = {
 @cache
 def program() -> Any:
     """Return the command line, called with its arguments: its options are read off once."""
-    app = typer.Typer(
+    found = typer.main.get_command(app())
+    _keep_brackets(found)
+    return found
+
+
+def app() -> typer.Typer:
+    """Return the commands as typer has them."""
+    made = typer.Typer(
         name="bywire",
         help="A virtual test bench for brake-by-wire actuators.",
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    app.callback(invoke_without_command=True)(_root)
+    made.callback(invoke_without_command=True)(_root)
     groups = {word: typer.Typer(no_args_is_help=True, **more) for word, more in _GROUPS.items()}
     order = [words.strip() for words in _ORDER.split(",")]
     found = dict(_commands())
     for words in sorted(found, key=lambda words: order.index(words) if words in order else 99):
         group, _, name = words.rpartition(" ")
-        groups.get(group, app).command(name)(found[words])
+        groups.get(group, made).command(name)(found[words])
     for word, members in groups.items():
-        app.add_typer(members, name=word)
-    return typer.main.get_command(app)
+        made.add_typer(members, name=word)
+    return made
+
+
+def _keep_brackets(command: Any) -> None:
+    """Have help show brackets, as in ``Pressure [bar]``, which Rich would take for markup."""
+    for option in command.params:
+        if getattr(option, "help", None):
+            option.help = option.help.replace("[", r"\[")
+    for inner in getattr(command, "commands", {}).values():
+        _keep_brackets(inner)
 
 
 def _commands() -> Iterator[tuple[str, Callable[..., None]]]:

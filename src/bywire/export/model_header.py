@@ -7,10 +7,8 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
-from bywire.export.exported import Exported
-from bywire.export.initial_values import HEADING
-from bywire.export.interface import Interface, tables
-from bywire.export.variables import Variable, finite_range
+from bywire.export.exported import HEADING, Exported
+from bywire.export.interface import Interface, Variable, finite_range, tables
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.layout import COUNTERS
 

@@ -71,8 +71,7 @@ def page(
     from bywire.bench.running import run
     from bywire.core.errors import ParameterError, unknown_name
     from bywire.core.parameters import leaf_fields
-    from bywire.export.exported import exported
-    from bywire.export.initial_values import start_source
+    from bywire.export.exported import exported, start_source
     from bywire.export.interface import interface
     from bywire.report.files import write_bytes
     from bywire.report.live_page.content import page_text

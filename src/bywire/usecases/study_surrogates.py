@@ -54,8 +54,8 @@ def study_surrogates(
     from bywire.api.study_surrogate import StudySurrogates
     from bywire.api.study_tables import shown_figures
     from bywire.bench.relative_changes import share_of
-    from bywire.bench.values import number
     from bywire.core.errors import ParameterError, unknown_name
+    from bywire.core.values import number
     from bywire.studies.polynomial_chaos import require_fittable, surrogate_of
     from bywire.studies.surrogate import Surrogate
 
@@ -73,7 +73,7 @@ def study_surrogates(
     surrogates: dict[str, Surrogate] = {}
     refused: dict[str, str] = {}
     wanted = [kpis] if isinstance(kpis, str) else kpis
-    required = [each.kpi for each in report.plan.demands]
+    required = [each.figure for each in report.plan.demands]
     for kpi in wanted or shown_figures(findings) or required:
         try:
             surrogates[kpi] = surrogate_of(findings, kpi)

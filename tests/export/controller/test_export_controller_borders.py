@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bywire.core import ops
-from bywire.export.controller.borders import Borders
-from bywire.export.controller.traced import Traced
+from bywire.export.controller.borders import Borders, Traced
 
 
 class Memory(NamedTuple):

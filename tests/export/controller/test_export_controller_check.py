@@ -16,9 +16,15 @@ from bywire.api import controller_check
 from bywire.api.controller_check import ControllerCheck, figures_of
 from bywire.cli.app import app
 from bywire.core.errors import CompilerError
-from bywire.export.controller.target import targets
-from bywire.export.controller.target.targets import CROSS, INSTALL, TARGETS, missing_tools
-from bywire.export.controller.target.trial import TaskFigures, Trial
+from bywire.export.controller.target import trial
+from bywire.export.controller.target.trial import (
+    CROSS,
+    INSTALL,
+    TARGETS,
+    TaskFigures,
+    Trial,
+    missing_tools,
+)
 from bywire.usecases.export_controller import export_controller
 
 needs_targets = pytest.mark.skipif(bool(missing_tools()), reason=missing_tools() or "all there")
@@ -47,8 +53,12 @@ def test_processors_agree_in_every_bit_and_goals_are_met(structure: str, tmp_pat
 def test_what_is_missing_is_skipped_and_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    there = shutil.which("true")
-    monkeypatch.setattr(targets, "find_program", lambda name: None if name == CROSS else there)
+    find, any_program = trial.find_program, shutil.which("true")
+
+    def without_cross(name: str) -> str | None:
+        return None if name == CROSS else find(name) or any_program
+
+    monkeypatch.setattr(trial, "find_program", without_cross)
     with pytest.warns(match=re.escape(f"{CROSS} not installed ({INSTALL})")):
         made = export_controller(bench_of(BRAKES[1]), tmp_path, vectors=5, check=True)
     assert made.check is not None
@@ -82,7 +92,7 @@ def test_other_bits_do_not_hold() -> None:
 def test_command_checks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(controller_check, "missing_tools", lambda: "no tools")
     words = ["export", "controller", "moment-pulses", "--out", str(tmp_path), "--vectors", "5"]
-    done = CliRunner().invoke(app, [*words, "--check", "--json"])
+    done = CliRunner().invoke(app(), [*words, "--check", "--json"])
     assert done.exit_code == 0, done.output
     check = json.loads(done.stdout.splitlines()[-1])["check"]
     assert check["holds"]

@@ -13,7 +13,7 @@ import numpy as np
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCornerParameters
-from bywire.brakes.wedge.sets import adjuster
+from bywire.brakes.wedge.sets.roberts2003 import ADJUSTER
 from bywire.control import wear_adjuster
 from bywire.core.parameters import ParameterSet
 from bywire.core.provenance import chosen
@@ -138,7 +138,7 @@ WEDGE_PADS = Life(
         "disc.C_d": chosen(3.4e3, "7 kg of cast iron"),
         "disc.tau_d": chosen(300.0, "minutes, in the wind of driving"),
         "mechanism": chosen("teeth", "without one the travel ends after some 280 stops"),
-        **{f"adjuster.{name}": value for name, value in adjuster.LAW.items()},
+        **{f"adjuster.{name}": value for name, value in ADJUSTER.items()},
         "adjuster.ways": chosen("closing", "wear alone moves the clearance"),
         "h_new": chosen(10e-3, "front pads of a mid-size car"),
         "h_min": chosen(2e-3, "usual limit of wear"),

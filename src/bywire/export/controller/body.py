@@ -8,11 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from bywire.export.controller.c_text import c_name, unique
-from bywire.export.controller.c_values import built_shape, ctype_of, is_number, literal
 from bywire.export.controller.derived import is_exact
-from bywire.export.controller.memories import Memories
-from bywire.export.controller.statements import Statement
-from bywire.export.controller.structs import Structs
+from bywire.export.controller.structs import Structs, built_shape, ctype_of, is_number, literal
 from bywire.export.controller.values import (
     PRIMARY,
     Built,
@@ -21,12 +18,59 @@ from bywire.export.controller.values import (
     Group,
     Items,
     Known,
+    Memories,
     Record,
     Shape,
     Table,
     Update,
+    Uses,
     lifted,
 )
+
+
+@dataclass(frozen=True)
+class Statement:
+    """``target = value``, or ``target.member = value``, with comments above.
+
+    Parameters
+    ----------
+    target
+        None (an empty text) where a function is called for what it changes alone.
+    changes
+        Memory that the function called in ``value`` changes in its place.
+    is_pointer
+        Whether the target is a pointer to what has the member.
+    """
+
+    target: str
+    ctype: str
+    value: Expr
+    member: str = ""
+    notes: tuple[str, ...] = ()
+    changes: tuple[str, ...] = ()
+    is_pointer: bool = False
+
+
+def live(statements: list[Statement], result: Uses) -> list[Statement]:
+    """Return the statements that the result needs."""
+    needed, kept = _locals(result), []
+    for statement in reversed(statements):
+        if statement.target not in needed:
+            if needed.isdisjoint(statement.changes):
+                continue
+            statement = replace(statement, target="")
+        kept.append(statement)
+        if not statement.member:
+            needed.discard(statement.target)
+        needed |= _locals(statement.value.uses)
+    return kept[::-1]
+
+
+def _locals(uses: Iterable[Any]) -> set[str]:
+    return {use[1] for use in uses if use[0] == "local"}
+
+
+# --- Bodies
 
 
 @dataclass

@@ -1,24 +1,260 @@
-"""Test vectors next to borders: inputs at which a comparison of the laws is about to turn.
-
-Random inputs hardly ever meet a limit to the last digit, where ``<`` and ``<=`` differ, nor come
-so close to it that another limit shows. A tick is run on numbers that note every comparison that
-they take part in, and how far its sides are apart. One input is changed until a comparison turns;
-in between the place is sought where it does. What lies there is where the search goes on: behind
-a limit that is rarely met stand those that are met nowhere else.
-"""
+"""Test vectors next to borders: inputs at which a comparison of the laws is about to turn."""
 
 from __future__ import annotations
 
 import math
+import sys
+import threading
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from types import FrameType
 from typing import Any
 
 import numpy as np
 
-from bywire.export.controller.traced import Margins, Place, margins
-from bywire.export.controller.turns import Border, Field, Inputs, Turn, changed, value_of
+from bywire.core import ops
+
+Place = tuple[Any, ...]
+"""places in the code that lead to a comparison, innermost first; those of ``core.ops`` as one"""
+Margins = dict[Place, float]
+"""how far the sides of comparisons are apart"""
+_LESS = ("__lt__", "__ge__")
+
+_now = threading.local()
+"""``margins``: of the tick that this thread is in"""
+
+
+class Traced(float):
+    """A float that notes what it is compared with; what is computed of it does so, too."""
+
+    __slots__ = ()
+    __hash__ = float.__hash__
+
+
+def _comparing(name: str) -> Callable[[Traced, Any], Any]:
+    plain = getattr(float, name)
+
+    def compare(self: Traced, other: Any) -> Any:
+        if isinstance(other, (float, int)):
+            # Equal sides count with those that are not apart: where the comparison turns.
+            apart = float(self) - float(other)
+            _now.margins[_place(sys._getframe(1))] = -apart if name in _LESS else apart
+        return plain(self, other)
+
+    return compare
+
+
+def _place(frame: FrameType | None) -> Place:
+    inside: list[int] = []
+    while frame is not None and frame.f_code.co_filename == ops.__file__:
+        inside.append(frame.f_lasti)
+        frame = frame.f_back
+    places: list[Any] = [tuple(inside)]
+    while frame is not None and frame.f_code is not _BEGIN:
+        places.append(frame.f_lasti)
+        frame = frame.f_back
+    return tuple(places)
+
+
+def _computing(name: str) -> Callable[..., Any]:
+    plain = getattr(float, name)
+
+    def compute(self: Traced, *others: Any) -> Any:
+        result = plain(self, *others)
+        return Traced(result) if isinstance(result, float) else result
+
+    return compute
+
+
+for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
+    setattr(Traced, f"__{_name}__", _comparing(f"__{_name}__"))
+for _name in (
+    "add",
+    "radd",
+    "sub",
+    "rsub",
+    "mul",
+    "rmul",
+    "truediv",
+    "rtruediv",
+    "neg",
+    "pos",
+    "abs",
+    "pow",
+):
+    setattr(Traced, f"__{_name}__", _computing(f"__{_name}__"))
+
+
+def margins(tick: Callable[..., Any], inputs: tuple[Any, Any, Any], par: Any) -> Margins:
+    """Return how far the sides of every comparison of a tick are apart; none where it fails.
+
+    Parameters
+    ----------
+    tick
+        ``tick(x, m, u, par) -> memory``.
+    inputs
+        Plant, stimulus and memory.
+    """
+    x, u, m = (type(each)(*map(Traced, each)) for each in inputs)
+    _now.margins = {}
+    try:
+        with np.errstate(all="ignore"):  # numbers of single precision warn where others raise
+            tick(x, m, u, par)
+    except (ArithmeticError, ValueError):
+        return {}
+    noted: Margins = _now.margins
+    return noted
+
+
+_BEGIN = margins.__code__
+"""above it there is no law any more"""
+
+
+# --- Where a comparison turns while an input of a tick changes
+
+Inputs = tuple[Any, Any, Any]
+"""plant, stimulus and memory of a tick"""
+Field = tuple[int, str]
+"""an input: which of the three, and its name"""
+_STEPS, _JUMP = 60, 1e-7
+
+
+def value_of(inputs: Inputs, field: Field) -> float:
+    """Return an input."""
+    return float(getattr(inputs[field[0]], field[1]))
+
+
+def changed(inputs: Inputs, changes: Iterable[tuple[Field, float]]) -> Inputs:
+    """Return inputs of which some have other values."""
+    parts = list(inputs)
+    for (part, name), value in changes:
+        parts[part] = parts[part]._replace(**{name: value})
+    return tuple(parts)
+
+
+@dataclass(frozen=True)
+class Border:
+    """Inputs on both sides of where a comparison turns, and whether its sides are equal at one."""
+
+    above: Inputs
+    below: Inputs
+    is_met: bool
+
+    def changed(self, field: Field, value: float) -> Border:
+        """Return both sides with another input changed, which are taken to be equal at one."""
+        above, below = (changed(each, [(field, value)]) for each in (self.above, self.below))
+        return Border(above, below, is_met=True)
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A comparison of a tick, looked at along one of its inputs.
+
+    Parameters
+    ----------
+    tick
+        ``tick(x, m, u, par) -> memory``.
+    place
+        Of the comparison.
+    field
+        The input.
+    """
+
+    tick: Callable[..., Any]
+    par: Any
+    place: Place
+    field: Field
+
+    def margins(self, inputs: Inputs, value: float) -> Margins:
+        """Return how far the sides of all comparisons are apart, with a value of the input."""
+        return margins(self.tick, changed(inputs, [(self.field, value)]), self.par)
+
+    def margin(self, inputs: Inputs, value: float) -> float:
+        """Return how far the sides are apart; NaN where the comparison is not reached."""
+        return self.margins(inputs, value).get(self.place, math.nan)
+
+    def border(
+        self, inputs: Inputs, first: tuple[float, float], last: tuple[float, float]
+    ) -> Border:
+        """Return where the comparison turns between two values with their margins."""
+        ends = turning_point(lambda value: self.margin(inputs, value), first, last)
+        above, below = (changed(inputs, [(self.field, value)]) for value, _ in ends)
+        return Border(above, below, ends[1][1] == 0.0)
+
+    def is_at(self, border: Border) -> bool:
+        """Return whether the comparison turns there, as the border says."""
+        above, below = (
+            margins(self.tick, each, self.par).get(self.place, 0.0)
+            for each in (border.above, border.below)
+        )
+        return above > 0.0 >= below and (below == 0.0 or not border.is_met)
+
+    def is_seen(self, border: Border) -> bool:
+        """Return whether the memory jumps between two inputs next to each other."""
+        try:
+            with np.errstate(all="ignore"):
+                first, last = (
+                    list(self.tick(x, m, u, self.par)) for x, u, m in (border.above, border.below)
+                )
+        except (ArithmeticError, ValueError):
+            return False
+        return any(abs(a - b) > _JUMP * (abs(a) + abs(b)) for a, b in zip(first, last, strict=True))
+
+
+def turning_point(
+    margin: Callable[[float], float], first: tuple[float, float], last: tuple[float, float]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return two numbers as close to each other as can be, between which a margin turns.
+
+    Parameters
+    ----------
+    margin
+        Of a number; NaN where the comparison is not reached.
+    first, last
+        Numbers and their margins, of which one is above zero.
+
+    Returns
+    -------
+    tuple
+        The number above with its margin, and the one that is not.
+    """
+    above, below = (first, last) if first[1] > 0.0 else (last, first)
+    for step in range(_STEPS):
+        middle = 0.5 * above[0] + 0.5 * below[0]
+        if middle in (above[0], below[0]):
+            break
+        if step % 3 < 2 and math.isfinite(above[1] - below[1]):
+            middle = _guessed(above, below, middle, is_beyond=step % 3 == 1)
+        at = margin(middle)
+        if math.isnan(at):
+            break
+        if at > 0.0:
+            above = middle, at
+        else:
+            below = middle, at
+    return above, below
+
+
+def _guessed(
+    above: tuple[float, float], below: tuple[float, float], middle: float, is_beyond: bool
+) -> float:
+    """Return where a straight line turns, or a number just beyond the end that is closer to it."""
+    (a, at_a), (b, at_b) = above, below
+    guess = b - at_b * (a - b) / (at_a - at_b)
+    if is_beyond or at_b == 0.0:
+        end, other = (b, a) if abs(at_b) <= abs(at_a) else (a, b)
+        ulps = 1.0 if at_b == 0.0 else 4.0
+        guess = end + math.copysign(ulps * math.ulp(end), other - end)
+    return guess if min(a, b) < guess < max(a, b) else middle
+
+
+# --- Inputs next to borders
+# Random inputs hardly ever meet a limit to the last digit, where ``<`` and ``<=`` differ, nor come
+# so close to it that another limit shows. A tick is run on numbers that note every comparison that
+# they take part in, and how far its sides are apart. One input is changed until a comparison turns;
+# in between the place is sought where it does. What lies there is where the search goes on: behind
+# a limit that is rarely met stand those that are met nowhere else.
 
 _LAW = 3
 """places, innermost first, that are the same for all who call a law"""

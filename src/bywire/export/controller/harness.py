@@ -1,15 +1,211 @@
-"""Test vectors as C, and a program that compares the compiled ECU with them."""
+"""C programs that test the compiled ECU: by vectors, refused inputs, numbers of any bits."""
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 
+import numpy as np
+
 from bywire.export.controller.c_text import c_name, comment
-from bywire.export.controller.parameter_file import parameter_values
+from bywire.export.controller.contract import LARGEST, CheckedInput
 from bywire.export.controller.program import Program
-from bywire.export.controller.trespassing import prepared, stepped, trespassing
+from bywire.export.controller.render import parameter_values
 from bywire.export.controller.vectors import Vectors
+
+_BASES, _WILD = 8, 400
+"""vectors of a task from which inputs are refused; draws of all bits"""
+
+
+def trespassing(program: Program, every: Sequence[Vectors]) -> list[str]:
+    """Return the functions of a harness that count breaches of the contract, one for each task."""
+    if not every:
+        return []
+    left = [_left(program)] if any(each.step.inputs for each in every) else []
+    return [*left, _drawn(program), *(_breaches(program, each) for each in every)]
+
+
+def prepared(program: Program, vectors: Vectors) -> list[str]:
+    """Return the statements that set up vector ``k`` of a task."""
+    name, task = program.name, c_name(vectors.step.task.name)
+    types = {"x": f"{name}_Plant", "u": f"{name}_Stimulus", "memory": f"{name}_Memory"}
+    wanted = [short for _, short in vectors.step.arguments]
+    # A structure of which a task reads nothing is given its zeros.
+    lines = [f"{types[kind]} {kind} = {{0}};" for kind in ("x", "u", "memory") if kind in wanted]
+    for at, (kind, field) in enumerate(vectors.names):
+        if kind in wanted:
+            lines.append(f"{kind}.{c_name(field)} = given_{task}[k][{at}];")
+    if "par" in wanted:
+        chosen = f"(other_{task}[k] == 1) ? &other_parameters : &{name}_parameters"
+        lines.append(f"const {name}_Parameters *par = {chosen};")
+    return [f"        {line}" for line in lines]
+
+
+def stepped(vectors: Vectors) -> str:
+    """Return the call of a task on what ``prepared`` set up."""
+    wanted = [short for _, short in vectors.step.arguments]
+    arguments = ", ".join(each if each == "par" else f"&{each}" for each in wanted)
+    return f"{vectors.step.name}({arguments});"
+
+
+def _left(program: Program) -> str:
+    """Return the function that compares memory before and behind a refused step."""
+    fields = [c_name(each.name) for each in program.members(program.model.Memory)]
+    same = [f"is_same(a->{each}, b->{each})" for each in fields] or ["1"]
+    return (
+        f"/* Return whether two memories hold the same numbers. */\n"
+        f"static int is_left(const {program.name}_Memory *a, const {program.name}_Memory *b)\n"
+        "{\n    return " + "\n            && ".join(same) + ";\n}"
+    )
+
+
+def _drawn(program: Program) -> str:
+    """Return the functions that draw numbers of any bits, many of them at ends of their ranges."""
+    real = program.precision.real
+    return f"""static const {real} special[] = {{
+    ({real})NAN, ({real})INFINITY, -({real})INFINITY, {_limits(program)}
+}};
+static uint32_t drawn = 1u;
+
+static uint32_t draw(void)
+{{
+    drawn = drawn * 1664525u + 1013904223u;
+    return drawn >> 8;
+}}
+
+static {real} draw_real(void)
+{{
+    {real} value;
+    unsigned char bytes[sizeof value];
+
+    if (draw() % 4u == 0u) {{
+        return special[draw() % (sizeof special / sizeof special[0])];
+    }}
+    for (unsigned int n = 0; n < sizeof bytes; ++n) {{
+        bytes[n] = (unsigned char)draw();
+    }}
+    memcpy(&value, bytes, sizeof value);
+    return value;
+}}"""
+
+
+def _limits(program: Program) -> str:
+    kind = np.float32 if program.precision.name == "single" else np.float64
+    ends = np.finfo(kind)
+    values = (float(ends.max), -float(ends.max), float(ends.tiny), 0.0, 1.0, -1.0, LARGEST)
+    return ", ".join(map(program.precision.literal, values))
+
+
+def _refused(program: Program, each: CheckedInput) -> list[str]:
+    """Return values that a step has to refuse."""
+    real, literal = program.precision.real, program.precision.literal
+    kind = np.float32 if real == "float" else np.float64
+    values = [
+        f"({real})NAN",
+        f"({real})INFINITY",
+        f"-({real})INFINITY",
+        literal(LARGEST),
+        literal(-LARGEST),
+    ]
+    for end, away in ((each.low, -math.inf), (each.high, math.inf)):
+        if math.isfinite(end):
+            beyond = float(np.nextafter(kind(end), kind(away)))
+            # The number next to 0 is below those that compilers keep; take a usual one.
+            values.append(literal(beyond if abs(beyond) > 1e-30 else math.copysign(1e-6, away)))
+    return values
+
+
+def _breaches(program: Program, vectors: Vectors) -> str:
+    task = c_name(vectors.step.task.name)
+    lines = [f"static int breaches_{task}(void)", "{", "    int wrong = 0;"]
+    if vectors.step.inputs:
+        lines += _refusing(program, vectors)
+    return "\n".join([*lines, *_wild(program, vectors), "    return wrong;", "}"])
+
+
+def _refusing(program: Program, vectors: Vectors) -> list[str]:
+    """Return the trial of inputs to refuse: the memory stays as the step before left it."""
+    name, step, task = program.name, vectors.step, c_name(vectors.step.task.name)
+    status, refused = f"memory.{step.status}", f"{name.upper()}_STATUS_INPUT"
+    lines = ["", f"    for (int k = 0; k < VECTORS_{task}; k += 1 + VECTORS_{task} / {_BASES}) {{"]
+    lines += [*prepared(program, vectors), f"        {stepped(vectors)}"]
+    lines += [
+        f"        wrong += ({status} == 0u) ? 0 : 1;",
+        f"        const {name}_Memory before = memory;",
+    ]
+    for each in step.inputs:
+        place = f"{each.kind}.{c_name(each.field)}"
+        values = _refused(program, each)
+        lines += [
+            "        {",
+            f"            const {program.precision.real} refused[] = {{{', '.join(values)}}};",
+            f"            const {program.precision.real} accepted = {place};",
+            f"            for (int n = 0; n < {len(values)}; ++n) {{",
+            f"                {place} = refused[n];",
+            f"                {stepped(vectors)}",
+            "                wrong += is_left(&memory, &before) ? 0 : 1;",
+            f"                wrong += ({status} == {refused}) ? 0 : 1;",
+            "            }",
+            f"            {place} = accepted;",
+            "        }",
+        ]
+    return [*lines, "    }"]
+
+
+def _wild(program: Program, vectors: Vectors) -> list[str]:
+    """Return the trial of numbers of any bits: memory stays numbers, and commands within limits."""
+    name, step, model = program.name, vectors.step, program.model
+    short = [each for _, each in step.arguments]
+    types = {"x": model.State, "u": model.Stimulus, "memory": model.Memory}
+    kinds = {"x": "Plant", "u": "Stimulus", "memory": "Memory"}
+    held = [each for each in ("x", "u", "memory") if each in short]
+    lines = ["", f"    for (int k = 0; k < {_WILD}; ++k) {{"]
+    lines += [f"        {name}_{kinds[each]} {each} = {{0}};" for each in held]
+    if "par" in short:
+        lines += [
+            f"        {name}_Parameters wild = {name}_parameters;",
+            f"        const {name}_Parameters *par = &wild;",
+        ]
+    for each in held:
+        for member in program.members(types[each]):
+            if each != "memory":
+                lines.append(
+                    f"        if (draw() % 8u == 0u) {{ {each}.{c_name(member.name)} = "
+                    "draw_real(); }"
+                )
+            else:
+                lines.append(f"        {each}.{c_name(member.name)} = draw_real();")
+    if "par" in short:
+        for dotted, member in program.held():
+            place = ".".join(map(c_name, dotted.split(".")))
+            last = "[0]" if member.length else ""
+            lines.append(f"        if (draw() % 16u == 0u) {{ wild.{place}{last} = draw_real(); }}")
+    lines.append(f"        {stepped(vectors)}")
+    refused = f"(memory.{step.status} == {name.upper()}_STATUS_INPUT)"
+    lines += [
+        f"        wrong += ({refused} || (fabs((double)memory.{c_name(each)}) <= {LARGEST!r}))\n"
+        "            ? 0 : 1;"
+        for each in step.kept
+    ]
+    for command in step.commands:
+        place, limit = f"memory.{c_name(command.field)}", command.limit.text
+        if command.is_input:
+            limit = limit.replace("u->", "u.", 1)
+            lines.append(
+                f"        wrong += ((memory.{step.status} != 0u) || ({place} <= {limit})) ? 0 : 1;"
+            )
+            continue
+        lines.append(
+            f"        wrong += ({limit} >= {program.precision.literal(0.0)})\n"
+            f"            ? !(({place} <= {limit}) && ({place} >= -{limit}))\n"
+            f"            : (({place} > {program.precision.literal(0.0)}) || ({place} < "
+            f"{program.precision.literal(0.0)}));"
+        )
+    return [*lines, "    }"]
+
+
+# --- The harness
 
 WARNINGS = (
     "-Wall",

@@ -12,9 +12,8 @@ from typing import Any
 from bywire.core.errors import ModelError
 from bywire.core.model import Model, Task
 from bywire.core.parameters import ParameterSet
-from bywire.export.controller.body import Body
+from bywire.export.controller.body import Body, Statement, live
 from bywire.export.controller.c_text import PRECISIONS, Precision, c_name, checked_name, unique
-from bywire.export.controller.calls import called
 from bywire.export.controller.contract import (
     CheckedInput,
     Command,
@@ -24,18 +23,18 @@ from bywire.export.controller.contract import (
     held_by,
 )
 from bywire.export.controller.derived import Derivations, Derived
-from bywire.export.controller.execution import Executor
+from bywire.export.controller.evaluation import called
 from bywire.export.controller.functions import CFunction
-from bywire.export.controller.memories import Memories, Site
-from bywire.export.controller.statements import Statement, live
 from bywire.export.controller.structs import Member, Struct, Structs
-from bywire.export.controller.translation import Translation
+from bywire.export.controller.translation import Executor, Translation
 from bywire.export.controller.values import (
     Expr,
     Group,
     Known,
+    Memories,
     Record,
     Shape,
+    Site,
     Update,
     Use,
     shape_of,

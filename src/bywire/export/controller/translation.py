@@ -1,40 +1,314 @@
-"""All functions of an ECU in C: each law once for every structure in which it is called."""
+"""All functions of an ECU in C: from the Python of a law, statement by statement."""
 
 from __future__ import annotations
 
 import ast
+import importlib
 import inspect
 import types
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 from bywire.core import ops
-from bywire.core.errors import ModelError
-from bywire.export.controller.arguments import kind_of, passed, received
+from bywire.core.errors import ModelError, place_of
 from bywire.export.controller.body import Body
 from bywire.export.controller.c_text import c_name, unique
-from bywire.export.controller.context import Context
-from bywire.export.controller.execution import Executor, Returned
-from bywire.export.controller.functions import CFunction, as_value, finish, given_back
-from bywire.export.controller.members import attribute
-from bywire.export.controller.memories import Memories, Site
-from bywire.export.controller.source import closure_of, description, node_of, stores
-from bywire.export.controller.structs import Structs
+from bywire.export.controller.evaluation import Evaluator
+from bywire.export.controller.functions import (
+    CFunction,
+    as_value,
+    finish,
+    given_back,
+    kind_of,
+    passed,
+    received,
+)
+from bywire.export.controller.operators import Context, attribute
+from bywire.export.controller.structs import Structs, ctype_of
 from bywire.export.controller.values import (
     Array,
+    Built,
+    BuiltGroup,
     Closure,
     Expr,
     Given,
     Group,
     Items,
     Known,
+    Memories,
+    Method,
     Record,
+    Site,
     Table,
+    Update,
     Uses,
     lifted,
 )
+
+Function = ast.FunctionDef | ast.Lambda
+
+
+@cache
+def _text(name: str) -> str:
+    return Path(name).read_text(encoding="utf-8")
+
+
+@cache
+def _functions(name: str) -> Mapping[int, Sequence[Function]]:
+    """Return the functions of a file by the line that their code begins at."""
+    found: dict[int, list[Function]] = {}
+    for node in ast.walk(ast.parse(_text(name))):
+        if isinstance(node, ast.FunctionDef):
+            first = min([node.lineno, *(each.lineno for each in node.decorator_list)])
+            found.setdefault(first, []).append(node)
+        elif isinstance(node, ast.Lambda):
+            found.setdefault(node.lineno, []).append(node)
+    return found
+
+
+def node_of(function: types.FunctionType) -> Function:
+    """Return the syntax tree of a function.
+
+    Raises
+    ------
+    ModelError
+        Where its source is not there, or two functions stand on its line.
+    """
+    code = function.__code__
+    try:
+        here = _functions(code.co_filename).get(code.co_firstlineno, ())
+    except OSError:
+        raise ModelError(
+            f"{place_of(function)}: the ECU cannot be exported as C: the source of "
+            f"{function.__qualname__} is not there; put it into a file"
+        ) from None
+    matches = [node for node in here if _is_of(node, code)]
+    if len(matches) != 1:
+        raise ModelError(
+            f"{code.co_filename}, line {code.co_firstlineno}: the ECU cannot be exported as C: "
+            f"{len(matches)} functions stand on the line of {function.__qualname__}; give it a "
+            "line of its own"
+        )
+    return matches[0]
+
+
+def _is_of(node: Function, code: types.CodeType) -> bool:
+    if isinstance(node, ast.FunctionDef):
+        return node.name == code.co_name
+    names = [each.arg for each in node.args.args]
+    return code.co_name == "<lambda>" and names == list(code.co_varnames[: code.co_argcount])
+
+
+def notes_above(file: str, line: int) -> list[str]:
+    """Return the comment right above a line of a file."""
+    lines = _text(file).splitlines()
+    notes: list[str] = []
+    at = line - 2
+    while at >= 0 and lines[at].strip().startswith("# "):
+        notes.insert(0, lines[at].strip()[2:])
+        at -= 1
+    return notes
+
+
+def description(function: types.FunctionType) -> list[str]:
+    """Return what a function does: first line, equations and references of its docstring."""
+    lines = inspect.cleandoc(function.__doc__ or "").splitlines()
+    said, part = lines[:1], ""
+    for line in lines[1:]:
+        if line.startswith(".. math::"):
+            part, line = "equation", line.removeprefix(".. math::")
+        elif line == "References":
+            part = "references"
+        elif part == "equation" and line and not line.startswith(" "):
+            part = ""
+        if part and line.strip("- ") and line != "References":
+            said.append(line.strip())
+    module = function.__module__.rpartition("bywire.")[2] or function.__module__
+    return [*said, f"Source: {module}.{function.__qualname__}"]
+
+
+def stores(node: ast.AST) -> Counter[str]:
+    """Return how often every variable is assigned; what is assigned in a loop counts twice."""
+    counted: Counter[str] = Counter()
+    weights: dict[ast.AST, int] = {node: 1}
+    for each in ast.walk(node):
+        weight = weights.get(each, 1)
+        inner = 2 if isinstance(each, (ast.For, ast.While)) else weight
+        for child in ast.iter_child_nodes(each):
+            weights[child] = inner
+        if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store):
+            counted[each.id] += weight
+        elif isinstance(each, ast.arg):
+            counted[each.arg] += 1
+        elif isinstance(each, ast.AugAssign) and isinstance(each.target, ast.Name):
+            counted[each.target.id] += 1
+    return counted
+
+
+def closure_of(function: types.FunctionType) -> dict[str, Any]:
+    """Return what a function sees of the functions around it."""
+    cells = function.__closure__ or ()
+    return {
+        name: cell.cell_contents
+        for name, cell in zip(function.__code__.co_freevars, cells, strict=True)
+    }
+
+
+# --- Statements: assignments, structural conditions, loops over tuples, returns
+
+
+@dataclass
+class Returned:
+    """What a function returned, and the expression that says so."""
+
+    value: Any
+    node: ast.AST
+
+
+class Executor(Evaluator):
+    """Runs the statements of a function once, for its structure."""
+
+    def run(self, statements: list[ast.stmt]) -> Returned | None:
+        """Return what the statements return; None where they go on."""
+        for statement in statements:
+            rule = getattr(self, f"_do_{type(statement).__name__.lower()}", None)
+            if rule is None:
+                what = f"a statement {type(statement).__name__} is not translated"
+                raise self.refuse(statement, what)
+            self.body.notes[:] = notes_above(self.file, statement.lineno)
+            returned = rule(statement)
+            if returned is not None:
+                return returned  # type: ignore[no-any-return]
+        return None
+
+    def _do_expr(self, node: ast.Expr) -> None:
+        if not isinstance(node.value, ast.Constant):
+            raise self.refuse(node, "a statement without a result is not translated")
+
+    def _do_pass(self, node: ast.Pass) -> None:
+        return None
+
+    def _do_return(self, node: ast.Return) -> Returned:
+        if node.value is None:
+            raise self.refuse(node, "a law returns a value")
+        return Returned(self.value(node.value), node.value)
+
+    def _do_if(self, node: ast.If) -> Returned | None:
+        return self.run(node.body if self.truth(node.test) else node.orelse)
+
+    def _do_for(self, node: ast.For) -> Returned | None:
+        for entry in self.sequence(node.iter, self.value(node.iter)):
+            self.bind(node.target, entry)
+            returned = self.run(node.body)
+            if returned is not None:
+                return returned
+        return self.run(node.orelse)
+
+    def _do_functiondef(self, node: ast.FunctionDef) -> None:
+        self.scope[node.name] = Closure(node, self.scope, self.file, self.module)
+
+    def _do_importfrom(self, node: ast.ImportFrom) -> None:
+        home = importlib.import_module(node.module or "", self.module.get("__package__"))
+        for each in node.names:
+            self.scope[each.asname or each.name] = Known(getattr(home, each.name))
+
+    def _do_raise(self, node: ast.Raise) -> None:
+        raise self.refuse(node, "the law refuses these parameters")
+
+    def _do_annassign(self, node: ast.AnnAssign) -> None:
+        if node.value is not None:
+            self._assign(node.target, self.value(node.value))
+
+    def _do_augassign(self, node: ast.AugAssign) -> None:
+        load = ast.copy_location(ast.parse(ast.unparse(node.target), mode="eval").body, node)
+        whole = ast.copy_location(ast.BinOp(load, node.op, node.value), node)
+        self._assign(node.target, self.value(ast.fix_missing_locations(whole)))
+
+    def _do_assign(self, node: ast.Assign) -> None:
+        value = self.value(node.value)
+        for target in node.targets:
+            self._assign(target, value)
+
+    def _assign(self, target: ast.expr, value: Any) -> None:
+        if isinstance(target, ast.Name):
+            self.scope[target.id] = self.named(target.id, value)
+            return
+        if not isinstance(target, (ast.Tuple, ast.List)):
+            raise self.refuse(target, "only names can be assigned")
+        values = list(self.sequence(target, value))
+        names = {each.id for each in target.elts if isinstance(each, ast.Name)}
+        for at, each in enumerate(values[1:], 1):
+            used = {use[1] for use in _uses(each) if use[0] == "local"}
+            is_memory = self.body.structs.is_memory(each)
+            if used & names and not isinstance(each, Update) and not is_memory:
+                values[at] = self.body.variable("then", each)
+        for each, entry in zip(target.elts, values, strict=True):
+            self._assign(each, entry)
+
+    def named(self, name: str, value: Any) -> Any:
+        """Return a value under the name of a Python variable, put into one of C where it runs."""
+        value = lifted(value)
+        body = self.body
+        if isinstance(value, Expr):
+            there = body.derived(value, name)
+            if there is not value:
+                return there
+        if isinstance(value, (Known, Closure, Method, Array)):
+            return value
+        if body.structs.is_memory(value):
+            is_new = isinstance(value, Built)
+            return body.variable(name, value) if is_new else body.settled(value, name)
+        if isinstance(value, Update) and self._is_own(name, value.record):
+            body.update(value.record, value.items)
+            return value.record
+        if isinstance(value, Group) and (value.origin or body.is_stable(value.expr)):
+            return value
+        if isinstance(value, (Items, Table)):
+            return body.settled(value, name)
+        if not isinstance(value, (Expr, Record, Built, Update, Group, BuiltGroup)):
+            raise TypeError(type(value).__name__)
+        return self._variable(name, value)
+
+    def _is_own(self, name: str, record: Record) -> bool:
+        """Return whether a NamedTuple stands in the variable of this name already."""
+        own = self.scope.get(name)
+        return isinstance(own, Record) and own.expr.text == record.expr.text and not own.pointer
+
+    def _variable(self, name: str, value: Any) -> Any:
+        body: Body = self.body
+        ctype = ctype_of(body.structs, value)
+        held = self.scope.get(name)
+        place = held.expr if isinstance(held, (Record, Group)) else held
+        is_own = isinstance(place, Expr) and body.types.get(place.text) == ctype
+        if is_own and isinstance(place, Expr):
+            if isinstance(value, Update):
+                value = body.variable(f"{name}_new", value)
+            body.moving.add(place.text)
+            return body.variable(name, value, place.text)
+        target = body.fresh(name)
+        body.types[target] = ctype
+        if body.stores[name] > 1:
+            body.moving.add(target)
+        return body.variable(name, value, target)
+
+
+def _uses(value: Any) -> frozenset[Any]:
+    if isinstance(value, Expr):
+        return value.uses
+    if isinstance(value, (Record, Group)):
+        return value.expr.uses
+    if isinstance(value, (Built, BuiltGroup, Table)):
+        return frozenset().union(*(_uses(each) for each in value.items.values()))
+    if isinstance(value, Items):
+        return frozenset().union(*(_uses(each) for each in value.values))
+    return frozenset()
+
+
+# --- Functions: each law once for every structure in which it is called
 
 DEEP = 40
 """calls within calls beyond which a law counts as recursive"""

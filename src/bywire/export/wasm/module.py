@@ -15,12 +15,9 @@ from bywire.core.child_process import run_program
 from bywire.core.errors import CompilerError
 from bywire.core.scratch import process_folder, scratch_folder
 from bywire.core.signals import Signal, ranges_of, signals_of
-from bywire.export.exported import Exported
-from bywire.export.initial_values import start_nodes
-from bywire.export.interface import Interface, interface
-from bywire.export.variables import finite_range, parameter_variables
-from bywire.export.wasm.formulas import with_section
-from bywire.export.wasm.run_formulas import run_formulas
+from bywire.export.exported import Exported, start_nodes
+from bywire.export.interface import Interface, finite_range, interface, parameter_variables
+from bywire.export.wasm.formulas import run_formulas, with_section
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.compiler import KERNEL_MATH, TIMEOUT, bundled_compiler
 from bywire.simulation.rare_text import CUT

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from bywire.bench.values import number
 from bywire.core.errors import ParameterError
 from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, shown
+from bywire.core.values import number
 from bywire.identification.measured import NOISE_OF_SAMPLES
 from bywire.identification.noise import is_told, noise_of, robust_scale
 from bywire.identification.output_error import Trial

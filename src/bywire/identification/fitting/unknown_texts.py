@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from bywire.bench.experiment import Case
-from bywire.bench.values import number
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
@@ -16,6 +15,7 @@ from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of, without_noise
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, shown, split
+from bywire.core.values import number
 from bywire.identification.fitting.question import BETWEEN, Question
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 

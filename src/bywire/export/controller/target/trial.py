@@ -1,4 +1,4 @@
-"""Trials of an exported ECU: compiled, run on its vectors, and measured."""
+"""Trials of an exported ECU on a processor: compiled, run on its vectors, and measured."""
 
 from __future__ import annotations
 
@@ -11,12 +11,133 @@ from pathlib import Path
 
 from bywire.core.child_process import find_program, run_program
 from bywire.core.errors import CompilerError
-from bywire.export.controller.harness import FLAGS, SMALL_FLAGS
+from bywire.export.controller.c_text import c_name
+from bywire.export.controller.harness import FLAGS, SMALL_FLAGS, comparison, prepared, stepped
 from bywire.export.controller.program import Program
-from bywire.export.controller.target.target_harness import target_harness
-from bywire.export.controller.target.targets import CROSS, EMULATOR, HERE, RUNTIME, Target
 from bywire.export.controller.vectors import Vectors
 from bywire.simulation.compiler import Compiler
+
+CROSS = "arm-none-eabi-gcc"
+EMULATOR = "qemu-system-arm"
+INSTALL = "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"
+HERE = Path(__file__).parent
+RUNTIME = ("startup.c", "target.h", "target.ld")
+"""files of this folder that run a harness on a Cortex-M"""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A processor.
+
+    Parameters
+    ----------
+    name
+        What users call it.
+    flags
+        For the compiler.
+    machine
+        Board of the emulator.
+    """
+
+    name: str
+    flags: tuple[str, ...]
+    machine: str
+
+
+TARGETS = (
+    Target("Cortex-M3", ("-mcpu=cortex-m3", "-mthumb", "-mfloat-abi=soft"), "mps2-an385"),
+    Target(
+        "Cortex-M4F",
+        ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
+        "mps2-an386",
+    ),
+    Target(
+        "Cortex-M7",
+        ("-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-d16"),
+        "mps2-an500",
+    ),
+)
+
+
+def missing_tools() -> str:
+    """Return what is missing for targets, and how it is installed; empty where nothing is."""
+    absent = [name for name in (CROSS, EMULATOR) if find_program(name) is None]
+    if not absent:
+        return ""
+    return f"{' and '.join(absent)} not installed ({INSTALL})"
+
+
+# --- A harness for a Cortex-M
+
+SAMPLES = 100
+"""vectors of a task whose instructions are counted, at most"""
+_REPEATS = 40
+
+
+def target_harness(program: Program, every: Sequence[Vectors]) -> str:
+    """Return a program that says how many values differ, then a line of figures for every task."""
+    name = program.name
+    what = f"Tries the compiled ECU of {program.model.name} on a Cortex-M."
+    tasks = [c_name(each.step.task.name) for each in every]
+    calls = " + ".join(f"differing_{task}()" for task in tasks)
+    breaches = " + ".join(f"breaches_{task}()" for task in tasks)
+    measured = "".join(f"    measure_{task}();\n" for task in tasks)
+    parts = [
+        *comparison(program, every, what, '#include "target.h"'),
+        *(_measured(program, each) for each in every),
+        f"int main(void)\n{{\n    {name}_Memory memory;\n\n    {name}_ecu_init(&memory);\n"
+        f'    say("differ ");\n    say_number((uint32_t)({calls}));\n'
+        f'    say("\\nbits ");\n    say_number(bits);\n'
+        f'    say("\\nbreaches ");\n    say_number((uint32_t)({breaches}));\n    say("\\n");\n'
+        f"{measured}    return 0;\n}}",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _measured(program: Program, vectors: Vectors) -> str:
+    task = c_name(vectors.step.task.name)
+    set_up = "\n".join(prepared(program, vectors))
+    return f"""static void measure_{task}(void)
+{{
+    uint32_t most = 0u, sum = 0u, count = 0u, depth = 0u;
+
+    for (int k = 0; k < VECTORS_{task}; k += 1 + VECTORS_{task} / {SAMPLES + 1}) {{
+{set_up}
+        const {program.name}_Memory given = memory;
+        uint32_t begin = SYST_CVR;
+        for (int n = 0; n < {_REPEATS}; ++n) {{
+            memory = given;
+            IN_ORDER();
+        }}
+        const uint32_t without = counted_since(begin);
+        begin = SYST_CVR;
+        for (int n = 0; n < {_REPEATS}; ++n) {{
+            memory = given;
+            IN_ORDER();
+            {stepped(vectors)}
+        }}
+        const uint32_t with = counted_since(begin);
+        const uint32_t took = (with - without) * INSTRUCTIONS_PER_COUNT / {_REPEATS}u;
+        most = (took > most) ? took : most;
+        sum += took;
+        count += 1u;
+        memory = given;
+        paint_stack();
+        {stepped(vectors)}
+        const uint32_t used = stack_used();
+        depth = (used > depth) ? used : depth;
+    }}
+    say("task {task} ");
+    say_number(most);
+    say(" ");
+    say_number((count > 0u) ? sum / count : 0u);
+    say(" ");
+    say_number(depth);
+    say("\\n");
+}}"""
+
+
+# --- Trials
 
 _TIMEOUT = 300.0
 

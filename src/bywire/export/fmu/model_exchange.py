@@ -1,0 +1,224 @@
+"""A plant in model exchange: its variables, and its equations in continuous time as C text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
+
+from bywire.core.signals import Signal, signals_of
+from bywire.export.exported import Exported
+from bywire.export.interface import (
+    Interface,
+    Variable,
+    leaves_read,
+    memory_variable,
+    parameter_variables,
+    readings,
+    row_variable,
+    state_variable,
+)
+from bywire.export.model_header import braced, number
+from bywire.simulation.c_runtime import SCALAR
+from bywire.simulation.continuous import Continuous, build_continuous
+from bywire.simulation.emission import indented, leaf_namer, statements
+from bywire.simulation.expressions import as_number, needed
+from bywire.simulation.graph import Graph
+from bywire.simulation.operation import Node
+
+LEAVES = {"p": "p", "x": "x", "m": "m", "c": "closed", "r": "reaction"}
+"""arguments of the C functions by kind of leaf; integrals are none, they are not computed"""
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """The equations of an exported run's plant between two events, in one graph."""
+
+    made: Exported
+
+    @cached_property
+    def continuous(self) -> Continuous:
+        """Its symbolic functions."""
+        return build_continuous(self.made.run.model, self.made.run.par)
+
+    @cached_property
+    def graph(self) -> Graph:
+        """What the other properties put their nodes into."""
+        return Graph()
+
+    def _added(self, function: object, kinds: str) -> list[list[Node]]:
+        n = self.made.program.sizes
+        lengths = {
+            "p": n.parameters,
+            "x": n.x,
+            "m": n.memory,
+            "c": self.continuous.contacts,
+            "r": len(self.continuous.modal),
+            "q": n.flow,
+        }
+        leaves = [[self.graph.leaf(kind, k) for k in range(lengths[kind])] for kind in kinds]
+        return self.graph.add_function(function, leaves)
+
+    @cached_property
+    def closing(self) -> list[Node]:
+        """Whether each contact presses."""
+        return self._added(self.continuous.closing, "xp")[0]
+
+    @cached_property
+    def equations(self) -> list[list[Node]]:
+        """Right-hand sides, factors of derivatives, bounds, and of contacts what presses."""
+        return self._added(self.continuous.equations, "xmpc")
+
+    @cached_property
+    def output(self) -> list[Node]:
+        """What is recorded."""
+        return self._added(self.continuous.output, "xmpcrq")[0]
+
+    @property
+    def shown(self) -> list[int]:
+        """Recorded signals that state and inputs decide: no integrals, nothing of the ECU alone."""
+        held = leaves_read(self.graph, chain(*self.equations))["m"]
+        reads = [leaves_read(self.graph, [node]) for node in self.output]
+        return [k for k, each in enumerate(reads) if not each["q"] and each["m"] <= held]
+
+    @property
+    def counts(self) -> dict[str, object]:
+        """What the functions around the equations must know, by name of its macro."""
+        states = list(signals_of(self.made.run.model.State).values())
+        names = self.made.run.model.State._fields
+        modal = [names.index(name) for name in self.continuous.modal]
+        return {
+            "MODAL": len(modal),
+            "CONTACTS": self.continuous.contacts,
+            "MODAL_STATES": braced(map(str, modal)),
+            "NOMINALS": braced(number(signal.nominal) for signal in states),
+        }
+
+    def source(self) -> str:
+        """Return the C source."""
+        names = ("balance", "mass", "low", "high", "pressed", "lack")
+        results = {
+            f"{name}[{k}]": node
+            for name, nodes in zip(names, self.equations, strict=True)
+            for k, node in enumerate(nodes)
+        }
+        outputs = ", ".join(f"double *{name}" for name in names)
+        held = "const double *m, const double *closed"
+        return SCALAR + "\n".join(
+            (
+                self._function(
+                    "bw_closing",
+                    "double *closed",
+                    {f"closed[{k}]": node for k, node in enumerate(self.closing)},
+                ),
+                self._function("bw_equations", f"{held}, {outputs}", results),
+                self._function(
+                    "bw_output",
+                    f"{held}, const double *reaction, double *row",
+                    {f"row[{k}]": self.output[k] for k in self.shown},
+                ),
+            )
+        )
+
+    def _function(self, name: str, arguments: str, results: dict[str, Node]) -> str:
+        graph = self.graph
+        named = leaf_namer(graph, lambda kind, k: f"{LEAVES[kind]}[{k}]", lambda n: f"v{n}")
+        order = needed(graph, results.values(), lambda _: False)
+        lines = statements(graph, order, named, "const double ")
+        lines += [f"{place} = {as_number(graph, node, named)};" for place, node in results.items()]
+        given = ["p", "x", *(each.rpartition("*")[2] for each in arguments.split(", "))]
+        unused = f"{', '.join(f'(void){each}' for each in given)};"
+        return (
+            f"void {name}(const double *p, const double *x, {arguments}) {{\n"
+            f"  {unused}\n  {indented(lines, 2)}\n}}\n"
+        )
+
+
+# --- Variables: states, derivatives, modes, event indicators
+
+
+def exchange_interface(equations: Equations, start_reads: frozenset[int]) -> Interface:
+    """Return the variables of a plant whose states a client integrates.
+
+    Parameters
+    ----------
+    start_reads
+        Parameters that the initial values depend on, by index.
+    """
+    made, graph = equations.made, equations.graph
+    read = leaves_read(graph, [n for nodes in equations.equations for n in nodes])
+    shown = equations.shown
+    names = _state_names(equations, shown)
+    outputs = set(made.program.outputs)
+    variables = [memory_variable(made, k, "input") for k in sorted(read["m"])]
+    asked = readings(made)
+    for k, name in enumerate(names):
+        is_output = name in outputs or k in asked
+        variables.append(state_variable(made, k, name, "output" if is_output else "local"))
+    taken = {each.name for each in variables}
+    rows = [row_variable(made, k, "row") for k in shown]
+    variables += (each for each in rows if each.name not in taken)
+    variables += _rates(made, names)
+    variables += _modes(equations)
+    closing = leaves_read(graph, equations.closing)
+    outputs_read = leaves_read(graph, [equations.output[k] for k in shown])
+    parameters = read["p"] | closing["p"] | outputs_read["p"] | start_reads
+    variables += parameter_variables(made, parameters, frozenset())
+    return Interface("plant", tuple(variables), "model-exchange")
+
+
+def _state_names(equations: Equations, shown: list[int]) -> list[str]:
+    """Return the names of the states; of those that are recorded otherwise, or held, another."""
+    made = equations.made
+    recorded = list(made.program.outputs)
+    taken = set(made.run.model.Memory._fields)
+    taken |= {
+        recorded[k]
+        for k in shown
+        if recorded[k] in made.run.model.State._fields
+        and equations.output[k]
+        != equations.graph.leaf("x", made.run.model.State._fields.index(recorded[k]))
+    }
+    return [f"state.{name}" if name in taken else name for name in made.run.model.State._fields]
+
+
+def _rates(made: Exported, names: list[str]) -> Iterator[Variable]:
+    for k, (name, signal) in enumerate(
+        zip(names, signals_of(made.run.model.State).values(), strict=True)
+    ):
+        unit = "1/s" if signal.unit == "1" else f"{signal.unit}/s"
+        yield Variable(f"der({name})", "local", "rate", k, unit, f"derivative: {signal.label}")
+
+
+def _modes(equations: Equations) -> Iterator[Variable]:
+    """Yield modes, how often they have changed, and what tells that they must."""
+    model = equations.made.run.model
+    continuous = equations.continuous
+    known = signals_of(model.State)
+    for k, name in enumerate(continuous.modal):
+        label = f"{known[name].label}: 0 stuck, else the direction in which it moves"
+        yield Variable(f"mode.{name}", "local", "mode", k, "1", label, is_held=True)
+    for k in range(continuous.contacts):
+        label = f"contact {k + 1}: 1 where it presses"
+        yield Variable(f"mode.contact_{k + 1}", "local", "closed", k, "1", label, is_held=True)
+    label = "how often a mode has changed"
+    yield Variable("mode.changes", "local", "events", 0, "1", label, is_held=True)
+    at = 0
+    for name in continuous.modal:
+        yield _indicator(at, f"{name}.motion", known[name], "until it turns, or meets its limit")
+        yield _indicator(
+            at + 1,
+            f"{name}.hold",
+            Signal("1", known[name].label),
+            "what more would hold it where it is stuck",
+        )
+        at += 2
+    for k in range(continuous.contacts):
+        label = "how far it is pressed, or open"
+        yield _indicator(at + k, f"contact_{k + 1}", Signal("1", f"contact {k + 1}"), label)
+
+
+def _indicator(at: int, name: str, signal: Signal, meaning: str) -> Variable:
+    label = f"{signal.label}: {meaning}"
+    return Variable(f"indicator.{name}", "local", "indicator", at, signal.unit, label)
