@@ -240,7 +240,7 @@ def test_a_set_for_an_assembly_that_does_not_exist_is_said(bywire: Bywire, tmp_p
     assert wrong != text
     (tmp_path / "odd_axis.py").write_text(wrong)
     system = ("--system", tmp_path / "odd_axis.py")
-    line = wrong[: wrong.index("CitedSet(\n")].count("\n") + 1
+    line = wrong[: wrong.index('CitedSet("')].count("\n") + 1
     for _ in range(2):  # made anew, then kept
         done = bywire("list", "--json", *system)
         assert f"odd_axis.py, line {line}: parameter set 'spring-axis-one'" in done.err

@@ -25,7 +25,6 @@ from bywire.server.place import Place
 from bywire.server.refusal import RefusedError
 from bywire.usecases import use_cases
 from bywire.usecases.declare import DECLARED
-from usecases import letters
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "docs"))
 
@@ -40,7 +39,8 @@ def declared(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr(callers, "_flags", dict(callers._flags))
     cached = (app.program, task.tasks, bywire._homes)
     use_cases()
-    importlib.reload(letters)
+    sys.modules.pop("usecases.letters", None)
+    importlib.import_module("usecases.letters")
     for each in cached:
         each.cache_clear()
     yield

@@ -84,7 +84,7 @@ def kept_plan(store: StudyStore) -> tuple[StudyPlan, Origin]:
         if not unloaded:
             raise
         raise type(error)(
-            f"{error}; the study was run with --system {' --system '.join(unloaded)}"
+            f"{error}; the study was run with {' '.join(map(_loaded_by, unloaded))}"
         ) from None
     is_listed = plan.design in SPANNED
     return (plan if is_listed else replace(plan, cases=int(said["cases"]))), origin
@@ -110,3 +110,8 @@ def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
     judged = status_of(findings.judgments) if findings.spreads else "failed"
     status = judged if is_whole else "unfinished"
     return StudyRun(plan, store.folder, findings, nominal, status)
+
+
+def _loaded_by(path: str) -> str:
+    """Return how a reader loads a brake from a file."""
+    return f"--system {path}" if is_command_line() else f'bywire.load_system("{path}")'
