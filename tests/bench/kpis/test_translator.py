@@ -288,16 +288,16 @@ def test_what_has_no_translation_is_refused_with_its_line(written, body, line, w
     family = written(figure(body))
     before = HEAD.count("\n") + 3  # decorator, head and docstring
     with pytest.raises(ModelError, match=re.escape(why)) as caught:
-        family.c_text  # noqa: B018
+        family.translate()
     assert f"written.py, line {before + line + 1}, in f: " in str(caught.value)
 
 
 def test_a_function_that_calls_itself_and_an_unknown_type_are_refused(written):
     again = "def g(x: float) -> float:\n    return g(x)\n"
     with pytest.raises(ModelError, match="does not call itself"):
-        written(again, figure("return g(y[0])")).c_text  # noqa: B018
+        written(again, figure("return g(y[0])")).translate()
     with pytest.raises(ModelError, match="the type of 'x' is <class 'str'>"):
-        written("def g(x: str) -> float:\n    return 1.0\n", figure("return g('a')")).c_text  # noqa: B018
+        written("def g(x: str) -> float:\n    return 1.0\n", figure("return g('a')")).translate()
     with pytest.raises(ModelError, match="takes 'z', which must be t, setting, a field"):
         written(figure("return 1.0", "z: Samples"))
 
