@@ -65,9 +65,7 @@ def test_what_cannot_be_translated_is_refused_when_the_brake_is_loaded(tmp_path)
 
 
 def test_key_figures_without_setting_are_refused(tmp_path):
-    wrong = (
-        example().replace("class Setting", "class Other").replace("setting: Setting", "setting: object")
-    )
+    wrong = example().replace("class Setting", "class Other").replace(": Setting", ": object")
     with (
         loaded(written(tmp_path, wrong, "swung_bare")),
         pytest.raises(ModelError, match="key figures need a data class Setting"),
