@@ -33,7 +33,7 @@ from math import isfinite, sqrt
 from typing import NamedTuple
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import Samples, integral
+from bywire.bench.kpis.loops import Samples, integral, moving_average
 
 LEVEL = 0.5
 WORDS = "its words"
@@ -142,6 +142,13 @@ COMPUTED = {
         moved = list(y)
         moved[0] = 7.0
         return integral(t, whole) + max(twice) + moved[0] + moved[-1] + odd[0] + len(odd)
+    """,
+    "functions that make lists": """
+        whole = 0.0
+        for x in moving_average(t, y, 0.1)[1:]:
+            whole += x
+        size = [abs(x) for x in moving_average(t, y, 0.2)]
+        return whole + max(size) + moving_average(t, y, 0.3)[-1] + moving_average(t, y, 1.0)[2]
     """,
     "nothing": """
         least = 0.0 if setting.least is None else setting.least
@@ -272,6 +279,11 @@ REFUSED = {
         "return Undefined(f'{y[0]:g} {y[0]:g} {y[0]:g} {y[0]:g}')",
         0,
         "at most 3 numbers",
+    ),
+    "a list in a comparison": (
+        "return 1.0 if 0.0 < max(moving_average(t, y, 1.0)) < 1.0 else 0.0",
+        0,
+        "a number that has a name",
     ),
     "infinity": ("return math.inf", 0, "only a finite number is a constant"),
     "a name in several": ("a = b = 1.0\nreturn a", 0, "it knows assignments"),

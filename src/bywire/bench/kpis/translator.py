@@ -388,13 +388,15 @@ class _Writer:
         outer = self.kinds.get(name)
         if isinstance(over, ast.Call) and self.called_name(over) == "range":
             begin, end = self.bounds_of_list(over)
+            above = []
             self.kinds[name] = INT
             item = f"const int64_t {c_name(name)} = {k} + {begin};"
         else:
-            begin, samples = "0", self.samples(over)
-            end = f"{samples}.n"
+            given = f"{array}_of"
+            above = [f"const bw_samples {given} = {self.samples(over)};"]
+            begin, end = "0", f"{given}.n"
             self.kinds[name] = FLOAT
-            item = f"const double {c_name(name)} = {samples}.at[{k}];"
+            item = f"const double {c_name(name)} = {given}.at[{k}];"
         self.loops += 1
         value = self.number(element)
         self.loops -= 1
@@ -403,6 +405,7 @@ class _Writer:
             self.kinds[name] = outer
         count = f"{array}_n"
         return [
+            *above,
             f"const int64_t {count} = {end} > {begin} ? {end} - {begin} : 0;",
             f"double *restrict {array} = bw_take(room, {count});",
             f"for (int64_t {k} = 0; {k} < {count}; ++{k}) {{",
@@ -441,21 +444,26 @@ class _Writer:
         """Return the lines of a loop over a range or over samples; its bounds are known at once."""
         if name in self.kinds:
             self.refuse(node, f"{name!r} is in use: give what counts this loop a name of its own")
-        self.loops += 1
         k = c_name(name)
         if isinstance(over, ast.Call) and self.called_name(over) == "range":
-            head, item, self.kinds[name] = self.range_head(over, k), [], INT
+            head, self.kinds[name] = [f"{{ {self.range_head(over, k)}"], INT
         else:
-            at, count = f"bw_at_{self.loops}_{k}", f"bw_n_{self.loops}_{k}"
-            samples = self.samples(over)
-            head = f"for (int64_t {at} = 0, {count} = {samples}.n; {at} < {count}; ++{at}) {{"
-            item, self.kinds[name] = [f"  const double {k} = {samples}.at[{at}];"], FLOAT
+            at, given = f"bw_at_{k}", f"bw_of_{k}"
+            head, self.kinds[name] = (
+                [
+                    f"{{ const bw_samples {given} = {self.samples(over)};",
+                    f"for (int64_t {at} = 0; {at} < {given}.n; ++{at}) {{",
+                    f"  const double {k} = {given}.at[{at}];",
+                ],
+                FLOAT,
+            )
+        self.loops += 1
         self.counters.append(name)
         lines = _in(self.block(body))
         self.counters.pop()
         del self.kinds[name]
         self.loops -= 1
-        return [head, *item, *lines, "}"]
+        return [*head, *lines, "}}"]
 
     def range_head(self, over: ast.Call, k: str) -> str:
         """Return the head of a loop over a range."""
@@ -561,6 +569,8 @@ class _Writer:
                 begin = "0" if low is None else self.whole(low)
                 end = "INT64_MAX" if high is None else self.whole(high)
                 return Value(f"bw_slice({self.samples(of)}, {begin}, {end})", SAMPLES)
+            case ast.Subscript(of, ast.UnaryOp(ast.USub(), ast.Constant(int(back)))):
+                return Value(f"bw_from_end({self.samples(of)}, {back})", FLOAT)
             case ast.Subscript(of, at) if not isinstance(at, ast.Slice):
                 return Value(f"{self.plain(of).text}.at[{self.index(of, at)}]", FLOAT)
             case ast.UnaryOp(ast.Not(), operand):
@@ -622,15 +632,12 @@ class _Writer:
         return Value(f"{value.text}.{c_name(node.attr)}", kind)
 
     def index(self, of: ast.expr, at: ast.expr) -> str:
-        """Return the place of a sample; a constant below zero counts from the end."""
+        """Return the place of a sample."""
         value = self.plain(of)
         if value.kind == PAIR and isinstance(at, ast.Constant) and at.value in (0, 1):
             return str(at.value)
         if value.kind != SAMPLES:
             self.refuse(of, "samples are needed here")
-        match at:
-            case ast.UnaryOp(ast.USub(), ast.Constant(int(back))):
-                return f"{value.text}.n - {back}"
         return self.whole(at)
 
     def arithmetic(self, node: ast.BinOp) -> Value:
@@ -655,7 +662,10 @@ class _Writer:
                 there = "reason" if value.kind.base is Undefined else "is"
                 sign = "==" if isinstance(op, ast.Is) else "!="
                 return Value(f"({value.text}.{there} {sign} 0)", BOOL)
+        before = self.made.arrays
         sides = [self.number(each) for each in (node.left, *node.comparators)]
+        if len(sides) > 2 and self.made.arrays > before:  # C would compute the middle one twice
+            self.refuse(node, "compare a number that has a name")
         signs = [_OPERATORS.get(type(op)) for op in node.ops]
         if None in signs:
             self.refuse(node, "comparisons are < <= > >= == != of numbers, and `is None`")
