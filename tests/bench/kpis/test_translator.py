@@ -287,7 +287,7 @@ REFUSED = {
     ),
     "infinity": ("return math.inf", 0, "only a finite number is a constant"),
     "a name in several": ("a = b = 1.0\nreturn a", 0, "it knows assignments"),
-    "a sum": ("return sum(y)", 0, "`sum`"),
+    "a sum": ("return sum(y)", 0, "`sum(y)` in C: it calls functions of loops"),
     "a starred call": ("return integral(*[t, y])", 0, "without * and **"),
     "what is never nothing": ("return 1.0 if y is None else 0.0", 0, "this is never None"),
     "a lambda": ("f = lambda x: x\nreturn 0.0", 0, "not among the expressions"),
