@@ -15,6 +15,7 @@ from bywire.api.verification_parts import (
     verification_parts,
 )
 from bywire.bench.requirements import Limit
+from bywire.core.callers import option
 from bywire.core.parameters import leaf_fields
 from bywire.report.document import Flat, Listing, TableBlock
 from bywire.report.tables import text_table
@@ -144,7 +145,7 @@ def limit_lines(case: LoopCase, limits: Mapping[str, tuple[float, float]]) -> li
         else f"{name} >= {gain_text(case, name, low)}"
         for name, (low, high) in limits.items()
     ]
-    return [f"kept for an ECU: {', '.join(texts)} (--free-derivative does not)"]
+    return [f"kept for an ECU: {', '.join(texts)} ({option('free_derivative')} does not)"]
 
 
 def unit_of(case: LoopCase, name: str) -> str:

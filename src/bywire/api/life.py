@@ -6,23 +6,19 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
-from bywire.bench.running import Progress
 from bywire.core.arguments import whole_number
 from bywire.core.errors import ParameterError
-from bywire.core.typing import Array, silent
+from bywire.core.typing import Array
 from bywire.core.units import difference_unit
-from bywire.life.life_file import CONDITIONS, WEAR, read_life
-from bywire.life.one_by_one import one_by_one
+from bywire.life.life_file import CONDITIONS, WEAR
 from bywire.life.plan import CONDITION, LifePlan
-from bywire.life.projection import CONFIDENCE, Projection, projected
-from bywire.report.answer import Answer, use_case
+from bywire.life.projection import CONFIDENCE, Projection
+from bywire.report.answer import Answer
 from bywire.report.changes import defaults_of, value_changes
 from bywire.report.document import (
     Banner,
@@ -265,51 +261,6 @@ def wear_changes(plan: LifePlan) -> tuple[Change, ...]:
             if chosen[name] != default
         ),
     )
-
-
-@use_case
-def project_life(
-    source: str | Path,
-    overrides: Mapping[str, str] = MappingProxyType({}),
-    *,
-    check: int = 0,
-    progress: Progress | None = None,
-) -> LifeResult:
-    """Project how a brake wears, and when its life ends.
-
-    Parameters
-    ----------
-    source
-        Life file, see ``docs/life.md``; or the name of a life.
-    overrides
-        Changes of the bench, of wear (``wear.NAME``) and of what is between stops
-        (``stop.NAME``), as texts with units.
-    check
-        Stops that are also run one by one, to check the projection, in whole rounds of the
-        population; none by default.
-    progress
-        Called with a label and the finished share, 0 to 1.
-
-    Returns
-    -------
-    LifeResult
-        Stops until the end, with an interval; slow states after every stop in SI units.
-
-    Raises
-    ------
-    InputError
-        For a life file that does not fit, and a brake that is at its end from the start.
-    RunError
-        When a run fails, or a stop lacks a key figure that wear is computed from.
-    KeyboardInterrupt
-        When interrupted.
-    """
-    shown = progress or silent
-    plan = read_life(source, overrides)
-    require_checkable(check, plan)
-    made = projected(plan, shown)
-    rounds = min(check, made.stops) // plan.count
-    return LifeResult(made, one_by_one(plan, rounds * plan.count, shown) if rounds else {})
 
 
 def require_checkable(check: int, plan: LifePlan) -> None:

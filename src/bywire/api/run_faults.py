@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bywire.api.study_tested import varied_texts
-from bywire.bench.running import Progress
-from bywire.campaigns.campaign_file import read_campaign
 from bywire.campaigns.findings import CampaignFindings, FaultFinding
 from bywire.campaigns.residual import NEVER
-from bywire.campaigns.running import complete
-from bywire.campaigns.store import CampaignStore
 from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
-from bywire.core.typing import Array, silent
+from bywire.core.typing import Array
 from bywire.core.units import difference_unit, display_factor
-from bywire.report.answer import Answer, use_case
+from bywire.report.answer import Answer
 from bywire.report.document import Banner, Document, FigureBlock, Listing, Section, TableBlock
 from bywire.report.record import Quantity, record_data, record_table
 from bywire.report.subject import Subject
@@ -277,56 +272,6 @@ class FaultCampaign(Answer):
             "warnings": self.warnings,
             "notes": self.notes,
         }
-
-
-@use_case
-def run_faults(
-    campaign: str | Path,
-    out: str | Path | None = None,
-    overrides: Mapping[str, str] = MappingProxyType({}),
-    *,
-    progress: Progress | None = None,
-) -> FaultCampaign:
-    """Run a campaign: every fault of a brake in a maneuver, at several onsets.
-
-    Parameters
-    ----------
-    campaign
-        Campaign file, see ``docs/faults.md``; or the name of one that comes with a brake.
-    out
-        Folder in which outcomes are kept, so that the same call goes on after an interrupt;
-        nothing is kept by default.
-    overrides
-        Changes of the bench, as texts with units.
-    progress
-        Called with a label and the finished share, 0 to 1.
-
-    Returns
-    -------
-    FaultCampaign
-        Of every fault its effect, fault tolerant time, time to detection [s] and class;
-        diagnostic coverage, false alarms.
-
-    Raises
-    ------
-    InputError
-        For a campaign that does not fit, and a folder that holds another one.
-    RunError
-        When a run fails.
-    KeyboardInterrupt
-        When interrupted; finished faults stay in the folder.
-    """
-    plan = read_campaign(campaign, overrides)
-    store = CampaignStore(None if out is None else Path(out))
-    try:
-        return FaultCampaign(complete(plan, store, progress or silent), store.folder)
-    except KeyboardInterrupt:
-        if store.folder is None:
-            raise
-        kept = sum(store.kept(number) is not None for number in range(len(plan.faults)))
-        raise KeyboardInterrupt(
-            f"{kept} of {len(plan.faults)} faults are kept: the same command goes on"
-        ) from None
 
 
 def _sentences(texts: Sequence[str]) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,13 +12,10 @@ import xarray as xr
 
 from bywire.api.parameter_choice import set_for
 from bywire.bench.relative_changes import settled
-from bywire.bench.running import Progress
-from bywire.core.blas import on_one_thread
 from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
-from bywire.core.typing import silent
 from bywire.core.values import parsed
-from bywire.report.answer import Answer, use_case
+from bywire.report.answer import Answer
 from bywire.report.changes import defaults_of, value_changes
 from bywire.report.document import (
     Details,
@@ -166,53 +162,16 @@ class StudyResult(Answer):
         }
 
 
-@use_case
-@on_one_thread()
-def study(
-    name: str,
-    parameters: str = "",
-    overrides: Mapping[str, Any] = MappingProxyType({}),
-    *,
-    progress: Progress | None = None,
-) -> StudyResult:
-    """Compare designs of a brake at equal demands.
-
-    Parameters
-    ----------
-    name
-        Name of the study.
-    parameters
-        Parameter set; the main one of the study's brake by default.
-    overrides
-        Changes: names with a dot are the brake's parameters, others the study's options; SI
-        numbers, or texts with units.
-    progress
-        Called with a label and the finished share, 0 to 1.
-
-    Returns
-    -------
-    StudyResult
-        The designs with their figures in SI units, the best, and what limits it.
-
-    Raises
-    ------
-    InputError
-        For names that are unknown, values out of range, and changes without effect.
-    """
-    definition, named, par, options = asked_study(name, parameters, overrides)
-    findings = definition.compute(par, options, progress or silent)
-    return StudyResult(definition, named, par, options, findings)
+AskedStudy = tuple[Study, str, ParameterSet, ParameterSet]
 
 
-def asked_study(
-    name: str, parameters: str, overrides: Mapping[str, Any]
-) -> tuple[Study, str, ParameterSet, ParameterSet]:
+def asked_study(name: str, parameters: str, overrides: Mapping[str, Any]) -> AskedStudy:
     """Return a study, the name of its parameter set, and parameters and options as changed.
 
     Raises
     ------
     InputError
-        As `study`.
+        As `bywire.study`.
     """
     definition = STUDIES.find(name)
     cited = set_for(f"study {definition.name!r}", definition.assembly, parameters)

@@ -10,6 +10,7 @@ from pathlib import Path
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.experiment_choice import former_names
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
+from bywire.core.callers import option
 from bywire.core.catalog import PARAMETER_SETS, main_set, sets_of_loaded
 from bywire.core.errors import ParameterError
 from bywire.data.file_kinds import BENCH
@@ -69,8 +70,8 @@ def usual_set(name: str) -> str:
         for now, assembly in former_names(name).items()
     )
     raise ParameterError(
-        f"experiment {name!r} is for any brake: say for which, with --set parameters=NAME "
-        f"({known}){former}"
+        f"experiment {name!r} is for any brake: say for which, with "
+        f"{option('overrides', {'parameters': 'NAME'})} ({known}){former}"
     )
 
 

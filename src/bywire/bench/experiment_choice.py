@@ -7,6 +7,7 @@ from typing import Any
 
 from bywire.bench.experiment import EXPERIMENTS, Experiment
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
+from bywire.core.callers import option
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import ASSEMBLIES
@@ -87,5 +88,5 @@ def _former(
     raise ParameterError(
         f"experiment {name!r} is for any brake, and that of the {system} is called "
         f"{former.name!r} now: write {former.name}, or say which signal {name} is about, for "
-        f"instance --set options.{example}=NAME"
+        f"instance {option('overrides', {f'options.{example}': 'NAME'})}"
     )

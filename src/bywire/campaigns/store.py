@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bywire.campaigns.plan import CampaignPlan
+from bywire.core.callers import option
 from bywire.core.errors import FileError
 from bywire.core.scratch import replacing, sweep
 from bywire.studies.identity import differing
@@ -52,7 +53,8 @@ class CampaignStore:
             ) from None
         except (ValueError, KeyError, TypeError):
             raise FileError(
-                f"{record} is damaged, or not of a campaign: name another folder with --out"
+                f"{record} is damaged, or not of a campaign: name another folder with "
+                f"{option('out')}"
             ) from None
 
     def _require(self, plan: CampaignPlan, known: dict[str, Any]) -> None:
@@ -60,7 +62,7 @@ class CampaignStore:
             differs = differing(known["campaign"], plan.identity)
             raise FileError(
                 f"{self.folder} holds another campaign{differs and f' ({differs})'}: name another "
-                "folder with --out, or remove it"
+                f"folder with {option('out')}, or remove it"
             )
 
     def holds(self, plan: CampaignPlan) -> bool:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.identification.measured import wrong_sign
@@ -155,7 +156,8 @@ def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> Non
         said = ", ".join(f"{count} {way}" for way, count in counts.items())
         raise ParameterError(
             f"too few samples slide {' and '.join(short)} ({said}; {_LEAST} each way are needed): "
-            "record motion to and fro (speed changes its sign), or lower --option slowest, which "
+            "record motion to and fro (speed changes its sign), or lower "
+            f"{option('options')} slowest, which "
             f"leaves out what is slower than {100 * slowest:g} % of a record's fastest speed"
         )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bywire.core.callers import option
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, shown
 from bywire.identification.estimate import Estimate
@@ -89,7 +90,7 @@ def advice(estimate: Estimate, silent: bool) -> str:
     if left > _FAR:
         return (
             f"the model does not fit, it leaves {left:.2g} times the noise at its best: check sign "
-            "and unit of what was measured (--map), then what is taken as known"
+            f"and unit of what was measured ({option('mapping')}), then what is taken as known"
         )
     return "switch it on, or name another unknown" if silent else "excite the system more"
 

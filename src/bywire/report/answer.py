@@ -7,15 +7,11 @@ import json
 import math
 import os
 import sys
-import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from bywire.core.arguments import require_kinds
-from bywire.core.callers import in_callers_words
 from bywire.report.document import Document, FigureBlock, TableBlock
 from bywire.report.result_folder import ResultFolder, result_folder
 from bywire.report.tables import Table
@@ -124,28 +120,6 @@ def frame_of(table: Table) -> pd.DataFrame:
     frame.columns = pd.Index(headings)
     frame.attrs["units"] = units
     return frame
-
-
-Asked = ParamSpec("Asked")
-Given = TypeVar("Given", bound=Answer)
-
-
-def use_case(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
-    """Have a function warn of what its answer warns of, so that nothing coarse passes in silence.
-
-    Arguments of another kind than its signature says are refused before it begins. Commands take
-    warnings, notes and failures from the answer, and print each in its place.
-    """
-
-    @wraps(function)
-    def warned(*args: Asked.args, **kwargs: Asked.kwargs) -> Given:
-        require_kinds(function, args, kwargs)
-        answer = function(*args, **kwargs)
-        for text in (*answer.warnings, *answer.notes, *answer.failures):
-            warnings.warn(in_callers_words(text), AnswerWarning, stacklevel=2)
-        return answer
-
-    return warned
 
 
 def write_document(document: Document, folder: Path) -> list[Path]:

@@ -12,6 +12,7 @@ from itertools import islice
 from typing import Any
 
 from bywire.core.arguments import whole_number
+from bywire.core.callers import option
 from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.errors import ParameterError
 from bywire.core.heard_warnings import heard_warnings
@@ -33,7 +34,6 @@ from bywire.studies.plan import StudyPlan
 # machine's memory for stimuli and rows.
 _TOGETHER = 64
 _MOST_WORKERS = 1024
-_KILLED = "resume it, with fewer --workers"
 _AHEAD = 2  # chunks in flight for each worker, so that none waits for us
 # Chunks from which on processes are worth their start; those that load all anew take a second.
 _WORTH_COPIES, _WORTH = 2, 8
@@ -97,7 +97,8 @@ class Pool:
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
         """Return what computes; see `Executor`."""
-        with processes_with_brakes(self.workers, _KILLED, _give, plan) as pool:
+        fewer = f"resume it, with fewer {option('workers')}"
+        with processes_with_brakes(self.workers, fewer, _give, plan) as pool:
             yield _InPool(pool, _AHEAD * self.workers)
 
 
@@ -151,7 +152,7 @@ def require_workers(workers: int | None, cluster: str, engine: str) -> None:
     if engine == CUDA and (workers is not None or cluster):
         raise ParameterError(
             "engine = 'cuda' computes all cases on one graphics processor: leave out "
-            f"{'--cluster' if cluster else '--workers'}"
+            f"{option('cluster' if cluster else 'workers')}"
         )
     if cluster and workers is not None:
         raise ParameterError("workers of a cluster are the cluster's own: leave one out")

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
 from bywire.bench.bench_source import names_experiment
+from bywire.core.callers import option
 from bywire.core.errors import InputError, ParameterError, quoted
 from bywire.core.section import Hint, Name, Section, Table
 from bywire.data.file_kinds import STUDY, require_kind
@@ -118,7 +119,7 @@ def read_bench(
         if not isinstance(value, str):
             raise ParameterError(
                 f"[set] {key} = {quoted(value)}: write the value as a text, "
-                "with its unit, as --set takes it"
+                f"with its unit, as {option('overrides')} takes it"
             )
     there = source if names_experiment(source) else folder / source
     return bench_file.read(there, {**flat, **overrides})

@@ -98,17 +98,17 @@ class Question:
 
     @property
     def given(self) -> tuple[str, ...]:
-        """What was given, as options of the command."""
+        """Names of what was given."""
         options = {
-            "--bench": self.bench is not None,
-            "--input": self.inputs,
-            "--output": self.outputs,
-            "--unknown": self.unknowns,
-            "--prior": self.priors,
-            "--estimate-start": self.states,
-            "--case": self.case,
-            "--holdout": self.holdout is not None,
-            "--loss": self.loss,
+            "bench": self.bench is not None,
+            "inputs": self.inputs,
+            "outputs": self.outputs,
+            "unknowns": self.unknowns,
+            "priors": self.priors,
+            "states": self.states,
+            "case": self.case,
+            "holdout": self.holdout is not None,
+            "loss": self.loss,
         }
         return tuple(name for name, value in options.items() if value)
 

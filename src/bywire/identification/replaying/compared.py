@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError, UnitError, nearest_first, unknown_name
 from bywire.core.signals import Signal, signals_of
 from bywire.core.typing import Array
@@ -46,7 +47,8 @@ def compared_outputs(
             notes = (f"left out as flags, sums or constants: {', '.join(passed)}",)
     if not wanted:
         raise ParameterError(
-            "nothing measured is an output of the model: name signals as the model does (--map), "
+            "nothing measured is an output of the model: name signals as the model does "
+            f"({option('mapping')}), "
             f"for instance {', '.join(list(signals)[:6])}; measured are "
             f"{nearest_first(there, signals)}"
         )
