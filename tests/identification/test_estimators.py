@@ -22,15 +22,15 @@ from bywire.identification import (
     differentiated,
     estimate,
     initial_states,
-    inverse_dynamics,
     multistart,
     output_error,
     parameters_of,
     predict,
     trial,
 )
+from bywire.identification import equation as inverse_dynamics
 from bywire.identification.estimate import as_object
-from bywire.identification.loss import Loss
+from bywire.identification.least_squares import Loss
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
 

@@ -17,11 +17,9 @@ from bywire.core.errors import ParameterError
 from bywire.data.file_format import Progress, no_progress
 from bywire.data.named_columns import NamedColumns
 from bywire.identification.fitting.question import Question
-from bywire.identification.measured import Measured, measured, name_of
+from bywire.identification.measured import Measured, measured, name_of, require_signals
 from bywire.identification.method import Effort, Identified
-from bywire.identification.records import require_signals
-from bywire.identification.simulated_experiments import displaced
-from bywire.identification.trust import put_in
+from bywire.identification.trust import displaced, put_in
 from bywire.report.answer import use_case
 
 if TYPE_CHECKING:

@@ -19,8 +19,8 @@ from bywire.data.file_format import Progress, no_progress
 from bywire.data.named_columns import NamedColumns
 from bywire.identification.measured import measured, name_of
 from bywire.identification.replaying import bench_replay, tracking
+from bywire.identification.replaying.bench_replay import case_of
 from bywire.identification.replaying.fit import judged
-from bywire.identification.replaying.measured_run import case_of
 from bywire.identification.replaying.segments import (
     Segment,
     found_in,

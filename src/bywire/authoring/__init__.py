@@ -97,7 +97,7 @@ if TYPE_CHECKING:
     from bywire.identification.least_squares import Problem, estimate
     from bywire.identification.measured import measured, wrong_sign
     from bywire.identification.method import METHODS, Check, Curve, Effort, Identified, Method
-    from bywire.identification.moved_run import moved_run
+    from bywire.identification.output_error import moved_run
     from bywire.identification.replaying.tracking import track
     from bywire.identification.residuals import lack_of_fit
     from bywire.identification.unknown import Unknown, parameters_of
@@ -176,7 +176,7 @@ _HOMES = {
     "identification.estimate": "Estimate",
     "identification.least_squares": "Problem estimate",
     "identification.measured": "measured wrong_sign",
-    "identification.moved_run": "moved_run",
+    "identification.output_error": "moved_run",
     "identification.replaying.tracking": "track",
     "identification.method": "METHODS Check Curve Effort Identified Method",
     "identification.residuals": "lack_of_fit",

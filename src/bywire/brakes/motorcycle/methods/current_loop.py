@@ -22,9 +22,9 @@ from bywire.identification.electrics.loop_records import (
     require_steps,
     without_lead,
 )
+from bywire.identification.measured import split
 from bywire.identification.method import Effort, Identified, Method
 from bywire.identification.output_error import Trial, trial
-from bywire.identification.records import split
 from bywire.simulation.run import simulate
 
 _GAINS = ("ecu.current.k_p", "ecu.current.k_i")
