@@ -22,7 +22,7 @@ from bywire.core.quantities import Stiffness
 from bywire.core.signals import signals_of, zeros
 from bywire.core.subassembly import Sub
 from bywire.simulation.compiler import find_compiler
-from bywire.simulation.model_check import check_model
+from bywire.simulation.program import check_model
 from bywire.simulation.run import Run, simulate
 from systems.ram_pair import BOTH, PAR, Coupled, Pair, PairParameters, Ram
 

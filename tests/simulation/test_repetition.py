@@ -19,7 +19,7 @@ from bywire.analysis.response.frequency_response import frequency_response
 from bywire.core.catalog import parameters
 from bywire.core.errors import SolverError
 from bywire.core.interrupts import thread_pool
-from bywire.simulation import window as part
+from bywire.simulation import repetition as part
 from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
 

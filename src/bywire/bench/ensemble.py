@@ -25,9 +25,8 @@ from bywire.core.leaf import Leaf
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.typing import Array
 from bywire.simulation import ensemble
-from bywire.simulation.ensemble import Ensemble
+from bywire.simulation.ensemble import Ensemble, Variations
 from bywire.simulation.run import Run
-from bywire.simulation.variations import Variations
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from bywire.core.errors import StepError
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
-from bywire.simulation.changes import Change
+from bywire.simulation.advance import Change
 from bywire.simulation.run import Run
 from bywire.simulation.schedule import plan
 

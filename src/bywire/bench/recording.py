@@ -17,7 +17,7 @@ from bywire.bench.rows import Rows
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
 from bywire.core.version import __version__
-from bywire.simulation.changes import put_in_signals
+from bywire.simulation.advance import put_in_signals
 from bywire.simulation.run import Run, Trajectory, doubts_of
 from bywire.simulation.run_group import RunGroup
 

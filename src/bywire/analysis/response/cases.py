@@ -12,8 +12,8 @@ from bywire.analysis.response.dataset import Sweep
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.simulation.engine import structure_of
+from bywire.simulation.ensemble import case_matrix
 from bywire.simulation.run import Run
-from bywire.simulation.variations import case_matrix
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,8 +13,8 @@ import xarray as xr
 from bywire.analysis.response.saturation import Saturation
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array, Complex
+from bywire.simulation.ensemble import Variations
 from bywire.simulation.run import Run
-from bywire.simulation.variations import Variations
 
 
 @dataclass(frozen=True)
