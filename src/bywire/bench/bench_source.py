@@ -12,8 +12,7 @@ from bywire.bench.experiment_choice import former_names
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.core.catalog import PARAMETER_SETS, main_set, sets_of_loaded
 from bywire.core.errors import ParameterError
-from bywire.data.file_kinds import BENCH
-from bywire.data.meant_file import first_there, near_files
+from bywire.data.file_kinds import BENCH, first_there, near_files
 
 _NAME = re.compile(r"[a-z][a-z0-9-]*")
 _FOLDER = "benches"  # where bench files usually are

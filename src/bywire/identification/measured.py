@@ -23,8 +23,7 @@ from bywire.data.alignment import resample
 from bywire.data.channel_quality import AlignmentReport
 from bywire.data.column_units import measures, unit_of_symbol
 from bywire.data.file_format import Progress, no_progress
-from bywire.data.mapping import MeasurementMapping
-from bywire.data.mapping_file import read_mapping
+from bywire.data.mapping import MeasurementMapping, read_mapping
 from bywire.data.named_columns import NamedColumns, read_named, renamed
 from bywire.identification.noise import noise_of
 

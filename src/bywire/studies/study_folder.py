@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from bywire.core.errors import FileError
-from bywire.data.file_kinds import STUDY, kind_of_file
-from bywire.data.meant_file import first_there
+from bywire.data.file_kinds import STUDY, first_there, kind_of_file
 
 RECORD = "study.json"
 """file that says which study a folder holds"""
