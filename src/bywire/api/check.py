@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bywire.contracts.finding import Finding, one_by_cause
+from bywire.contracts.evidence import Finding, one_by_cause
 from bywire.contracts.subjects import demands_on
 from bywire.core.brake import brakes, load_system, loaded_files
 from bywire.report.answer import Answer, use_case
