@@ -18,10 +18,8 @@ from bywire.core.arguments import whole_number
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array, silent
 from bywire.core.units import difference_unit
-from bywire.life.life_file import CONDITIONS, WEAR, read_life
-from bywire.life.one_by_one import one_by_one
-from bywire.life.plan import CONDITION, LifePlan
-from bywire.life.projection import CONFIDENCE, Projection, projected
+from bywire.life.life_file import CONDITION, CONDITIONS, WEAR, LifePlan, read_life
+from bywire.life.projection import CONFIDENCE, Projection, one_by_one, projected
 from bywire.report.answer import Answer, use_case
 from bywire.report.changes import defaults_of, value_changes
 from bywire.report.document import (

@@ -16,8 +16,7 @@ from bywire.bench.running import Progress
 from bywire.campaigns.campaign_file import read_campaign
 from bywire.campaigns.findings import CampaignFindings, FaultFinding
 from bywire.campaigns.residual import NEVER
-from bywire.campaigns.running import complete
-from bywire.campaigns.store import CampaignStore
+from bywire.campaigns.running import CampaignStore, complete
 from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array, silent

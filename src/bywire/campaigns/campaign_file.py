@@ -14,11 +14,17 @@ from bywire.bench.experiment import Case
 from bywire.bench.faults.fault_section import require_admissible
 from bywire.bench.faults.modes import Mode, modes_of
 from bywire.bench.values import number, written
-from bywire.campaigns.criterion import read_criteria
 from bywire.campaigns.declared import CAMPAIGNS
-from bywire.campaigns.plan import CampaignPlan, Failing, Reaction, evenly, touch_alike
+from bywire.campaigns.judging import require_small
+from bywire.campaigns.plan import (
+    CampaignPlan,
+    Failing,
+    Reaction,
+    evenly,
+    read_criteria,
+    touch_alike,
+)
 from bywire.campaigns.residual import Residual, residuals_of
-from bywire.campaigns.simulating import require_small
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.signals import signals_of
 from bywire.data.file_kinds import CAMPAIGN, require_kind

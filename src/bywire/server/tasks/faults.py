@@ -25,7 +25,7 @@ def _plan(asked: Mapping[str, Any], place: Place) -> CampaignPlan:
 
 
 def _begun(asked: Mapping[str, Any], place: Place, folders: Sequence[Path]) -> Path | None:
-    from bywire.campaigns.store import CampaignStore
+    from bywire.campaigns.running import CampaignStore
 
     plan = _plan(asked, place)
     return next((each for each in folders if CampaignStore(each).holds(plan)), None)

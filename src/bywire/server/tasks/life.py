@@ -15,7 +15,7 @@ from bywire.server.place import Place
 from bywire.server.task import Task
 
 if TYPE_CHECKING:
-    from bywire.life.plan import LifePlan
+    from bywire.life.life_file import LifePlan
 
 
 def _plan(asked: Mapping[str, Any], place: Place) -> LifePlan:
