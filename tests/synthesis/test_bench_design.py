@@ -13,8 +13,8 @@ import pytest
 from bywire.analysis.crossings import measured_margin
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.margins import margins
-from bywire.analysis.response.dataset import Sweep, complex_values
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep, complex_values
 from bywire.api.loop_case import loop_case
 from bywire.api.verification_parts import verdict_text, verification_parts
 from bywire.bench.bench import Bench

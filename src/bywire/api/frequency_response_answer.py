@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.analysis.response.frequency_response import largest
 from bywire.analysis.response.large_signal import (
     Variant,
 )
-from bywire.analysis.response.step_share import largest
 from bywire.api.bandwidth_tables import (
     NOTE,
     figures_object,

@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.rates import rates
+from bywire.analysis.linear.linear_model import LinearModel, rates
 from bywire.analysis.locus import Locus
-from bywire.analysis.periodic.averaged_map import PeriodicModel
-from bywire.analysis.reduction.error import ReductionError
-from bywire.analysis.reduction.reduce import TOLERANCE, Reduced, reduce
+from bywire.analysis.periodic import PeriodicModel
+from bywire.analysis.reduction import TOLERANCE, Reduced, ReductionError, reduce
 from bywire.bench.values import number
 from bywire.core.errors import ParameterError, quoted
 from bywire.core.pairs import DIGITS, read_count

@@ -16,10 +16,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bywire.analysis.linear.closed_loop import closed_loop
     from bywire.analysis.linear.linear_model import LinearModel
     from bywire.analysis.linear.linearize import linearize
     from bywire.analysis.linear.plant import Plant, PlantPoint
+    from bywire.analysis.linear.sampled_loops import closed_loop
     from bywire.analysis.loop import LOOPS, Loop, Point, Quantity
     from bywire.bench.bench import Bench
     from bywire.bench.experiment import Case, Experiment, Recordings, as_run, fixed
@@ -164,7 +164,7 @@ _HOMES = {
     "report.line_role": "Role:LineRole",
     # loops, plants, studies
     "analysis.loop": "LOOPS Loop Point Quantity",
-    "analysis.linear.closed_loop": "closed_loop",
+    "analysis.linear.sampled_loops": "closed_loop",
     "analysis.linear.linear_model": "LinearModel",
     "analysis.linear.linearize": "linearize",
     "analysis.linear.plant": "Plant PlantPoint",

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from bywire.analysis.linear.rates import STILL
+from bywire.analysis.linear.linear_model import STILL
 from bywire.report import style
 from bywire.report.s_plane import draw_plane, planes, shown_radius
 

@@ -10,7 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from bywire.analysis.linear.rates import STILL
+from bywire.analysis.linear.linear_model import STILL
 from bywire.analysis.locus import Border, Locus
 from bywire.core.typing import Array
 from bywire.report import style

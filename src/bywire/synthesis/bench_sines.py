@@ -22,9 +22,8 @@ import numpy as np
 from bywire.analysis.crossings import Margin, fall, measured_margin
 from bywire.analysis.linear.corners import taking
 from bywire.analysis.loop import Loop
-from bywire.analysis.response.dataset import Sweep, complex_values
 from bywire.analysis.response.frequency_response import frequency_response
-from bywire.analysis.response.window import common_interval, nyquist
+from bywire.analysis.response.sweep import Sweep, common_interval, complex_values, nyquist
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array, Complex
 from bywire.simulation.run import Run

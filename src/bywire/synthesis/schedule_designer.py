@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from bywire.analysis.loop import Loop
+from bywire.analysis.loop import Loop, LoopSchedule
 from bywire.analysis.loop_figures import LoopFigures
-from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Progress

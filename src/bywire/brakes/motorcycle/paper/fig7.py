@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.analysis.crossings import bandwidth, fall
-from bywire.analysis.response.dataset import complex_values
+from bywire.analysis.response.sweep import complex_values
 from bywire.bench.result import Result
 from bywire.brakes.motorcycle.linear.pressure_loop import BAND, PressureLoop, cancelling_pi
 from bywire.brakes.motorcycle.paper import facts

@@ -8,11 +8,11 @@ from typing import cast
 
 import numpy as np
 
-from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.linearize import linearize
+from bywire.analysis.linear.sampled_loops import closed_loop
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep
 from bywire.benchmark.linear_batch import linearize_many
 from bywire.benchmark.peers.python_control import by_differences, nonlinear_system
 from bywire.benchmark.result import Result, at_least, at_most
