@@ -1,7 +1,7 @@
 """Programs and kernels of models, built once per structure, and which engine serves.
 
-To know which compiled kernel is a model's, its whole graph had to be built, simplified and emitted
-again. Kept is what runs need beside the library: its name and digest, the layout of the state
+To find the compiled kernel of a model, a command would have to build, simplify and emit its whole
+graph again. So an earlier command keeps what runs need beside the library: its name and digest, the layout of the state
 vector, and the Jacobians that judge the contacts; of kernels in lanes one for every choice of
 outputs. All else is built when it is asked for.
 

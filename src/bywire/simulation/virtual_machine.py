@@ -1,6 +1,6 @@
 """Fallback without a compiler: CasADi's virtual machine evaluates the same functions.
 
-The same as the functions of ``rare_text``; ``emit_rare`` says why.
+A substep in which a velocity passes zero is cut there, as the C text of ``emit_rare`` cuts it.
 """
 
 from __future__ import annotations
