@@ -208,7 +208,7 @@ def energy_doubts_of_cases(
 def _losses(runs: Sequence[Run]) -> Collection[str] | None:
     """Return the losses that grow whatever happens; None for all.
 
-    In the loss of a contact stands what a change of its parameters does, see `simulation.changes`.
+    In the loss of a contact stands what a change of its parameters does, see `simulation.advance`.
     """
     return runs[0].model.Flow._fields if any(run.changes for run in runs) else None
 

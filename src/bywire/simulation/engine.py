@@ -1,9 +1,9 @@
 """Programs and kernels of models, built once per structure, and which engine serves.
 
 To find the compiled kernel of a model, a command would have to build, simplify and emit its whole
-graph again. So an earlier command keeps what runs need beside the library: its name and digest, the layout of the state
-vector, and the Jacobians that judge the contacts; of kernels in lanes one for every choice of
-outputs. All else is built when it is asked for.
+graph again. So an earlier command keeps what runs need beside the library: its name and digest,
+the layout of the state vector, and the Jacobians that judge the contacts; of kernels in lanes one
+for every choice of outputs. All else is built when it is asked for.
 
 A stale entry would be a wrong number in silence. So kept are only our own models, whose files are
 all in `source_state`: what another's model is made of, tables read from elsewhere for instance,

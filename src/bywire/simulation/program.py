@@ -129,7 +129,7 @@ class Program:
     parameter_ranges
         Names in the order of the parameter vector, each with its admissible range.
     contact_jacobians
-        ``(x, m, p)`` -> Jacobians of dx/dt, see ``stiff_contacts.contact_jacobians``.
+        ``(x, m, p)`` -> Jacobians of dx/dt, see ``contacts.contact_jacobians``.
     fast, exact
         ``(x, d, m, p, h) -> (x, d, reaction, flow, jump, flag, doubt)``, see ``scheme.Pass``; the
         flag is up where the pass is in doubt or a velocity turns round.

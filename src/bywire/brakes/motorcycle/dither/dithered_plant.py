@@ -57,7 +57,7 @@ def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPla
     p
         Mean pressure [Pa], > 0.
     step
-        Substep [s]; see `averaged_map.STEPS`.
+        Substep [s]; see `periodic.STEPS`.
 
     Raises
     ------
