@@ -68,7 +68,7 @@ NEWEST_TESTS = [
         "campaigns/test_campaign_runs.py",
         "synthesis/test_design_floors.py",
         "contracts/test_gates_can_fail.py",
-        "benchmark/test_suite.py",
+        "benchmarks/test_suite.py",
         "simulation/test_run_outcomes.py",
         "analysis/test_margins.py",
         "life/test_life_file.py",

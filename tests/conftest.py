@@ -17,7 +17,7 @@ def pytest_collection_finish() -> None:
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
     """Yield a browser; without one, tests that ask for it say that they are skipped, and why."""
-    from bywire.benchmark.browser import browser
+    from benchmarks.browser import browser
     from bywire.core.errors import RunError
 
     try:

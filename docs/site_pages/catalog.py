@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
+from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.api.describe import Description, described
 from bywire.api.described_faults import fault_summaries
 from bywire.bench.experiment import EXPERIMENTS
@@ -117,6 +118,29 @@ def faults_page() -> str:
     ]
     rows = ([f"`{name}`", plain(summary)] for name, summary in fault_summaries().items())
     return "\n".join([*lines, *table_lines(["fault", "what happens"], rows)])
+
+
+def loop_figures_page() -> str:
+    """Return the page of the figures of loops, a line each."""
+    lines = [
+        "# Figures of loops",
+        "",
+        "What `--require` of `bywire design` and a file of requirements limit, by either name; "
+        "`bywire margins --json` gives those that have a second name by it.",
+        "",
+    ]
+    rows = (
+        [
+            f"`{figure.name}`",
+            f"`{figure.margin}`" if figure.margin else "",
+            "" if figure.unit == "1" else figure.unit,
+            "less" if figure.is_less_better else "more",
+            plain(figure.meaning),
+        ]
+        for figure in LOOP_FIGURES.values()
+    )
+    headings = ["figure", "in `margins`", "unit", "better", "meaning"]
+    return "\n".join([*lines, *table_lines(headings, rows)])
 
 
 def brakes_page() -> str:

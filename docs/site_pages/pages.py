@@ -27,6 +27,7 @@ def texts() -> Iterator[tuple[str, str]]:
     for topic in catalog.TOPICS:
         yield f"{topic}.md", catalog.page(topic)
     yield "faults.md", catalog.faults_page()
+    yield "loop-figures.md", catalog.loop_figures_page()
     yield "commands.md", commands.page()
     yield "python.rst", python_names.page()
     yield "authoring.rst", python_names.authoring_page()

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.requirements import check, judge
+from bywire.bench.requirements import judge, read_limits
 from bywire.core.errors import ParameterError, UnitError, UnknownNameError
 
 KPIS = {"overshoot": "%", "rise_time": "s", "steady_state_error": "Pa", "share_stuck": "1"}
@@ -15,8 +15,8 @@ KPIS = {"overshoot": "%", "rise_time": "s", "steady_state_error": "Pa", "share_s
 
 def met(name: str, text: str, value: float) -> bool:
     """Return whether one requirement is met by one value."""
-    check({name: text}, KPIS)
-    (verdict,) = judge({name: text}, [Kpi(name, value, KPIS[name], "Of this test.")])
+    limits = read_limits({name: text}, KPIS)
+    (verdict,) = judge(limits.values(), [Kpi(name, value, KPIS[name], "Of this test.")])
     assert (verdict.kpi, verdict.limit, verdict.unit) == (name, text, KPIS[name])
     return verdict.met
 
@@ -77,4 +77,4 @@ def test_share_takes_both_spellings(text):
 )
 def test_what_cannot_be_judged_is_refused(name, text, error, message):
     with pytest.raises(error, match=message):
-        check({name: text}, KPIS)
+        read_limits({name: text}, KPIS)

@@ -70,3 +70,7 @@ def test_what_a_library_prints_is_no_result(capsys, monkeypatch, tmp_path, error
         write_measurement(data, tmp_path / "a.mf4")
     assert capsys.readouterr().out == ""
     assert list(tmp_path.iterdir()) == []
+
+
+def test_help_shows_units_in_brackets(bywire):
+    assert "p_set=Demand [bar]" in bywire("identify", "--help").out

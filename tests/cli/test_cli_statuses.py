@@ -45,6 +45,12 @@ def test_bad_input_is_2(bywire, bench):
     refused(bywire("run", bench(BRAKING + '[set]\nmotor.R_m = "-1 ohm"\n')), "must be > 0 ohm")
 
 
+def test_benchmarks_are_those_of_a_clone(bywire, process, tmp_path, monkeypatch):
+    refused(process("benchmark", "comands"), "part of the benchmark 'comands'", "did you mean")
+    monkeypatch.setattr("bywire.cli.bench_commands.__file__", str(tmp_path / "a/b/c/d.py"))
+    refused(bywire("benchmark"), "benchmarks come with a clone", "tasks.py")
+
+
 def test_failed_run_is_3(bywire, bench):
     stimulus = '[stimulus]\nkind = "step"\nstart = 0\nend = "1e300 A"\nt_step = "5 ms"\n'
     outcome = bywire("run", bench(OPEN_LOOP + stimulus), "--json")

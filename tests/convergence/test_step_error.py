@@ -16,7 +16,7 @@ from bywire.bench.bench_file import read
 from bywire.bench.ensemble import run_benches
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.requirements import judge
+from bywire.bench.requirements import judge, read_limit
 from bywire.bench.running import run
 from bywire.bench.step_error import OTHER_STEPS, SPREAD, steps_of, with_step_errors
 from bywire.core.errors import BywireError, RunError, StepError
@@ -80,7 +80,7 @@ def test_a_figure_that_agrees_by_chance_leaves_its_requirement_undecided():
     """The hold power of a rubbing brake: at 5 us it is 0.13 W lower than at 20 us."""
     figure = estimated(22.35168, {0.5: 22.34791, 2.0: 22.32283})
     assert not figure.converges
-    (verdict,) = judge({"energy": "<= 22.3 J"}, [figure])
+    (verdict,) = judge([read_limit("energy", "<= 22.3 J", "J")], [figure])
     assert verdict.outcome == "undecided"
 
 
@@ -104,7 +104,7 @@ def test_differences_within_rounding_show_nothing():
     ],
 )
 def test_what_is_closer_to_its_limit_than_its_error_is_undecided(value, error, expected):
-    (verdict,) = judge({"energy": "<= 1.1 J"}, [kpi(value, error)])
+    (verdict,) = judge([read_limit("energy", "<= 1.1 J", "J")], [kpi(value, error)])
     assert verdict.outcome == expected
     assert verdict.met == (expected == "met")
 

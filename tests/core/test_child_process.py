@@ -109,7 +109,8 @@ def marks(folder: Path) -> str:
 def test_marks_are_left_by_what_is_run(planted: Path) -> None:
     subprocess.run([sys.executable, "-c", "import ziglang"], capture_output=True, check=False)
     subprocess.run(["cc"], check=False)
-    assert marks(planted).split() == ["ziglang", "program", "cc"]
+    # From Python 3.13 on, -c loads linecache first.
+    assert marks(planted).split()[-3:] == ["ziglang", "program", "cc"]
 
 
 @posix
@@ -234,7 +235,6 @@ def test_a_compiler_writes_elsewhere_where_home_takes_nothing(
 
 
 def test_processes_are_started_in_one_place() -> None:
-    """Elsewhere only by benchmarks, which measure commands as users start them."""
     starting = re.compile(
         r"subprocess\.(run|Popen|call|check_)|sys\.executable|shutil\.which|os\.(system|exec|spawn)"
     )
@@ -243,4 +243,4 @@ def test_processes_are_started_in_one_place() -> None:
         for path in SOURCES.rglob("*.py")
         if starting.search(path.read_text(encoding="utf-8").replace("subprocess.Popen[", ""))
     }
-    assert {each for each in places if "benchmark" not in each} == {"core/child_process.py"}
+    assert places == {"core/child_process.py"}

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from bywire.analysis.crossings import Margin
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.requirements import Verdict
+from bywire.bench.requirements import Verdict, read_limit
 
 UNDEFINED = float("nan")  # another object than math.nan, which fields have by default
 
@@ -14,7 +14,7 @@ UNDEFINED = float("nan")  # another object than math.nan, which fields have by d
 def test_undefined_numbers_are_equal_and_numbers_differ():
     for one in (
         Kpi("overshoot", UNDEFINED, "%", "How far.", "no step"),
-        Verdict("overshoot", "<= 5 %", UNDEFINED, "%", False, "no step"),
+        Verdict(read_limit("overshoot", "<= 5 %", "%"), UNDEFINED, False, "no step"),
         Margin(UNDEFINED, UNDEFINED),
     ):
         changes = {"value": float("nan")} if hasattr(one, "value") else {"phase": float("nan")}

@@ -9,9 +9,9 @@ from bywire.life import life_file
 from bywire.studies import study_file
 
 KEYS = {
-    STUDY: set(study_file._KEYS),
-    CAMPAIGN: set(campaign_file._KEYS),
-    LIFE: set(life_file._KEYS),
+    STUDY: {*study_file.StudyFile.model_fields},
+    CAMPAIGN: {*campaign_file.CampaignFile.model_fields},
+    LIFE: {*life_file.LifeFile.model_fields},
 }
 
 

@@ -59,7 +59,7 @@ def test_stops_that_differ_in_pauses_alone_are_simulated_once(plan_of):
         ('lfe = "wedge-pads"', r"unknown key of a life file 'lfe': did you mean 'life'"),
         ("[set]", r"life is missing: write life ="),
         ('life = "wedge-pad"', r"unknown life 'wedge-pad': did you mean 'wedge-pads'"),
-        ("life = 3", r"life = 3: a text is wanted"),
+        ("life = 3", r"life = 3: write life ="),
         ('life = "wedge-pads"\nset = 1', r"\[set\] must be a section"),
         ('life = "wedge-pads"\n[set]\nwear.h_ne = "1 mm"', r"'h_ne': did you mean 'h_new'"),
         ('life = "wedge-pads"\n[set]\nwear.h_new = 9', r"write the value as a text, with its unit"),
@@ -77,7 +77,7 @@ def test_stops_that_differ_in_pauses_alone_are_simulated_once(plan_of):
         ('life = "wedge-pads"\n[projection]\nstop = 3', r"did you mean 'stops'"),
         ('life = "wedge-pads"\n[projection]\nstops = 1', r"whole number from 2 to 4096"),
         ('life = "wedge-pads"\n[projection]\nstops = 2.5', r"whole number"),
-        ('life = "wedge-pads"\n[projection]\nshare = "90 %"', r"between 0.1 % and 50 %"),
+        ('life = "wedge-pads"\n[projection]\nshare = "90 %"', r">= 0.1 % and <= 50 %"),
         ('life = "wedge-pads"\n[projection]\nshare = "5 mm"', r"share"),
     ],
 )

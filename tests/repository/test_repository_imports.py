@@ -83,6 +83,10 @@ def test_recordings_are_known_in_the_bench():
     assert "bench/recording.py" in importers("xarray")
 
 
+def test_the_wheel_needs_no_benchmarks():
+    assert importers("benchmarks") == set()
+
+
 @pytest.mark.parametrize("library", ["pickle", "marshal", "shelve", "dill", "cloudpickle", "yaml"])
 def test_nothing_reads_formats_that_execute(library):
     assert importers(library) == set()

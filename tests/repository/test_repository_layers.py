@@ -126,7 +126,6 @@ NAMED = {
     "src/bywire/core/sources.py": "rooms whose files shape models, of which it loads none",
     "src/bywire/bench/computation.py": "rooms whose definitions count, of which it loads none",
     "src/bywire/api/new.py": "files that are copied and not run",
-    "src/bywire/benchmark/commands.py": "a command in a process of its own",
 }
 
 
@@ -164,7 +163,7 @@ def equations() -> list[Path]:
     calling = re.compile(r"^from bywire\.core(?: import .*\bops\b|\.ops )", re.MULTILINE)
     for path in PACKAGE.glob("brakes/*/**/*.py"):
         room = path.relative_to(PACKAGE).parts[2]
-        if room not in ("benchmarks", "methods") and calling.search(path.read_text("utf-8")):
+        if room != "methods" and calling.search(path.read_text("utf-8")):
             listed.add(path)
     return sorted(listed)
 

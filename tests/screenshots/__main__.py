@@ -14,7 +14,7 @@ from pathlib import Path
 if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from bywire.benchmark.browser import browser
+from benchmarks.browser import browser
 from screenshots.compared import difference
 from screenshots.subjects import SUBJECTS, without_site
 from screenshots.taken import path_of, store, stored, taken

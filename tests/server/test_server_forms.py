@@ -83,7 +83,7 @@ def options_of(task: Task) -> dict[str, str]:
     found = {}
     for option in command.params:
         name = option.name if option.name in fields else CALLED.get(option.name, option.name)
-        found[name] = option.help
+        found[name] = option.help.replace("\\[", "[")
     return {name: said for name, said in found.items() if name not in ALL}
 
 

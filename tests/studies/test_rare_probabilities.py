@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from bywire.bench.requirements import read_limit
 from bywire.studies.failure_probability import FailureProbability
 from bywire.studies.importance_sampling import importance_sampling
 from bywire.studies.limit_state import BEYOND, BudgetSpentError, margins_of
@@ -180,10 +181,13 @@ def test_what_is_said_where_there_is_nothing_to_find():
 
 def test_cases_without_a_figure_fail():
     given = np.array([14.0, 15.0, 16.0, np.nan, np.inf])
-    assert margins_of(given, "<=", 15.0)[[0, 2, 3]].tolist() == [1.0, -1.0, BEYOND]
-    assert (margins_of(given, "<=", 15.0) > 0).tolist() == [True, True, False, False, False]
-    assert (margins_of(given, "<", 15.0) > 0).tolist() == [True, False, False, False, False]
-    assert (margins_of(given, ">=", 15.0) > 0).tolist() == [False, True, True, False, True]
+    at_most, below, at_least = (
+        read_limit("overshoot", f"{sign} 15 %", "%") for sign in ("<=", "<", ">=")
+    )
+    assert margins_of(given, at_most)[[0, 2, 3]].tolist() == [1.0, -1.0, BEYOND]
+    assert (margins_of(given, at_most) > 0).tolist() == [True, True, False, False, False]
+    assert (margins_of(given, below) > 0).tolist() == [True, False, False, False, False]
+    assert (margins_of(given, at_least) > 0).tolist() == [False, True, True, False, True]
 
     def failing(z):  # beyond the plane no case has a result
         return np.where(plane(z) > 0.0, plane(z), BEYOND)

@@ -51,7 +51,7 @@ overshoot = "<= 15 % with 99.9 %"
     assert (plan.design, plan.seed, plan.confidence) == ("latin-hypercube", 3, 0.99)
     assert (plan.cases, plan.chunks, plan.total) == (100, 2, 128)  # whole hypercubes
     assert plan.bench.requirements == {"peak_current": "<= 25 A", "overshoot": "<= 15 %"}
-    assert [d.text for d in plan.demands][1] == "overshoot <= 15 % with 99.9 %"
+    assert str(plan.demands[1]) == "overshoot <= 15 % with 99.9 %"
     values = plan.values(0)
     ratio = values["ecu.est_par.K_e"] / plan.bench.par.ecu.est_par.K_e
     np.testing.assert_allclose(ratio, values["motor.K_e"] / plan.bench.par.motor.K_e)
@@ -118,7 +118,10 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
         ),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\ncases = 0', ["cases = 0", "from 1"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nkind = "sobl"', ["'sobl'", "'sobol'"]),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nconfidence = "100 %"', ["below 100 %"]),
+        (
+            '[vary]\n"motor.R_m" = "+-5 %"\n[design]\nconfidence = "100 %"',
+            ["[design] confidence = '100 %' must be >= 50 % and < 100 %"],
+        ),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[desing]\ncases = 1', ["'desing'", "'design'"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershot = "<= 15 %"', ["'overshoot'"]),
         (
@@ -157,7 +160,7 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
         ('[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nvalue = 0.5', ["of is missing"]),
         (
             '[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nof = [["a"], "b"]\nvalue = 0.5',
-            ["quantity of [[correlation]]"],
+            ["of = [['a'], 'b']: write for instance of = "],
         ),
         (
             '[vary]\n"motor.R_m" = "+-5 %"\n[simulation]\nstep = "10 us"',
@@ -181,11 +184,11 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
             '[vary]\n"motor.R_m" = "+-5 %"\n[design]\ntime = 5',
             ["[design] time = 5 has the wrong unit", "'1.5 s'"],
         ),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\ntime = 0', ["time = 0 must be above zero"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\ntime = 0', ["time = 0 must be > 0 s"]),
         (
             '[vary]\n"motor.R_m" = "+-5 %"\n"motor.K_e" = "+-5 %"\n[[correlation]]\n'
             'of = ["motor.R_m", "motor.K_e"]\nvalue = 1.0',
-            ["between -1 and 1"],
+            ["[[correlation]] value = 1.0 must be > -1 and < 1"],
         ),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[set]\n"motor.K_e" = 0.3', ["write the value as a text"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nlevels = 3', ["levels", "'monte-carlo'"]),

@@ -84,7 +84,7 @@ def test_what_drives_missed_requirements_comes_first(study):
     columns = {each: rng.uniform(0.5, 0.9, 128) for each in (*names, *QUANTITIES)}
     columns |= {CASE: np.arange(128), "overshoot": rng.uniform(0.5, 1.5, 128), FAILURE: ""}
     findings = Findings(plan, pd.DataFrame(columns), ())
-    outcomes = {each.demand.kpi: each.outcome for each in findings.judgments}
+    outcomes = {each.demand.figure: each.outcome for each in findings.judgments}
     assert outcomes == {"dead_time": "met", "rise_time": "undecided", "overshoot": "missed"}
     titles = [each.title.split(",")[0] for each in influence_tables(findings)]
     assert titles == [f"what drives {name}" for name in ("overshoot", "rise_time", "dead_time")]

@@ -12,6 +12,7 @@ import pytest
 
 from bywire.analysis.crossings import measured_margin
 from bywire.analysis.loop import LOOPS
+from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.analysis.margins import margins
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.sweep import Sweep, complex_values
@@ -28,7 +29,7 @@ from bywire.synthesis.candidate import Candidate, bench_slacks, judged, linear_s
 from bywire.synthesis.linear_case import NOMINAL, cases_of
 from bywire.synthesis.optimizer import Problem
 from bywire.synthesis.outcome import bench_text
-from bywire.synthesis.requirement import FIGURES, read
+from bywire.synthesis.requirement import read
 from bywire.synthesis.trial import Trial
 from bywire.synthesis.verification import Verification, verify
 
@@ -145,7 +146,7 @@ def test_the_edge_between_two_requirements() -> None:
 def test_what_the_bench_cannot_show_is_the_linear_models() -> None:
     small = Small(1e5, 12.0, 0.9, math.nan, math.inf, 1.1, True)
     requirements = read(["bandwidth >= 10 Hz", "phase margin >= 60 deg", "disk margin >= 1"])
-    linear = {one.text: 0.3 for one in requirements}
+    linear = {str(one): 0.3 for one in requirements}
     found = bench_slacks(requirements, BenchFigures((small,), {}), linear)
     assert found["bandwidth >= 10 Hz"] == pytest.approx(0.9 * math.sqrt(2.0) - 1.0)
     assert found["phase_margin >= 60 deg"] < 0.0  # it crosses over beyond what was measured
@@ -176,7 +177,7 @@ def test_what_is_not_defined_says_why(peak: float, crossover: float, why: str) -
     step = {"overshoot": math.nan}
     figures = BenchFigures((small,), step, {"overshoot": "the response never moves"})
     one = Candidate({}, figures, {"overshoot <= 1 %": 0.1}, shown={"overshoot <= 1 %": (1, 1)})
-    nominal = dict.fromkeys(FIGURES, 1.0)
+    nominal = dict.fromkeys(LOOP_FIGURES, 1.0)
     parts = verification_parts(loop_case("pressure"), nominal, Verification(one, None, (), nominal))
     texts = [part for part in parts if isinstance(part, str)]
     assert any(why in text for text in texts)
@@ -187,8 +188,8 @@ def test_a_verdict_says_where_it_was_computed() -> None:
     """Sines without a phase margin leave it to the linear model; a gain margin always is there."""
     wanted = read(["bandwidth >= 1 Hz", "phase_margin >= 60 deg", "gain_margin >= 2"])
     small = Small(1e5, 4.0, 0.9, math.nan, math.nan, 1.0, True)
-    linear = dict.fromkeys((each.text for each in wanted), 0.1)
-    nominal = dict.fromkeys(FIGURES, 1.0)
+    linear = dict.fromkeys(map(str, wanted), 0.1)
+    nominal = dict.fromkeys(LOOP_FIGURES, 1.0)
 
     def verdict(*sines: Small, missed: str = "") -> tuple[str, list[str]]:
         slacks = {**linear, missed: -0.1} if missed else linear

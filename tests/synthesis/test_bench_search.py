@@ -19,7 +19,7 @@ from bywire.synthesis.requirement import read
 REQUIRED = read(
     ["bandwidth >= 10 Hz", "phase margin >= 60 deg", "overshoot <= 15 %", "disk margin >= 0.5"]
 )
-BANDWIDTH, PHASE, OVERSHOOT, DISK = (wanted.text for wanted in REQUIRED)
+BANDWIDTH, PHASE, OVERSHOOT, DISK = map(str, REQUIRED)
 _CROSSED = 5.0
 
 

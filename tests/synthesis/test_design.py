@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.loop_figures import LoopFigures
-from bywire.analysis.margins import margins
+from bywire.analysis.loop_figures import LOOP_FIGURES, LoopFigures
+from bywire.analysis.margins import MARGINS, margins
 from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop
 from bywire.brakes.motorcycle.linear.rational import first_orders
 from bywire.core.catalog import main_set, parameters
@@ -19,7 +19,7 @@ from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNam
 from bywire.simulation.run import simulate
 from bywire.synthesis.designer import Design, design
 from bywire.synthesis.linear_case import NOMINAL, LinearCase, cases_of
-from bywire.synthesis.requirement import FIGURES, read
+from bywire.synthesis.requirement import read
 from few_starts import few_starts
 
 MEDIUM = first_orders("medium", 10.2e5, (0.096,), (1.25, 7.15, 0.104))
@@ -213,6 +213,7 @@ def test_the_same_seed_gives_the_same_gains() -> None:
         (("bandwidth >= 10 Hz", "bandwidth <= 5 Hz"), ParameterError, "contradict"),
         (("bandwidth >= 10 Hz", "bandwidth >= 5 Hz"), ParameterError, "twice"),
         (("bandwith >= 10 Hz",), UnknownNameError, "bandwidth"),
+        (("phase >= 60 deg", "phase_margin >= 50 deg"), ParameterError, "phase_margin is required"),
         (("bandwidth >= 10 bar",), UnitError, "Hz"),
         (("bandwidth >= 10",), UnitError, "Hz"),
         (("bandwidth 10 Hz",), ParameterError, "cannot be read"),
@@ -229,8 +230,20 @@ def test_requirements_that_are_refused(texts: Any, error: type[InputError], matc
 
 def test_limits_in_other_units() -> None:
     found = read(["gain_margin >= 6 dB", "phase-margin >= 1 rad", "settling time <= 200 ms"])
-    assert [one.limit for one in found] == pytest.approx([10**0.3, math.degrees(1.0), 0.2])
-    assert {one.figure for one in found} <= FIGURES.keys()
+    assert [one.bound for one in found] == pytest.approx([10**0.3, math.degrees(1.0), 0.2])
+    assert {one.figure for one in found} <= LOOP_FIGURES.keys()
+
+
+@pytest.mark.parametrize("margin", MARGINS)
+def test_a_requirement_may_name_a_figure_as_margins_do(margin: str) -> None:
+    figure = MARGINS[margin]
+    sign = "<=" if figure.is_less_better else ">="
+    size = {"deg": "60 deg", "Hz": "10 Hz", "s": "1 ms"}.get(
+        figure.unit, "0.5" if figure.high == 1.0 else "1.5"
+    )
+    (by_margin,), (by_name,) = (read([f"{name} {sign} {size}"]) for name in (margin, figure.name))
+    assert by_margin == by_name
+    assert str(by_margin) == f"{figure.name} {sign} {size}"
 
 
 def test_problems_that_are_refused() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.margins import SENSES, margins
+from bywire.analysis.margins import MARGINS, margins
 from bywire.bench.bench import Bench
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
@@ -158,7 +158,7 @@ def test_the_scheduled_set_has_more_margin_at_low_pressure_and_meets_the_paper()
             assert there.phase > other.phase + 9.0
             assert there.disk > other.disk + 0.15
         elif p == 20e5:
-            for name in SENSES:
+            for name in MARGINS:
                 assert getattr(there, name) == pytest.approx(getattr(other, name), rel=1e-9)
     assert found.step["overshoot"] < 8.0
     (known,) = bench_figures(

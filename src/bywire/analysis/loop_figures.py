@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, wraps
 
@@ -37,6 +37,128 @@ _NOISE_POINTS = 1000  # frequencies, evenly spaced
 _LEFT_AFTER = 10.0  # periods of the bandwidth: when an error counts as steady
 _SETTLED = 1e-4  # share of the slowest mode that may be left where a step response ends
 
+
+@dataclass(frozen=True)
+class LoopFigure:
+    """What a figure of a loop is called, measured in and good for.
+
+    Parameters
+    ----------
+    name
+        What requirements call it, and the attribute of `LoopFigures` that computes it.
+    unit
+        SI unit, ``"deg"`` or ``"%"``.
+    meaning
+        One line.
+    low, high
+        What any loop can have.
+    is_less_better
+        Whether a smaller value is better.
+    margin
+        Its name among `LoopMargins`; empty where it is not one of them.
+    title
+        Heading of tables; its name in words where empty.
+    in_decibel
+        Whether it is a factor that may also be given in dB.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    low: float = 0.0
+    high: float = math.inf
+    is_less_better: bool = False
+    margin: str = ""
+    title: str = ""
+    in_decibel: bool = False
+
+    @property
+    def heading(self) -> str:
+        """What tables of margins call it."""
+        return self.title or self.name.replace("_", " ")
+
+
+LOOP_FIGURES: Mapping[str, LoopFigure] = {
+    figure.name: figure
+    for figure in (
+        LoopFigure(
+            "bandwidth",
+            "Hz",
+            "lowest frequency at which the closed loop is at -3 dB",
+            margin="bandwidth",
+        ),
+        LoopFigure(
+            "crossover",
+            "Hz",
+            "highest frequency at which the loop gain falls to 1",
+            margin="crossover",
+        ),
+        LoopFigure(
+            "phase_margin",
+            "deg",
+            "smallest phase margin of all gain crossovers",
+            high=180.0,
+            margin="phase",
+        ),
+        LoopFigure(
+            "gain_margin",
+            "1",
+            "factor by which the loop gain may grow; also in dB",
+            low=1.0,
+            margin="gain",
+            in_decibel=True,
+        ),
+        LoopFigure(
+            "lower_gain_margin",
+            "1",
+            "factor to which the loop gain may fall; also in dB, below 0",
+            high=1.0,
+            is_less_better=True,
+            margin="lower_gain",
+            in_decibel=True,
+        ),
+        LoopFigure(
+            "delay_margin", "s", "dead time that the loop can take in addition", margin="delay"
+        ),
+        LoopFigure("disk_margin", "1", "symmetric disk margin", high=2.0, margin="disk"),
+        LoopFigure(
+            "sensitivity_peak",
+            "1",
+            "largest magnitude of 1/(1 + L)",
+            low=1.0,
+            is_less_better=True,
+            margin="sensitivity",
+            title="max |S|",
+        ),
+        LoopFigure(
+            "complementary_peak",
+            "1",
+            "largest magnitude of L/(1 + L)",
+            is_less_better=True,
+            margin="complementary",
+            title="max |T|",
+        ),
+        LoopFigure(
+            "noise_gain",
+            "1",
+            "rms of the output over that of white noise of each measured sample",
+            is_less_better=True,
+        ),
+        LoopFigure(
+            "overshoot", "%", "of the unit step at the sampling instants", is_less_better=True
+        ),
+        LoopFigure(
+            "settling_time", "s", "of the unit step, to 2 % of its height", is_less_better=True
+        ),
+        LoopFigure(
+            "steady_state_error",
+            "%",
+            "what is left of a unit step after ten periods of the bandwidth",
+            is_less_better=True,
+        ),
+    )
+}
+"""every figure of a loop by its name; margins, requirements and documentation take it from here"""
 
 Figure = Callable[["LoopFigures"], float]
 

@@ -10,22 +10,26 @@ import numpy as np
 
 from bywire.analysis.crossings import lower_factor, margin_of, upper_factor
 from bywire.analysis.loop import Loop
-from bywire.analysis.loop_figures import LoopFigures
+from bywire.analysis.loop_figures import LOOP_FIGURES, LoopFigure, LoopFigures
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.undefined import EqualWhereUndefined
 
-SENSES = {
-    "gain": 1,
-    "lower_gain": -1,
-    "phase": 1,
-    "delay": 1,
-    "disk": 1,
-    "bandwidth": 1,
-    "sensitivity": -1,
-    "complementary": -1,
+_SHOWN = (
+    "gain_margin",
+    "lower_gain_margin",
+    "phase_margin",
+    "crossover",
+    "delay_margin",
+    "disk_margin",
+    "sensitivity_peak",
+    "complementary_peak",
+    "bandwidth",
+)
+MARGINS: Mapping[str, LoopFigure] = {
+    figure.margin: figure for figure in (LOOP_FIGURES[name] for name in _SHOWN)
 }
-"""figures of `LoopMargins`: 1 where more is better, -1 where less is"""
+"""figures of `LoopMargins` in the order of their table"""
 _POINTS = 2000
 
 
@@ -164,7 +168,10 @@ def worst(
     if not margins:
         raise ParameterError("no margins to choose from: give at least one value")
     result: dict[str, tuple[float, float]] = {}
-    for field, sense in SENSES.items():
+    for field, figure in MARGINS.items():
+        if field == "crossover":  # a place, of which neither more nor less is better
+            continue
+        sense = -1.0 if figure.is_less_better else 1.0
         sizes = [sense * getattr(row, field) if row.is_sound else -math.inf for row in margins]
         k = int(np.nanargmin(sizes)) if not all(map(math.isnan, sizes)) else 0
         result[field] = (getattr(margins[k], field), float(values[k]))

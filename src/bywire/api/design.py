@@ -25,6 +25,7 @@ from bywire.api.design_inputs import (
     tunables_of,
 )
 from bywire.api.loop_case import loop_case, over_range, spread
+from bywire.bench.requirements import Limit
 from bywire.bench.running import Progress
 from bywire.core.arguments import whole_number
 from bywire.core.blas import on_one_thread
@@ -33,7 +34,6 @@ from bywire.report.answer import use_case
 from bywire.synthesis import designer
 from bywire.synthesis.linear_case import cases_of
 from bywire.synthesis.outcome import Across
-from bywire.synthesis.requirement import Requirement
 from bywire.synthesis.schedule_designer import (
     design_schedule,
     frozen,
@@ -156,7 +156,7 @@ def _scheduled(
     parameters: str,
     at: str,
     overrides: Mapping[str, Any],
-    wanted: tuple[Requirement, ...],
+    wanted: tuple[Limit, ...],
     over: Sequence[str],
     amplitudes: str | None,
     free_derivative: bool,

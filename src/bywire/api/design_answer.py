@@ -20,6 +20,7 @@ from bywire.api.design_inputs import Spans
 from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase
 from bywire.api.verification_parts import Part, judged_on, verdict_text
+from bywire.bench.requirements import Limit
 from bywire.core.units import shown
 from bywire.report.answer import Answer
 from bywire.report.document import (
@@ -34,7 +35,6 @@ from bywire.report.document import (
     TableBlock,
 )
 from bywire.synthesis.outcome import Across, Design, ScheduleDesign, Status, bench_text
-from bywire.synthesis.requirement import Requirement
 from bywire.synthesis.verification import Verification
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class DesignAnswer(Answer):
 
     case: LoopCase
     overrides: Mapping[str, Any]
-    requirements: tuple[Requirement, ...]
+    requirements: tuple[Limit, ...]
     limits: Spans
     tried: Verification | None
 
@@ -121,7 +121,7 @@ class DesignAnswer(Answer):
         verdict = f"requirements {status} on the linear model"
         if tried is not None:
             verdict = verdict_text((*self.requirements, *self._missed_floors(tried)), tried)
-        required = Listing([requirement.text for requirement in self.requirements])
+        required = Listing([str(requirement) for requirement in self.requirements])
         return Document(
             f"Design of loop {loop.name}",
             self.case.subject.line,
@@ -150,9 +150,9 @@ class DesignAnswer(Answer):
         return []
 
     @staticmethod
-    def _missed_floors(tried: Verification) -> list[Requirement]:
+    def _missed_floors(tried: Verification) -> list[Limit]:
         """Return what was to be kept and is not: the verdict counts it."""
-        return [each for each in tried.kept if tried.final.slacks[each.text] < 0.0]
+        return [each for each in tried.kept if tried.final.slacks[str(each)] < 0.0]
 
     def _write_bench(self, path: Path) -> Path:
         """Write the gains as a bench file."""
@@ -181,7 +181,7 @@ class DesignAnswer(Answer):
     def _figures(self) -> list[Block]:
         if not self._curves:
             return [Paragraph(f"{NO_LOOP}.")]
-        limits = {(each.figure, each.sense): each.limit for each in self.requirements}
+        limits = {(each.figure, each.is_upper): each.bound for each in self.requirements}
         captions = {
             "loop-gain": "Loop gain of the nominal linear model; phase margins as the spans in "
             "which they are read.",
@@ -197,14 +197,14 @@ class DesignAnswer(Answer):
             for kind, text in captions.items()
         ]
 
-    def _draw(self, kind: str, limits: Mapping[tuple[str, int], float]) -> Figure:
+    def _draw(self, kind: str, limits: Mapping[tuple[str, bool], float]) -> Figure:
         from bywire.report.design_curves import loop_gains, sensitivities, steps
 
         if kind == "loop-gain":
-            return loop_gains(self._curves, limits.get(("phase_margin", 1)))
+            return loop_gains(self._curves, limits.get(("phase_margin", False)))
         if kind == "sensitivity":
             return sensitivities(self._curves)
-        return steps(self._curves, limits.get(("overshoot", -1)))
+        return steps(self._curves, limits.get(("overshoot", True)))
 
 
 @dataclass(frozen=True)

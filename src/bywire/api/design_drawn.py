@@ -11,6 +11,7 @@ from bywire.api.loop_case import LoopCase
 from bywire.api.study_tables import percent
 from bywire.api.verification_parts import Part, figure_text
 from bywire.bench.option_names import OPTION
+from bywire.bench.requirements import Limit
 from bywire.core.errors import InputError, ParameterError, quoted
 from bywire.core.typing import Progress, silent
 from bywire.core.units import parse
@@ -20,7 +21,6 @@ from bywire.studies.statistics import Outcome, Share, judged, share
 from bywire.studies.study_file import read_study
 from bywire.synthesis.linear_case import LinearCase, existing_case, require_given
 from bywire.synthesis.probability import Judged, judged_over
-from bywire.synthesis.requirement import Requirement
 
 DRAWN = 64
 """models that gains are chosen for, by default"""
@@ -70,7 +70,7 @@ class Probability:
     """
 
     drawn: DrawnModels
-    requirements: tuple[Requirement, ...]
+    requirements: tuple[Limit, ...]
     judged: Judged
     wanted: float | None
 
@@ -93,7 +93,7 @@ class Probability:
         """Return a table and sentences."""
         told = f"{100.0 * self.drawn.confidence:g} % interval"
         rows = [
-            (wanted.text, *self._words(self._share(count)), figure_text(wanted.figure, worst))
+            (str(wanted), *self._words(self._share(count)), figure_text(wanted.figure, worst))
             for wanted, count, worst in zip(
                 self.requirements, self.judged.met, self.judged.worst, strict=True
             )
@@ -148,7 +148,7 @@ class Probability:
             "outcome": self.outcome,
             "all": said(self.together),
             "requirements": [
-                {"requirement": wanted.text, "worst": worst, **said(self._share(count))}
+                {"requirement": str(wanted), "worst": worst, **said(self._share(count))}
                 for wanted, count, worst in zip(
                     self.requirements, self.judged.met, self.judged.worst, strict=True
                 )
@@ -196,7 +196,7 @@ def drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
 
 def probability_of(
     drawn: DrawnModels,
-    requirements: Sequence[Requirement],
+    requirements: Sequence[Limit],
     gains: Mapping[str, float],
     wanted: str,
     progress: Progress | None,

@@ -9,16 +9,17 @@ from typing import Any
 
 from bywire.api.loop_case import LoopCase, spread
 from bywire.bench.bench import Bench
+from bywire.bench.requirements import Limit
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields
 from bywire.data.toml_file import read_toml
-from bywire.synthesis.requirement import Requirement, read
+from bywire.synthesis.requirement import read
 from bywire.synthesis.trial import Trial
 
 Spans = Mapping[str, tuple[float, float]]
 
 
-def requirements_of(file: str | Path | None, texts: Sequence[str]) -> tuple[Requirement, ...]:
+def requirements_of(file: str | Path | None, texts: Sequence[str]) -> tuple[Limit, ...]:
     """Return the requirements of a file and of texts such as ``"bandwidth >= 10 Hz"``."""
     return read([*_from_file(None if file is None else Path(file)), *texts])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.api.loop_case import LoopCase
 from bywire.api.verification_parts import (
     Part,
@@ -12,18 +13,18 @@ from bywire.api.verification_parts import (
     verification_object,
     verification_parts,
 )
+from bywire.bench.requirements import Limit
 from bywire.core.parameters import leaf_fields
 from bywire.report.document import Flat, Listing, TableBlock
 from bywire.report.tables import text_table
 from bywire.report.wording import amount
 from bywire.synthesis.outcome import Design
-from bywire.synthesis.requirement import FIGURES, Requirement
 from bywire.synthesis.verification import Verification
 
 
 def as_object(
     case: LoopCase,
-    requirements: Sequence[Requirement],
+    requirements: Sequence[Limit],
     design: Design,
     tried: Verification | None,
 ) -> dict[str, Any]:
@@ -33,20 +34,20 @@ def as_object(
         "loop": case.loop.name,
         "parameters": case.name,
         "operating_point": {case.loop.at.name: case.value, "unit": case.loop.at.unit},
-        "requirements": [requirement.text for requirement in requirements],
+        "requirements": [str(requirement) for requirement in requirements],
         "status": design.status,
         "gains": dict(final),
         "gain_units": {name: unit_of(case, name) for name in final},
         "linear": {
             "gains": dict(design.gains),
-            "units": {name: kind.unit for name, kind in FIGURES.items()},
+            "units": {name: figure.unit for name, figure in LOOP_FIGURES.items()},
             "nominal": dict(design.nominal),
             "worst": {k: {"value": v, "at": at} for k, (v, at) in design.worst.items()},
             "slack": design.slack,
-            "kept": [requirement.text for requirement in design.kept],
+            "kept": [str(requirement) for requirement in design.kept],
             "binding": [
                 {
-                    "requirement": binding.requirement.text,
+                    "requirement": str(binding.requirement),
                     "at": binding.case,
                     "value": binding.value,
                     "slack": binding.slack,
@@ -56,9 +57,9 @@ def as_object(
             "unsound": dict(design.unsound),
             "conflicts": [
                 {
-                    "requirement": conflict.wanted.text,
+                    "requirement": str(conflict.wanted),
                     "best": conflict.best,
-                    "with": conflict.kept.text,
+                    "with": str(conflict.kept),
                     "excluded": conflict.excludes,
                 }
                 for conflict in design.conflicts
@@ -70,7 +71,7 @@ def as_object(
 
 def as_parts(
     case: LoopCase,
-    requirements: Sequence[Requirement],
+    requirements: Sequence[Limit],
     design: Design,
     tried: Verification | None,
 ) -> list[Part]:
@@ -87,7 +88,7 @@ def as_parts(
         heading.append("retuned on the bench")
         rows = [[*row, gain_text(case, row[0], final[row[0]])] for row in rows]
     parts.append(text_table(heading, rows))
-    wanted = {requirement.figure: requirement.text for requirement in (*requirements, *design.kept)}
+    wanted = {requirement.figure: str(requirement) for requirement in (*requirements, *design.kept)}
     figures = [
         [
             name,
@@ -96,18 +97,18 @@ def as_parts(
             design.worst[name][1],
             wanted.get(name, "").removeprefix(name).strip(),
         ]
-        for name in FIGURES
+        for name in LOOP_FIGURES
     ]
     parts.append(text_table(["linear", "nominal", "worst", "at", "wanted"], figures))
     parts += kept_lines(design) + unsound_lines(design)
     parts += [
-        f"{'binds' if design.binds else 'tightest'}: {binding.requirement.text}, "
+        f"{'binds' if design.binds else 'tightest'}: {binding.requirement}, "
         f"{figure_text(binding.requirement.figure, binding.value)} at {binding.case}"
         for binding in design.binding
     ]
     parts += [
-        f"{conflict.wanted.text}: at best {amount(conflict.best, conflict.wanted.unit, 3)} "
-        f"with {conflict.kept.text}"
+        f"{conflict.wanted}: at best {amount(conflict.best, conflict.wanted.unit, 3)} "
+        f"with {conflict.kept}"
         for conflict in design.conflicts
     ]
     if tried is not None:
@@ -119,7 +120,7 @@ def kept_lines(design: Design) -> list[str]:
     """Return what is kept besides the requirements, a sentence or none."""
     if not design.kept:
         return []
-    texts = ", ".join(requirement.text for requirement in design.kept)
+    texts = ", ".join(str(requirement) for requirement in design.kept)
     return [f"kept besides: {texts} (require another limit of the same figure to change it)"]
 
 

@@ -15,11 +15,11 @@ from bywire.analysis.linear.linear_model import LinearModel, rates
 from bywire.analysis.locus import Locus
 from bywire.analysis.periodic import PeriodicModel
 from bywire.analysis.reduction import TOLERANCE, Reduced, ReductionError, reduce
-from bywire.bench.values import number
 from bywire.core.errors import ParameterError, quoted
 from bywire.core.pairs import DIGITS, read_count
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
+from bywire.core.values import number
 from bywire.report.document import Attachment, Flat, Paragraph, TableBlock
 from bywire.report.rate_table import left_out, rate_table
 from bywire.report.wording import amount

@@ -18,9 +18,9 @@ from bywire.analysis.reduction import Reduced, ReductionError, reduction_error
 from bywire.api import linear_texts as texts
 from bywire.api.loop_case import range_of
 from bywire.api.parameter_choice import parameters_for
-from bywire.bench.values import number
 from bywire.core.errors import ParameterError, UnitError, unknown_name
 from bywire.core.parameters import ParameterSet
+from bywire.core.values import number
 from bywire.report.answer import Answer
 from bywire.report.document import Block, Document, FigureBlock, Flat, Listing, Paragraph, Section
 from bywire.report.subject import Subject

@@ -12,11 +12,11 @@ import numpy as np
 from bywire.analysis.linear.corners import read_sides
 from bywire.analysis.loop import LOOPS, Loop, Quantity
 from bywire.api.parameter_choice import parameters_for
-from bywire.bench.values import number
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.pairs import read_count
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
+from bywire.core.values import number
 
 if TYPE_CHECKING:
     from bywire.report.subject import Subject

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from bywire.analysis.linear.corners import CornerError
 from bywire.analysis.loop_curves import Family, loop_curve
-from bywire.analysis.margins import NO_LOOP, LoopMargins, figures_at, margins_of, worst
+from bywire.analysis.margins import MARGINS, NO_LOOP, LoopMargins, figures_at, margins_of, worst
 from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase, loop_case, over_range
 from bywire.core.parameters import ParameterSet
@@ -32,28 +32,6 @@ from bywire.report.wording import amount, clean
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-UNITS = {
-    "gain": "1",
-    "lower_gain": "1",
-    "phase": "deg",
-    "crossover": "Hz",
-    "delay": "s",
-    "disk": "1",
-    "sensitivity": "1",
-    "complementary": "1",
-    "bandwidth": "Hz",
-}
-"""unit of each margin"""
-TITLES = {
-    "gain": "gain margin",
-    "lower_gain": "lower gain margin",
-    "phase": "phase margin",
-    "delay": "delay margin",
-    "disk": "disk margin",
-    "sensitivity": "max |S|",
-    "complementary": "max |T|",
-}
-"""headings that say more than the margin's name"""
 LEGEND = (
     "Linear loop as it is sampled, dry friction left out. Gain margins: factors by which the loop "
     "gain may grow, and to which it may fall; delay margin: dead time that may be added; disk "
@@ -148,7 +126,8 @@ class Margins(Answer):
 
     def _data(self) -> dict[str, Any]:
         rows = [asdict(margins) for margins in self.margins]
-        shared = {**self.case.heading, "units": {**UNITS, "phase_at": "Hz"}}
+        units = {name: figure.unit for name, figure in MARGINS.items()} | {"phase_at": "Hz"}
+        shared = {**self.case.heading, "units": units}
         if not self.name:
             return {**shared, "margins": rows[0]}
         least = {
@@ -257,9 +236,12 @@ def margins_table(
     name, unit, values
         Parameter, its SI unit and its values; empty where nothing is varied.
     """
-    heading = [*(TITLES.get(k, k) for k in UNITS), "stable"]
+    heading = [*(figure.heading for figure in MARGINS.values()), "stable"]
     rows = [
-        (*(_cell(getattr(margins, k), unit, 3) for k, unit in UNITS.items()), _state_cell(margins))
+        (
+            *(_cell(getattr(margins, k), figure.unit, 3) for k, figure in MARGINS.items()),
+            _state_cell(margins),
+        )
         for margins in margins_at
     ]
     if name:
@@ -294,7 +276,7 @@ def worst_texts(
     if kept:
         least = worst([margins for margins, _ in kept], [value for _, value in kept])
         texts += [
-            f"{TITLES.get(k, k)} {amount(v, UNITS[k], 3)} at {name} = {amount(at, unit)}"
+            f"{MARGINS[k].heading} {amount(v, MARGINS[k].unit, 3)} at {name} = {amount(at, unit)}"
             for k, (v, at) in least.items()
         ]
     return texts

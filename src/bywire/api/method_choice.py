@@ -13,8 +13,8 @@ import xarray as xr
 from bywire.api.parameter_choice import set_for
 from bywire.api.replay import columns_of_bench, driven_bench
 from bywire.bench.relative_changes import settled
-from bywire.bench.values import parsed
 from bywire.core.errors import InputError, ParameterError, unknown_name, unknown_of_few
+from bywire.core.values import parsed
 from bywire.data.file_format import Progress, no_progress
 from bywire.data.named_columns import NamedColumns
 from bywire.identification.fitting.question import (

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from bywire.bench.relative_changes import settled
-from bywire.bench.values import parsed
 from bywire.core.catalog import PARAMETER_SETS, CitedSet, main_set
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
+from bywire.core.values import parsed
 
 
 def set_for(subject: str, assembly: str, name: str) -> CitedSet:

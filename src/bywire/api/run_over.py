@@ -221,7 +221,7 @@ class BenchRange(Answer):
         known = [(value, each) for value, each in pairs if math.isfinite(each.value)]
         if not known:
             return f"{where}: {pairs[0][1].note}" if pairs[0][1].note else where
-        sign = -1.0 if pairs[0][1].limit.strip().startswith("<") else 1.0
+        sign = -1.0 if pairs[0][1].required.is_upper else 1.0
         value, worst = min(known, key=lambda pair: sign * pair[1].value)
         return f"{where}, worst {amount(worst.value, worst.unit)} at {amount(value, self.unit)}"
 

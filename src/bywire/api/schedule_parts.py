@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.api.design_parts import gain_text, kept_lines, unit_of
 from bywire.api.loop_case import LoopCase
 from bywire.api.verification_parts import (
@@ -13,11 +14,11 @@ from bywire.api.verification_parts import (
     verification_object,
     verification_parts,
 )
+from bywire.bench.requirements import Limit
 from bywire.core.units import shown
 from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount
 from bywire.synthesis.outcome import Across, ScheduleDesign
-from bywire.synthesis.requirement import FIGURES, Requirement
 from bywire.synthesis.schedule_designer import scheduled
 from bywire.synthesis.verification import Verification
 
@@ -34,7 +35,7 @@ _SEEN = (
 
 def as_object(
     case: LoopCase,
-    requirements: Sequence[Requirement],
+    requirements: Sequence[Limit],
     design: ScheduleDesign,
     tried: Verification | None,
     retuned: Sequence[Across],
@@ -47,7 +48,7 @@ def as_object(
         "parameters": case.name,
         "operating_points": {"unit": at.unit, **{k: list(v) for k, v in design.points.items()}},
         "borders": {name: case.par.leaves()[name] for name in scheduled(case.loop).borders},
-        "requirements": [requirement.text for requirement in requirements],
+        "requirements": [str(requirement) for requirement in requirements],
         "status": design.status,
         "gains": dict(final),
         "gain_units": {name: unit_of(case, name) for name in final},
@@ -58,7 +59,7 @@ def as_object(
                 "slack": regional.slack,
                 "binding": [
                     {
-                        "requirement": b.requirement.text,
+                        "requirement": str(b.requirement),
                         "at": b.case,
                         "value": b.value,
                         "slack": b.slack,
@@ -69,7 +70,7 @@ def as_object(
             for region, regional in design.regions.items()
         },
         "across": {
-            "units": {name: kind.unit for name, kind in FIGURES.items()},
+            "units": {name: figure.unit for name, figure in LOOP_FIGURES.items()},
             "cases": [_case(across, at.name) for across in design.across],
             "worst": _case(design.worst, at.name),
             "retuned": [_case(across, at.name) for across in retuned],
@@ -107,14 +108,14 @@ def as_parts(
     for region, regional in design.regions.items():
         where = ", ".join(shown(point, at.unit) for point in design.points[region])
         bound = ", ".join(
-            f"{b.requirement.text} ({figure_text(b.requirement.figure, b.value)})"
+            f"{b.requirement} ({figure_text(b.requirement.figure, b.value)})"
             for b in regional.binding
         )
         word = "binds" if regional.binds else "tightest"
         parts.append(f"{region}, designed at {where}: {regional.status}; {word}: {bound}")
         parts += [f"  {line}" for line in kept_lines(regional)]
         parts += [
-            f"  {c.wanted.text}: at best {amount(c.best, c.wanted.unit, 3)} with {c.kept.text}"
+            f"  {c.wanted}: at best {amount(c.best, c.wanted.unit, 3)} with {c.kept}"
             for c in regional.conflicts
         ]
     for title, across in (("linear design", design.across), ("retuned gains", retuned)):

@@ -14,11 +14,11 @@ import xarray as xr
 from bywire.api.parameter_choice import set_for
 from bywire.bench.relative_changes import settled
 from bywire.bench.running import Progress
-from bywire.bench.values import parsed
 from bywire.core.blas import on_one_thread
 from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import silent
+from bywire.core.values import parsed
 from bywire.report.answer import Answer, use_case
 from bywire.report.changes import defaults_of, value_changes
 from bywire.report.document import (

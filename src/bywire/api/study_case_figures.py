@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bywire.bench.requirements import limit_of
 from bywire.report.document import Block, FigureBlock
 from bywire.report.study.drawn_cases import LINES, POINTS, DrawnCases, drawn_cases
 from bywire.studies.findings import Findings
@@ -27,12 +26,12 @@ def scatters(findings: Findings) -> list[Block]:
     return [
         _scatter_block(findings, judgment)
         for judgment in findings.judgments
-        if findings.drivers(judgment.demand.kpi)
+        if findings.drivers(judgment.demand.figure)
     ]
 
 
 def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
-    name, met = judgment.demand.kpi, judgment.met
+    name, met = judgment.demand.figure, judgment.met
     known = np.isfinite(findings.figure(name))
     cases = drawn_cases(met, POINTS, known=known)
     lacking = cases.lacking.size
@@ -75,7 +74,7 @@ def parallel(findings: Findings) -> Block:
     drawn = _required(findings)
     if not all(np.isfinite(findings.figure(name)).all() for name in drawn):
         text += " Where a case does not have a figure, its line goes to 'none'."
-    if absent := [j.demand.kpi for j in findings.judgments if j.demand.kpi not in drawn]:
+    if absent := [j.demand.figure for j in findings.judgments if j.demand.figure not in drawn]:
         text += f" No case has {', '.join(absent)}."
     return FigureBlock(partial(_parallel, findings, cases), text, "parallel")
 
@@ -83,7 +82,7 @@ def parallel(findings: Findings) -> Block:
 def _required(findings: Findings) -> list[str]:
     """Return the required key figures that some case has."""
     known = {each.name for each in findings.spreads}
-    return [j.demand.kpi for j in findings.judgments if j.demand.kpi in known]
+    return [j.demand.figure for j in findings.judgments if j.demand.figure in known]
 
 
 def _axis(findings: Findings, name: str) -> CaseAxis:
@@ -122,5 +121,4 @@ def _parallel(findings: Findings, cases: DrawnCases) -> Figure:
 
 def bound_of(findings: Findings, name: str) -> float | None:
     """Return the limit of a key figure in its unit; None where nothing is required of it."""
-    limits = {demand.kpi: demand.limit for demand in findings.plan.demands}
-    return limit_of(name, limits[name], findings.units[name])[1] if name in limits else None
+    return next((each.bound for each in findings.plan.demands if each.figure == name), None)

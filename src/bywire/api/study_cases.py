@@ -56,7 +56,7 @@ class ShownCases:
     def benches(self) -> Mapping[str, Bench]:
         """What runs each that has a result, by its key figure."""
         return {
-            j.demand.kpi: self._bench(j, row)
+            j.demand.figure: self._bench(j, row)
             for j in self.findings.judgments
             if (row := j.worst) is not None and row not in self.findings.failures
         }
@@ -75,7 +75,7 @@ class ShownCases:
         ]
 
     def _text(self, judgment: Judgment, row: int) -> str:
-        kpi = judgment.demand.kpi
+        kpi = judgment.demand.figure
         if row in self.findings.failures:
             return f"{kpi}: case {self.named(row)}, which has no result"
         if not math.isfinite(self.findings.figure(kpi)[row]):
@@ -129,7 +129,7 @@ class ShownCases:
     def _bench(self, judgment: Judgment, row: int) -> Bench:
         plan, findings = self.findings.plan, self.findings
         made = case_bench(plan, findings.number(row), findings.values(row))
-        return replace(made, name=f"{self.kind} {judgment.demand.kpi}")
+        return replace(made, name=f"{self.kind} {judgment.demand.figure}")
 
     def _doubt(self, judgment: Judgment, row: int) -> str:
         """Return that a case is too close to the limit to be told from one that meets it."""

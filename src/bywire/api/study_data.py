@@ -53,8 +53,8 @@ def _judgment_data(findings: Findings, judgment: Judgment) -> dict[str, Any]:
         (of,) = [each for each in findings.rare if each.demand == demand]
         rare = rare_data(judgment.failure, of)
     return rare | {
-        "kpi": demand.kpi,
-        "limit": demand.limit,
+        "kpi": demand.figure,
+        "limit": demand.text,
         "wanted": demand.probability,
         "outcome": judgment.outcome,
         "met": share.count,

@@ -167,8 +167,8 @@ def _convergence(findings: Findings) -> Figure:
 
     shown = _converging(findings)[:_PANELS]
     return convergence(
-        {j.demand.text: running_share(j.met, findings.plan.confidence, _SHARES) for j in shown},
-        {j.demand.text: j.demand.probability for j in shown},
+        {str(j.demand): running_share(j.met, findings.plan.confidence, _SHARES) for j in shown},
+        {str(j.demand): j.demand.probability for j in shown},
         first=CHUNK,
     )
 
@@ -181,7 +181,7 @@ def _converging(findings: Findings) -> list[Judgment]:
 
 
 def _on_others(findings: Findings) -> str:
-    others = [judgment.demand.text for judgment in _converging(findings)[_PANELS:]]
+    others = [str(judgment.demand) for judgment in _converging(findings)[_PANELS:]]
     return f" Not drawn: {'; '.join(others)}." if others else ""
 
 

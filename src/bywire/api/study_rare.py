@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bywire.bench.requirements import limit_of
 from bywire.report.document import FigureBlock, TableBlock
 from bywire.report.tables import OUTCOMES, Cell, Column, Table, value_text
 from bywire.report.wording import amount, clean
@@ -41,7 +40,7 @@ def failure_table(findings: Findings) -> Table:
         close = f" ({each.undecided} too close)" if each.undecided else ""
         rows.append(
             (
-                Cell(clean(f"{each.demand.kpi} {each.demand.limit}")),
+                Cell(clean(f"{each.demand.figure} {each.demand.text}")),
                 Cell(_value(probable), value=probable.value),
                 Cell(_ends(probable)),
                 Cell(
@@ -61,8 +60,8 @@ def importance_tables(findings: Findings) -> list[TableBlock]:
     return [
         TableBlock(
             _importance_table(findings, each),
-            f"Where {each.demand.kpi} fails.",
-            title=f"where {each.demand.kpi} fails",
+            f"Where {each.demand.figure} fails.",
+            title=f"where {each.demand.figure} fails",
         )
         for each in findings.rare
         if each.importance
@@ -113,7 +112,7 @@ def state_texts(findings: Findings) -> list[str]:
     """Return of each requirement without an estimate why there is none, and what to do."""
     outcomes = {each.demand: each.outcome for each in findings.judgments}
     return [
-        f"{each.demand.kpi}: {text}"
+        f"{each.demand.figure}: {text}"
         for each in findings.rare
         if (text := _state_text(each, findings.plan, outcomes[each.demand]))
     ]
@@ -130,13 +129,13 @@ def rare_notes(findings: Findings) -> list[str]:
             f"{design.level} cases in each level in place of {design.asked}: they come in "
             "whole chunks"
         )
-    if unjudged := [each.text for each in plan.demands if each not in plan.judged_demands]:
+    if unjudged := [str(each) for each in plan.demands if each not in plan.judged_demands]:
         notes.append(
             f"not judged, for no probability is wanted of it: {'; '.join(unjudged)}; cases that go "
             "where failures are say nothing of all cases"
         )
     notes += [
-        f"{each.demand.kpi}: failure is less probable than a thousandth of what is admitted: it "
+        f"{each.demand.figure}: failure is less probable than a thousandth of what is admitted: it "
         "was followed no further"
         for each in findings.rare
         if each.failure.state == "negligible"
@@ -148,7 +147,7 @@ def rare_notes(findings: Findings) -> list[str]:
                 if design.kind == SUBSET
                 else "extend the study"
             )
-            notes.append(f"{each.demand.kpi}: the interval holds what is admitted: {more}")
+            notes.append(f"{each.demand.figure}: the interval holds what is admitted: {more}")
     if design.kind == IMPORTANCE:
         notes.append(
             "importance-sampling: failures far from the design point may be missed; "
@@ -236,19 +235,18 @@ def _curves(findings: Findings) -> Figure:
 
 
 def _curve(findings: Findings, each: RareFailure, make: Any) -> Any:
-    demand, unit = each.demand, findings.units[each.demand.kpi]
-    compare, bound = limit_of(demand.kpi, demand.limit, unit)
+    demand = each.demand
     assert each.failure.span is not None
     assert demand.probability is not None
     margins = np.linspace(*each.failure.span, _POINTS)
-    sign = -1.0 if compare.startswith("<") else 1.0
+    sign = -1.0 if demand.is_upper else 1.0
     intervals: Sequence[Interval] = [each.failure.below(float(m)) for m in margins]
     return make(
-        demand.kpi,
-        unit,
-        bound,
+        demand.figure,
+        demand.unit,
+        demand.bound,
         1.0 - demand.probability,
-        bound + sign * margins,
+        demand.bound + sign * margins,
         np.array([f.value for f in intervals]),
         np.array([f.low for f in intervals]),
         np.array([f.high for f in intervals]),
@@ -259,7 +257,7 @@ def search_notes(findings: Findings) -> list[str]:
     """Return what a search for worst cases stands for, and where it did not come to its end."""
     plan = findings.plan
     spent = [
-        demand.kpi
+        demand.figure
         for demand, each in zip(plan.judged_demands, findings.searches, strict=False)
         if each.state == "budget spent"
     ]

@@ -41,9 +41,9 @@ def _undefined(findings: Findings) -> list[str]:
     """Return which figures of requirements are not defined in cases that ran."""
     cases: dict[int, list[str]] = {}
     for each in findings.judgments:
-        undefined = int(np.count_nonzero(~np.isfinite(findings.figure(each.demand.kpi))))
+        undefined = int(np.count_nonzero(~np.isfinite(findings.figure(each.demand.figure))))
         if lacking := undefined - len(findings.failures):
-            cases.setdefault(lacking, []).append(each.demand.kpi)
+            cases.setdefault(lacking, []).append(each.demand.figure)
     return [
         f"{', '.join(names)}: not defined in {number} of {len(findings.cases)} cases, which count "
         "as missing what is required"

@@ -145,7 +145,7 @@ class StudyRun(Answer):
         ParameterError
             When no case has it, or all have the same.
         """
-        required = [each.demand.kpi for each in self.findings.judgments]
+        required = [each.demand.figure for each in self.findings.judgments]
         if kpi not in required:
             raise unknown_name("key figure of a requirement", str(kpi), required)
         if kpi not in self._shown.benches:
@@ -223,7 +223,7 @@ class StudyRun(Answer):
             attachments=self._shown.attachments(),
             record="report.json",
             remarks=[
-                f"requirement {each.outcome}: {each.demand.text}"
+                f"requirement {each.outcome}: {each.demand}"
                 for each in findings.judgments
                 if each.outcome != "met"
             ],

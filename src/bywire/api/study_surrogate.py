@@ -12,8 +12,8 @@ from bywire.api.run_study import kept_study
 from bywire.api.study_run import StudyRun
 from bywire.api.study_tables import figure_text, shown_figures, varied_table
 from bywire.bench.relative_changes import share_of
-from bywire.bench.values import number
 from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.values import number
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import Document, Section, TableBlock, spaced
 from bywire.report.tables import Cell, Column, Table
@@ -179,7 +179,7 @@ def study_surrogates(
     surrogates: dict[str, Surrogate] = {}
     refused: dict[str, str] = {}
     wanted = [kpis] if isinstance(kpis, str) else kpis
-    required = [each.kpi for each in report.plan.demands]
+    required = [each.figure for each in report.plan.demands]
     for kpi in wanted or shown_figures(findings) or required:
         try:
             surrogates[kpi] = surrogate_of(findings, kpi)

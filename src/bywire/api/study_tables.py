@@ -36,7 +36,7 @@ def demand_table(findings: Findings) -> Table:
     for each in findings.judgments:
         count = f"{each.share.count} of {each.share.cases}"
         count += f" ({each.undecided} too close)" if each.undecided else ""
-        cells = [Cell(clean(each.demand.text)), Cell(count, value=each.share.count)]
+        cells = [Cell(clean(str(each.demand))), Cell(count, value=each.share.count)]
         if is_search:
             cells[1] = _worst(findings, each)
         if is_sampled:
@@ -56,7 +56,7 @@ def demand_table(findings: Findings) -> Table:
 
 def _worst(findings: Findings, judgment: Judgment) -> Cell:
     """Return the worst figure that was found; of cases that are all equal, theirs."""
-    kpi = judgment.demand.kpi
+    kpi = judgment.demand.figure
     figures = findings.figure(kpi)
     known = np.flatnonzero(np.isfinite(figures))
     if not known.size:
@@ -217,8 +217,11 @@ def shown_figures(findings: Findings) -> list[str]:
     known = [each.name for each in findings.spreads]
     judgments = findings.judgments if known else ()
     ordered = sorted(judgments, key=lambda each: _URGENCY.index(each.outcome))
-    judged = [each.demand.kpi for each in ordered]
-    required = [*judged, *(each.kpi for each in findings.plan.demands if each.kpi not in judged)]
+    judged = [each.demand.figure for each in ordered]
+    required = [
+        *judged,
+        *(each.figure for each in findings.plan.demands if each.figure not in judged),
+    ]
     return [name for name in required if name in known] if required else known
 
 

@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.api.loop_case import LoopCase
+from bywire.bench.requirements import Limit
 from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount
 from bywire.synthesis.bench_figures import BenchFigures
 from bywire.synthesis.candidate import Candidate
-from bywire.synthesis.requirement import FIGURES, GAINS, Requirement
 from bywire.synthesis.verification import Verification
 
 Part = str | Table
@@ -51,7 +52,7 @@ def verification_parts(
     if labels:
         worst = f" (worst of {tried.corners} corners)" if len(labels) < tried.corners else ""
         parts.append(f"tried on the bench: at the nominal point, and at {'; '.join(labels)}{worst}")
-    kept = {requirement.text for requirement in tried.kept}
+    kept = {str(requirement) for requirement in tried.kept}
     for text, slack in tried.final.slacks.items():
         verdict = "met" if slack >= 0.0 else "NOT met"
         room = 100.0 * tried.final.room(text)
@@ -77,11 +78,11 @@ def judged_on(candidate: Candidate, text: str) -> str:
     return f"on the bench{both}{part}"
 
 
-def verdict_text(requirements: Sequence[Requirement], tried: Verification) -> str:
+def verdict_text(requirements: Sequence[Limit], tried: Verification) -> str:
     """Return whether requirements are met, and which part of them the bench shows."""
     final = tried.final
-    on_bench = [each.text for each in requirements if final.shown[each.text][0]]
-    linear = [each.text for each in requirements if not final.shown[each.text][0]]
+    on_bench = [str(each) for each in requirements if final.shown[str(each)][0]]
+    linear = [str(each) for each in requirements if not final.shown[str(each)][0]]
     parts = ((on_bench, "on the nonlinear bench"), (linear, "on the linear model alone"))
     texts = []
     for names, where in parts:
@@ -90,15 +91,15 @@ def verdict_text(requirements: Sequence[Requirement], tried: Verification) -> st
             texts.append(f"{missed} of {len(names)} not met {where}")
         elif names:
             texts.append(f"{len(names)} met {where}")
-    if len(texts) == 1 and not any(final.slacks[each.text] < 0.0 for each in requirements):
+    if len(texts) == 1 and not any(final.slacks[str(each)] < 0.0 for each in requirements):
         return f"requirements met {parts[0][1] if on_bench else parts[1][1]}"
     return f"requirements: {', '.join(texts)}"
 
 
 def figure_text(name: str, value: float) -> str:
     """Return a figure with its unit; a gain margin as a factor and in dB."""
-    text = amount(value, FIGURES[name].unit, 3)
-    if name in GAINS and math.isfinite(value) and value > 0.0:
+    text = amount(value, LOOP_FIGURES[name].unit, 3)
+    if LOOP_FIGURES[name].in_decibel and math.isfinite(value) and value > 0.0:
         text += f" ({20.0 * math.log10(value):.3g} dB)"
     return text
 
@@ -109,7 +110,7 @@ def _figure_rows(case: LoopCase, where: str, columns: list[BenchFigures | None])
     def cell(figures: BenchFigures | None, k: int, name: str) -> str:
         if figures is None or not figures.small:
             return "-"
-        return amount(getattr(figures.small[k], name), FIGURES[name].unit, 3)
+        return amount(getattr(figures.small[k], name), LOOP_FIGURES[name].unit, 3)
 
     sizes = next(
         ([s.amplitude for s in figures.small] for figures in columns if figures and figures.small),
@@ -126,7 +127,7 @@ def _figure_rows(case: LoopCase, where: str, columns: list[BenchFigures | None])
     steps = next((tuple(figures.step) for figures in columns if figures and figures.step), ())
     for name in steps:
         cells = [
-            amount(figures.step.get(name) if figures else None, FIGURES[name].unit, 3)
+            amount(figures.step.get(name) if figures else None, LOOP_FIGURES[name].unit, 3)
             for figures in columns
         ]
         rows.append([f"{name}, {case.loop.proof}{where}", *cells])
@@ -167,7 +168,7 @@ def verification_object(case: LoopCase, tried: Verification) -> dict[str, Any]:
         "linear_design": _candidate(tried.linear),
         "final": _candidate(tried.final),
         "final_linear": dict(tried.nominal),
-        "kept": [requirement.text for requirement in tried.kept],
+        "kept": [str(requirement) for requirement in tried.kept],
         "experiment": case.loop.proof,
         "kpis": {kpi.name: {"value": kpi.value, "unit": kpi.unit} for kpi in tried.kpis},
         "conflict": None

@@ -18,10 +18,9 @@ from bywire.bench.faults.fault_section import Injection, injections
 from bywire.bench.faults.injected import checked_sections, with_faults
 from bywire.bench.option_names import OPTION, split_options
 from bywire.bench.relative_changes import settled
-from bywire.bench.requirements import check
+from bywire.bench.requirements import Limit, read_limits
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.bench.stimulus_sections import stimulus_of, stimulus_sections
-from bywire.bench.values import parsed
 from bywire.core.catalog import PARAMETER_SETS, outdated_values
 from bywire.core.errors import (
     InputError,
@@ -33,6 +32,7 @@ from bywire.core.errors import (
 )
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.units import shown
+from bywire.core.values import parsed
 from bywire.simulation.engine import engine_names
 from bywire.simulation.run import Run
 
@@ -131,7 +131,7 @@ class Bench:
             )
         self._check_stimulus(chosen)
         self._check_names()
-        check(self.requirements, chosen.kpis_with(self.chosen_options))
+        _ = self.limits  # read now, so that what cannot be judged is refused
         if chosen.preview is None:
             self._require_effects(written, self.cases(), chosen.cases)
         else:
@@ -204,6 +204,11 @@ class Bench:
         for name in self.overrides:
             if name in options and name not in parameters:
                 raise unknown_name("parameter", name, [f"{OPTION}{name}"])
+
+    @cached_property
+    def limits(self) -> Mapping[str, Limit]:
+        """The requirements as they are judged, by KPI name."""
+        return read_limits(self.requirements, self.definition.kpis_with(self.chosen_options))
 
     @cached_property
     def system(self) -> str:

@@ -16,10 +16,10 @@ from bywire.bench.faults.injected import checked_sections
 from bywire.bench.relative_changes import is_relative, settled
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.bench.stimulus_sections import stimulus_sections
-from bywire.bench.values import parsed, require_unit, require_units
 from bywire.core.arguments import checked
 from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
+from bywire.core.values import parsed, require_unit, require_units
 from bywire.data.file_kinds import BENCH, require_kind
 from bywire.data.toml_file import read_toml
 

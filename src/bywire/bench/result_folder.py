@@ -12,8 +12,8 @@ from typing import Any
 import xarray as xr
 
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.requirements import Verdict
-from bywire.core.errors import FileError
+from bywire.bench.requirements import Verdict, read_limit
+from bywire.core.errors import FileError, InputError
 from bywire.core.scratch import require_finished
 from bywire.data.netcdf import read_recording
 
@@ -79,7 +79,7 @@ def read_result(folder: Path) -> FolderResult:
             str(name): {key: str(each[key]) for key in ("value", "instead_of", "of")}
             for name, each in record.get("changes", {}).items()
         }
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, InputError, KeyError, TypeError, ValueError) as error:
         raise FileError(
             f"{folder / RECORD} is damaged ({type(error).__name__}: {error}); {_AGAIN}"
         ) from None
@@ -164,12 +164,9 @@ def _kpi(name: str, record: Mapping[str, Any]) -> Kpi:
 
 
 def _verdict(record: Mapping[str, Any]) -> Verdict:
-    value, unit = _number(record["value"]), str(record["unit"])
     return Verdict(
-        str(record["kpi"]),
-        str(record["limit"]),
-        value,
-        unit,
+        read_limit(str(record["kpi"]), str(record["limit"]), str(record["unit"])),
+        _number(record["value"]),
         bool(record["met"]),
         "",
         error=_number(record.get("error")),

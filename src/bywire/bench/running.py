@@ -223,7 +223,7 @@ def judged(
         in_others = {factor: figures(made) for factor, made in others.items()}
         kpis = with_step_errors(kpis, in_others, recordings)
         note_step_errors(recordings, others)
-    verdicts = judge(bench.requirements, kpis)
+    verdicts = judge(bench.limits.values(), kpis)
     return Result(bench, recordings, kpis, verdicts, status_of(verdicts))
 
 

@@ -7,58 +7,77 @@ from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.bench.faults.fault_section import require_admissible
 from bywire.bench.faults.modes import Mode, modes_of
-from bywire.bench.values import number, written
 from bywire.campaigns.declared import CAMPAIGNS
 from bywire.campaigns.judging import require_small
 from bywire.campaigns.plan import (
     CampaignPlan,
+    CriterionSection,
     Failing,
     Reaction,
+    criteria_of,
     evenly,
-    read_criteria,
     touch_alike,
 )
 from bywire.campaigns.residual import Residual, residuals_of
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
+from bywire.core.quantities import TimeConstant, Unit
+from bywire.core.section import Name, Names, Section, Table
 from bywire.core.signals import signals_of
+from bywire.core.values import number, written
 from bywire.data.file_kinds import CAMPAIGN, require_kind
 from bywire.data.toml_file import read_toml
-from bywire.studies.study_file import read_bench
+from bywire.studies.measured import MeasuredSection
+from bywire.studies.study_file import BenchName, read_bench
 from bywire.studies.vary_section import read_all_varied
 
-_KEYS = (
-    "name",
-    "bench",
-    "set",
-    "vary",
-    "measured",
-    "campaign",
-    "values",
-    "criteria",
-    "residuals",
-    "rates",
-    "reaction",
-)
-_SECTIONS = ("set", "vary", "campaign", "values", "rates", "reaction")
-_CAMPAIGN = (
-    "only",
-    "leave_out",
-    "present",
-    "latent",
-    "onset",
-    "onsets",
-    "spread",
-    "healthy",
-    "false_alarms",
-    "seed",
-)
-_REACTION = ("fault", "value", "delay")
+_MOST = 10_000
+
+
+class CampaignSection(Section):
+    """The section ``[campaign]``: which faults, when, and what a false alarm is."""
+
+    only: Names = ()
+    leave_out: Names = ()
+    present: Names = ()
+    latent: Names = ()
+    onset: Annotated[float, Unit("s")] = 0.0
+    onsets: Annotated[int | None, Field(ge=1, le=_MOST)] = None
+    spread: TimeConstant = 0.0
+    healthy: Annotated[int, Field(ge=4, le=_MOST)] = 64
+    false_alarms: Annotated[float, Unit("1"), Field(ge=0, lt=1)] = 0.01
+    seed: Annotated[int, Field(ge=0, le=1_000_000)] = 1
+
+
+class ReactionSection(Section):
+    """The section ``[reaction]``: what an ECU does when a residual alarms."""
+
+    fault: str = ""
+    value: Any = None
+    delay: TimeConstant = 0.0
+
+
+class CampaignFile(Section):
+    """A campaign file."""
+
+    name: Name
+    bench: BenchName
+    set: Table
+    vary: Table
+    measured: MeasuredSection | None = None
+    campaign: CampaignSection = CampaignSection()
+    values: Table
+    criteria: tuple[CriterionSection, ...] = ()
+    residuals: Names | None = None
+    rates: Table
+    reaction: ReactionSection | None = None
 
 
 def read_campaign(
@@ -95,53 +114,44 @@ def read_campaign(
 
 
 def _plan(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]) -> CampaignPlan:
-    for key in content:
-        if key not in _KEYS:
-            raise unknown_name("key of a campaign file", key, _KEYS)
-    for key in _SECTIONS:
-        if not isinstance(content.get(key, {}), Mapping):
-            raise ParameterError(f"[{key}] must be a section with key = value lines")
-    bench = read_bench(content, folder, overrides)
+    file = CampaignFile.read(content, "a campaign file")
+    section = file.campaign
+    bench = read_bench(file.bench, file.set, folder, overrides)
     case = _only_case(bench)
-    varied, correlations = read_all_varied(bench, content, folder)
+    varied, correlations = read_all_varied(bench, file.vary, file.measured, folder)
     chosen = [v.name for v in varied if not v.unit]
     if chosen:
         raise ParameterError(f"[vary] {chosen[0]} is a choice: in a campaign only numbers vary")
     known = modes_of(case.model, case.par)
     modes = {name: mode for name, mode in known.items() if not mode.lacks(case.par)}
-    _require_known_values(content.get("values", {}), modes)
-    section = content.get("campaign", {})
-    for key in section:
-        if key not in _CAMPAIGN:
-            raise unknown_name("key of [campaign]", key, _CAMPAIGN)
-    singles = tuple(_failing(modes, section, content.get("values", {})))
+    _require_known_values(file.values, modes)
+    singles = tuple(_failing(modes, section, file.values))
     if not singles:
         raise ParameterError("[campaign] leaves no fault: only and leave_out contradict each other")
     latent = [
         Failing(mode, size, is_present=True)
         for name, mode in modes.items()
         if any(fnmatchcase(name, each) for each in _patterns(section, "latent", modes))
-        for size in _sizes(mode, content.get("values", {}))
+        for size in _sizes(mode, file.values)
     ]
     pairs = _pairs(singles, latent, case)
-    faults = (*singles, *pairs)
-    criteria = read_criteria(content.get("criteria", []), signals_of(case.model.Output))
+    criteria = criteria_of(file.criteria, signals_of(case.model.Output))
     if not criteria:
         raise ParameterError("[[criteria]] are missing: say what a fault must not do")
     plan = CampaignPlan(
-        str(content["name"]),
+        file.name,
         bench,
-        faults,
+        (*singles, *pairs),
         _onsets(section, case),
         criteria,
-        _residuals(content.get("residuals"), case),
+        _residuals(file.residuals, case),
         varied,
-        healthy=_whole(section, "healthy", 64, 4),
-        false_alarms=_share(section),
-        seed=_whole(section, "seed", 1, 0, 1_000_000),
+        healthy=section.healthy,
+        false_alarms=section.false_alarms,
+        seed=section.seed,
         correlations=correlations,
-        rates=_rates(content.get("rates", {}), modes),
-        reaction=_reaction(content, modes),
+        rates=_rates(file.rates, modes),
+        reaction=None if file.reaction is None else _reaction(file.reaction, modes),
     )
     require_small(plan)
     return plan
@@ -158,7 +168,7 @@ def _only_case(bench: Bench) -> Case:
 
 
 def _failing(
-    modes: Mapping[str, Mode], section: Mapping[str, Any], values: Mapping[str, Any]
+    modes: Mapping[str, Mode], section: CampaignSection, values: Mapping[str, Any]
 ) -> Iterator[Failing]:
     only, without, present = (
         _patterns(section, key, modes) for key in ("only", "leave_out", "present")
@@ -209,21 +219,18 @@ def _pairs(singles: Sequence[Failing], latent: Sequence[Failing], case: Case) ->
                 yield replace(each, latent=before)
 
 
-def _patterns(section: Mapping[str, Any], key: str, modes: Mapping[str, Mode]) -> list[str]:
-    patterns = section.get(key, [])
-    if not isinstance(patterns, list) or not all(isinstance(each, str) for each in patterns):
-        raise ParameterError(f"[campaign] {key} = {quoted(patterns)}: a list of names is wanted")
+def _patterns(section: CampaignSection, key: str, modes: Mapping[str, Mode]) -> Names:
+    patterns: Names = getattr(section, key)
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in modes):
             raise unknown_name(f"fault of [campaign] {key}", pattern, modes)
     return patterns
 
 
-def _onsets(section: Mapping[str, Any], case: Case) -> tuple[float, ...]:
-    first = written(section.get("onset", 0.0), "s", "[campaign] onset")
-    spread = written(section.get("spread", 0.0), "s", "[campaign] spread")
-    onsets = evenly(first, spread, _whole(section, "onsets", 8 if spread > 0 else 1, 1))
-    if not (spread >= 0 and -case.keep <= first and onsets[-1] < case.duration):
+def _onsets(section: CampaignSection, case: Case) -> tuple[float, ...]:
+    first = section.onset
+    onsets = evenly(first, section.spread, section.onsets or (8 if section.spread > 0 else 1))
+    if not (-case.keep <= first and onsets[-1] < case.duration):
         raise ParameterError(
             f"[campaign] onsets from {first:g} s to {onsets[-1]:g} s: they must lie between "
             f"{-case.keep:g} s and the end of the run at {case.duration:g} s"
@@ -231,34 +238,14 @@ def _onsets(section: Mapping[str, Any], case: Case) -> tuple[float, ...]:
     return onsets
 
 
-def _residuals(names: Any, case: Case) -> tuple[Residual, ...]:
+def _residuals(names: Names | None, case: Case) -> tuple[Residual, ...]:
     known = residuals_of(case.model)
     if names is None:
         return tuple(known.values())
-    if not isinstance(names, list):
-        raise ParameterError(f"residuals = {quoted(names)}: a list of names is wanted")
     for name in names:
-        if not isinstance(name, str) or name not in known:
-            raise unknown_name("residual", str(name), known)
+        if name not in known:
+            raise unknown_name("residual", name, known)
     return tuple(known[name] for name in names)
-
-
-def _whole(
-    section: Mapping[str, Any], key: str, default: int, least: int, most: int = 10_000
-) -> int:
-    value = section.get(key, default)
-    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-        raise ParameterError(
-            f"[campaign] {key} = {quoted(value)}: a whole number from {least} to {most} is wanted"
-        )
-    return value
-
-
-def _share(section: Mapping[str, Any]) -> float:
-    share = number(section.get("false_alarms", "1 %"), "1", "[campaign] false_alarms")
-    if not 0 <= share < 1:
-        raise ParameterError(f"[campaign] false_alarms = {share:g} must be from 0 to below 100 %")
-    return share
 
 
 def _rates(section: Mapping[str, Any], modes: Mapping[str, Mode]) -> dict[str, float]:
@@ -272,22 +259,11 @@ def _rates(section: Mapping[str, Any], modes: Mapping[str, Mode]) -> dict[str, f
     return {name: float(rate) for name, rate in section.items()}
 
 
-def _reaction(content: Mapping[str, Any], modes: Mapping[str, Mode]) -> Reaction | None:
-    section = content.get("reaction", {})
-    if not section:
-        return None
-    for key in section:
-        if key not in _REACTION:
-            raise unknown_name("key of [reaction]", key, _REACTION)
-    name = str(section.get("fault", ""))
-    if name not in modes:
-        raise unknown_name("mode of [reaction]", name, modes)
-    mode = modes[name]
-    if "value" in section and not mode.unit:
-        raise ParameterError(f"[reaction] {name} takes no value: leave it out")
-    size = section.get("value", mode.value)
-    value = _size(mode, size, "[reaction] value")
-    delay = written(section.get("delay", 0.0), "s", "[reaction] delay")
-    if delay < 0:
-        raise ParameterError(f"[reaction] delay = {delay:g} s must be >= 0 s")
-    return Reaction(Failing(mode, value), delay)
+def _reaction(section: ReactionSection, modes: Mapping[str, Mode]) -> Reaction:
+    if section.fault not in modes:
+        raise unknown_name("mode of [reaction]", section.fault, modes)
+    mode = modes[section.fault]
+    if section.value is not None and not mode.unit:
+        raise ParameterError(f"[reaction] {mode.name} takes no value: leave it out")
+    size = mode.value if section.value is None else section.value
+    return Reaction(Failing(mode, _size(mode, size, "[reaction] value")), section.delay)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
@@ -17,12 +17,14 @@ from bywire.bench.faults.fault_section import Injection
 from bywire.bench.faults.injected import taps_of, touched
 from bywire.bench.faults.modes import Mode
 from bywire.bench.option_names import split_options
-from bywire.bench.values import written
 from bywire.campaigns.residual import Residual, first_time, least_of_the_last, missed_ticks
-from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import TimeConstant
+from bywire.core.section import Name, Section
 from bywire.core.signals import Signal
 from bywire.core.typing import Array
+from bywire.core.values import written
 from bywire.core.version import __version__
 from bywire.simulation.tapped import Tap
 from bywire.studies.identity import as_json, digest_of
@@ -30,7 +32,20 @@ from bywire.studies.plan import CHUNK, StudyPlan, Varied
 
 Sense = Literal["above", "below", "above_healthy", "below_healthy", "below_share"]
 SENSES: tuple[Sense, ...] = ("above", "below", "above_healthy", "below_healthy", "below_share")
-_KEYS = ("name", "signal", "lasting", "severity", *SENSES)
+
+
+class CriterionSection(Section):
+    """A section ``[[criteria]]``; its level has the unit of its signal."""
+
+    name: Name
+    signal: Any = ""
+    lasting: TimeConstant = 0.0
+    severity: str = ""
+    above: Any = None
+    below: Any = None
+    above_healthy: Any = None
+    below_healthy: Any = None
+    below_share: Any = None
 
 
 @dataclass(frozen=True)
@@ -80,13 +95,15 @@ class Criterion:
         return first_time(beyond, time, onset + self.lasting)
 
 
-def read_criteria(entries: Any, signals: Mapping[str, Signal]) -> tuple[Criterion, ...]:
+def criteria_of(
+    sections: Sequence[CriterionSection], signals: Mapping[str, Signal]
+) -> tuple[Criterion, ...]:
     """Return the criteria of a campaign.
 
     Parameters
     ----------
-    entries
-        Tables of ``[[criteria]]``.
+    sections
+        What its file says.
     signals
         What the model records.
 
@@ -95,9 +112,7 @@ def read_criteria(entries: Any, signals: Mapping[str, Signal]) -> tuple[Criterio
     InputError
         When one of them does not fit.
     """
-    if not isinstance(entries, list) or not all(isinstance(each, Mapping) for each in entries):
-        raise ParameterError("write [[criteria]] with two brackets, once for each criterion")
-    criteria = tuple(_criterion(each, signals) for each in entries)
+    criteria = tuple(_criterion(each, signals) for each in sections)
     names = [criterion.name for criterion in criteria]
     for name in names:
         if names.count(name) > 1:
@@ -105,31 +120,20 @@ def read_criteria(entries: Any, signals: Mapping[str, Signal]) -> tuple[Criterio
     return criteria
 
 
-def _criterion(entry: Mapping[str, Any], signals: Mapping[str, Signal]) -> Criterion:
-    for key in entry:
-        if key not in _KEYS:
-            raise unknown_name("key of [[criteria]]", key, _KEYS)
-    name, signal = entry.get("name"), entry.get("signal")
-    if not isinstance(name, str) or not name.strip():
-        raise ParameterError(f"[[criteria]] name = {quoted(name)}: a text is wanted")
+def _criterion(section: CriterionSection, signals: Mapping[str, Signal]) -> Criterion:
+    name, signal = section.name, section.signal
     if not isinstance(signal, str) or signal not in signals:
         raise unknown_name(f"signal of criterion {name!r}", str(signal), signals)
-    senses = [sense for sense in SENSES if sense in entry]
+    senses = [sense for sense in SENSES if sense in section.given]
     if len(senses) != 1:
         raise ParameterError(
             f"[[criteria]] {name!r}: say exactly one of {', '.join(SENSES)}, for instance "
             'above_healthy = "5 bar"'
         )
     (sense,) = senses
-    unit = "1" if sense == "below_share" else signals[str(signal)].unit
-    level = written(entry[sense], unit, f"criterion {name}.{sense}")
-    lasting = written(entry.get("lasting", 0.0), "s", f"criterion {name}.lasting")
-    if lasting < 0:
-        raise ParameterError(f"criterion {name}.lasting = {lasting:g} s must be >= 0 s")
-    severity = entry.get("severity", "")
-    if not isinstance(severity, str):
-        raise ParameterError(f"criterion {name}.severity = {quoted(severity)}: a text is wanted")
-    return Criterion(name, str(signal), sense, level, lasting, severity)
+    unit = "1" if sense == "below_share" else signals[signal].unit
+    level = written(getattr(section, sense), unit, f"criterion {name}.{sense}")
+    return Criterion(name, signal, sense, level, section.lasting, section.severity)
 
 
 # --- The plan

@@ -68,7 +68,18 @@ app.command("new")(new_command)
 @cache
 def program() -> Any:
     """Return the command line, called with its arguments: its options are read off once."""
-    return typer.main.get_command(app)
+    found = typer.main.get_command(app)
+    _keep_brackets(found)
+    return found
+
+
+def _keep_brackets(command: Any) -> None:
+    """Have help show brackets, as in ``Pressure [bar]``, which Rich would take for markup."""
+    for option in command.params:
+        if getattr(option, "help", None):
+            option.help = option.help.replace("[", r"\[")
+    for inner in getattr(command, "commands", {}).values():
+        _keep_brackets(inner)
 
 
 @app.callback(invoke_without_command=True)

@@ -50,14 +50,14 @@ def show(
     """
     from bywire.report.answer import (
         AnswerWarning,
-        leave_out_descriptions,
+        load_matplotlib,
         with_files,
         write_document,
     )
     from bywire.report.terminal import terminal_text
 
     if out is not None:
-        leave_out_descriptions()
+        load_matplotlib()
     files: list[Path] = []
     trouble: BywireError | None = None
     with heard_warnings() as caught:

@@ -163,7 +163,7 @@ def leaf_fields(cls: type[ParameterSet], prefix: str = "") -> Mapping[str, Leaf]
             continue
         unit = next((m for m in info.metadata if isinstance(m, Unit)), None)
         if unit is not None:
-            leaves[dotted] = _leaf(dotted, unit, info)
+            leaves[dotted] = leaf_of(dotted, unit, info)
     return MappingProxyType(leaves)
 
 
@@ -213,7 +213,8 @@ def require_units(cls: type[ParameterSet], prefix: str = "") -> None:
             )
 
 
-def _leaf(dotted: str, unit: Unit, info: FieldInfo) -> Leaf:
+def leaf_of(dotted: str, unit: Unit, info: FieldInfo) -> Leaf:
+    """Return what the constraints of a field say of a number."""
     low, high, low_open, high_open = -math.inf, math.inf, False, False
     is_whole = info.annotation is int
     for note in (*info.metadata, *_node_notes(info.annotation)):

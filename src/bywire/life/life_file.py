@@ -7,17 +7,19 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
-from bywire.bench.values import parsed, require_units
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
-from bywire.core.units import parse
+from bywire.core.quantities import Unit
+from bywire.core.section import Hint, Section, Table
+from bywire.core.values import parsed, require_units
 from bywire.data.file_kinds import LIFE, require_kind
 from bywire.data.toml_file import read_toml
 from bywire.life.declaration import LIVES, Life, StopConditions
@@ -114,10 +116,29 @@ class LifePlan:
 
 WEAR = "wear."
 """what the names of parameters of wear begin with"""
-_KEYS = ("name", "life", "set", "vary", "projection")
 _MOST = 4096  # stops that stand for a population
 CONDITIONS = StopConditions(pause=600.0, T_air=293.15)
 """a stop every ten minutes at 20 degC"""
+
+
+class ProjectionSection(Section):
+    """The section ``[projection]``; what it leaves out is as of a `LifePlan`."""
+
+    stops: Annotated[int | None, Field(ge=2, le=_MOST)] = None
+    seed: Annotated[int | None, Field(ge=0, le=2**63 - 1)] = None
+    longest: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
+    share: Annotated[float | None, Unit("1"), Field(ge=0.001, le=0.5)] = None
+    tolerance: Annotated[float | None, Unit("1"), Field(ge=1e-6, le=0.5)] = None
+
+
+class LifeFile(Section):
+    """A life file."""
+
+    name: str
+    life: Annotated[str, Hint("write life = \"...\" (see 'bywire list lives')")]
+    set: Table
+    vary: Mapping[str, Any] | None = None
+    projection: ProjectionSection = ProjectionSection()
 
 
 def read_life(source: str | Path, overrides: Mapping[str, str] = MappingProxyType({})) -> LifePlan:
@@ -151,19 +172,9 @@ def read_life(source: str | Path, overrides: Mapping[str, str] = MappingProxyTyp
 
 
 def _plan(content: Mapping[str, Any], name: str, overrides: Mapping[str, str]) -> LifePlan:
-    for key in content:
-        if key not in _KEYS:
-            raise unknown_name("key of a life file", key, _KEYS)
-    for key in ("set", "vary", "projection"):
-        if not isinstance(content.get(key, {}), Mapping):
-            raise ParameterError(f"[{key}] must be a section with key = value lines")
-    for key in ("name", "life"):
-        if not isinstance(content.get(key, name), str):
-            raise ParameterError(f"{key} = {quoted(content[key])}: a text is wanted")
-    if "life" not in content:
-        raise ParameterError("life is missing: write life = \"...\" (see 'bywire list lives')")
-    life = LIVES.find(content["life"])
-    changes = _texts(bench_file.flattened(content.get("set", {}))) | dict(overrides)
+    file = LifeFile.read({"name": name, **content}, "a life file")
+    life = LIVES.find(file.life)
+    changes = _texts(bench_file.flattened(file.set)) | dict(overrides)
     bench = bench_file.read(
         life.experiment,
         {**life.settings, **{k: v for k, v in changes.items() if not _is_of_life(k)}},
@@ -171,16 +182,16 @@ def _plan(content: Mapping[str, Any], name: str, overrides: Mapping[str, str]) -
     conditions = CONDITIONS.replace(_given(StopConditions, changes, CONDITION))
     wear = life.defaults().replace(_given(life.wear, changes, WEAR))
     population = {k: v for k, v in life.population.items() if k not in changes}
-    varied = tuple(_varied(bench, conditions, content.get("vary", population)))
+    varied = tuple(_varied(bench, conditions, population if file.vary is None else file.vary))
     _require_free(life, bench, wear, varied)
     return LifePlan(
-        content.get("name", name),
+        file.name,
         life,
         bench,
         wear,
         conditions,
         varied,
-        **_projection(content.get("projection", {})),
+        **file.projection.given,
     )
 
 
@@ -234,34 +245,3 @@ def _require_free(life: Life, bench: Bench, wear: ParameterSet, varied: tuple[Va
                     f"[vary] {name} follows from what wears: its first value is the bench's, "
                     "change it by [set]"
                 )
-
-
-def _projection(section: Mapping[str, Any]) -> dict[str, Any]:
-    known: dict[str, tuple[float, float]] = {
-        "stops": (2, _MOST),
-        "seed": (0, 2**63 - 1),
-        "longest": (1, 1_000_000),
-    }
-    shares = {"share": (0.001, 0.5), "tolerance": (1e-6, 0.5)}
-    settings: dict[str, Any] = {}
-    for key, value in section.items():
-        if key in shares:
-            low, high = shares[key]
-            settings[key] = parse(value, "1", f"[projection] {key}")
-            if not low <= settings[key] <= high:
-                raise ParameterError(
-                    f"[projection] {key} = {quoted(value)} must lie between {100 * low:g} % and "
-                    f"{100 * high:g} %"
-                )
-        elif key in known:
-            low, high = known[key]
-            is_whole = isinstance(value, int) and not isinstance(value, bool)
-            if not is_whole or not low <= value <= high:
-                raise ParameterError(
-                    f"[projection] {key} = {quoted(value)}: a whole number from {low} to {high} "
-                    "is wanted"
-                )
-            settings[key] = value
-        else:
-            raise unknown_name("key of [projection]", key, (*known, *shares))
-    return settings

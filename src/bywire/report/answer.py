@@ -194,20 +194,15 @@ def with_files(document: Document, files: list[Path]) -> dict[str, Any]:
     return {**shown, "files": [*shown.get("files", []), *map(str, files)]}
 
 
-def leave_out_descriptions() -> None:
-    """Load matplotlib without descriptions of all that can be set.
+def load_matplotlib() -> None:
+    """Load matplotlib as the user has set it up.
 
-    It makes signatures and docstrings of every artist's properties when it is loaded, which takes
-    a third of that time, and no command shows them. Settings of a file ``matplotlibrc`` in the
-    working folder, which may have figures set by another program (TeX), do not count.
+    A file ``matplotlibrc`` in the working folder does not count: it may have come with somebody
+    else's data, and may have figures set by another program (TeX).
     """
     is_set_here = os.path.exists("matplotlibrc")
     with contextlib.chdir(sys.prefix) if is_set_here else contextlib.nullcontext():
-        from matplotlib import artist
-
-    of_all: Any = artist.Artist
-    setattr(artist, "kwdoc", lambda _: "")  # noqa: B010 - a function is no variable to mypy
-    of_all._update_set_signature_and_docstring = classmethod(lambda _: None)
+        import matplotlib  # noqa: F401
 
 
 def finite(value: Any) -> Any:

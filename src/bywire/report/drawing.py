@@ -23,8 +23,6 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.text import Text
 
-from bywire.report.lean_ticks import lean_ticks
-
 _COMPRESSION = 3
 """zlib's next takes twice as long for a figure, to save 1 % of many points, 15 % of few lines"""
 _FONTS = "'DejaVu Sans', 'Bitstream Vera Sans', Verdana, sans-serif"
@@ -54,9 +52,8 @@ def drawn(figure: Figure, dpi: float) -> tuple[bytes, bytes]:
         try:
             figure.dpi = dpi
             both = _Canvas(figure).get_renderer()
-            with lean_ticks(figure):
-                settle(figure)
-                figure.draw(both)
+            settle(figure)
+            figure.draw(both)
         finally:
             figure.dpi = resolution
             figure.set_canvas(canvas)

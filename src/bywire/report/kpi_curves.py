@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bywire.bench.bench import Bench
-from bywire.bench.requirements import limit_of
 from bywire.bench.result import Result
 from bywire.core.typing import Array
 from bywire.report import style
@@ -81,11 +80,13 @@ def kpi_curves(varied: Varied) -> Figure:
             capsize=2.0,
         )
         axes.plot(abscissa, values, color=style.BLUE, linewidth=1.0, marker="o", markersize=3.0)
-        if name in varied.bench.requirements:
+        if (limit := varied.bench.limits.get(name)) is not None:
             look = style.STROKES[Role.LIMIT]
-            bound = limit_of(name, varied.bench.requirements[name], unit)[1]
             axes.axhline(
-                scale(bound), color=look.color, linestyle=look.linestyle, linewidth=look.linewidth
+                scale(limit.bound),
+                color=look.color,
+                linestyle=look.linestyle,
+                linewidth=look.linewidth,
             )
             missed = _missed(name, varied.results)
             axes.plot(

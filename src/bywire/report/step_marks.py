@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bywire.bench.experiment import Experiment
-from bywire.bench.requirements import Verdict, limit_of
+from bywire.bench.requirements import Verdict
 from bywire.core.errors import ParameterError
 from bywire.core.units import convert
 from bywire.report import style
@@ -91,7 +91,7 @@ def step_limits(
         return None
     if setting.start == setting.end:
         return None
-    limits = [limit_of(v.kpi, v.limit, v.unit)[1] for v in verdicts if v.kpi == "overshoot"]
+    limits = [v.required.bound for v in verdicts if v.kpi == "overshoot"]
     overshoot = limits[0] / 100.0 if limits else None
     return setting.signal, StepLimits(
         setting.t_step, setting.start, setting.end, overshoot=overshoot

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from bywire.bench.requirements import COMPARE
 from bywire.core.units import difference_unit
 from bywire.report.wording import amount, clean, error_text, measured_amount, unit_text
 
@@ -119,7 +120,7 @@ class ReproductionRow:
     @property
     def bound(self) -> str:
         """``"<="`` or ``">="`` where the statement is a bound, else empty."""
-        return str(self.tolerance) if self.tolerance in ("<=", ">=") else ""
+        return str(self.tolerance) if self.tolerance in COMPARE else ""
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
+from bywire.bench.requirements import COMPARE
 from bywire.core.arguments import checked
 
 Tolerance = float | Literal["<=", ">="]
@@ -170,12 +170,8 @@ def quoted(name: str, fact: Fact, note: str) -> Item:
 
 def holds(stated: float, computed: float, tolerance: Tolerance) -> bool:
     """Return whether a computed number agrees with a stated one; NaN never does."""
-    if math.isnan(computed):
-        return False
-    if tolerance == "<=":
-        return computed <= stated
-    if tolerance == ">=":
-        return computed >= stated
+    if isinstance(tolerance, str):
+        return bool(COMPARE[tolerance](computed, stated))
     return abs(computed - stated) <= tolerance
 
 

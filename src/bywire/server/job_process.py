@@ -80,11 +80,11 @@ def _compute(order: Mapping[str, Any]) -> None:
     from bywire.core.brake import load_system
     from bywire.core.callers import command_line
     from bywire.core.unneeded import silence_matplotlib
-    from bywire.report.answer import AnswerWarning, leave_out_descriptions, write_document
+    from bywire.report.answer import AnswerWarning, load_matplotlib, write_document
     from bywire.server.task_registry import tasks
 
     silence_matplotlib()
-    leave_out_descriptions()
+    load_matplotlib()
     os.chdir(order["folder"])
     task, out = tasks()[order["task"]], Path(order["out"])
     with heard_warnings() as caught, command_line():

@@ -43,9 +43,9 @@ def _judged(findings: Findings) -> Iterator[tuple[str, str]]:
         share = each.share
         low, high = percent(share.low, share), percent(share.high, share)
         yield (
-            each.demand.kpi,
+            each.demand.figure,
             (
-                f"{each.demand.text}: {share.count} of {share.cases} cases, probability "
+                f"{each.demand}: {share.count} of {share.cases} cases, probability "
                 f"{percent(share.value, share)} ({confidence} interval: {low} to {high})"
             ),
         )

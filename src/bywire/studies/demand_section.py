@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from bywire.bench.bench import Bench
-from bywire.bench.requirements import limit_of
+from bywire.bench.requirements import Limit, read_limit
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.units import parse
-from bywire.studies.plan import Demand
 
 _WITH = re.compile(r"(.*?)\s+with\b\s*(.*?)\s*", re.DOTALL)
 _PERCENT = re.compile(r"[+-]?[\d.]+(?:[eE][+-]?\d+)?\s*%")
@@ -18,7 +18,7 @@ _SHARE = re.compile(r"0?\.\d+")
 _EXAMPLE = "99 %"
 
 
-def read_demands(bench: Bench, section: Mapping[str, Any]) -> Iterator[Demand]:
+def read_demands(bench: Bench, section: Mapping[str, Any]) -> Iterator[Limit]:
     """Yield what is required: by the study, and by its bench of what the study says nothing of.
 
     Raises
@@ -31,9 +31,8 @@ def read_demands(bench: Bench, section: Mapping[str, Any]) -> Iterator[Demand]:
         if kpi not in units:
             raise unknown_name("KPI in [requirements]", kpi, units)
         split = _WITH.fullmatch(text) if isinstance(text, str) else None
-        limit = split[1] if split else text
-        limit_of(kpi, limit, units[kpi])
-        yield Demand(kpi, limit, _probability(kpi, text, split[2]) if split else None)
+        limit = read_limit(kpi, split[1] if split else text, units[kpi])
+        yield replace(limit, probability=_probability(kpi, text, split[2])) if split else limit
 
 
 def _probability(kpi: str, text: str, given: str) -> float:

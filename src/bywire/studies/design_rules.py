@@ -47,7 +47,7 @@ def require_agreement(plan: StudyPlan) -> None:
         if demand.probability is not None:
             why = _DEPENDENT if plan.design == "sobol-indices" else "draws nothing"
             raise ParameterError(
-                f"requirement {demand.text!r}: {plan.design!r} {why}, so that its cases "
+                f"requirement {str(demand)!r}: {plan.design!r} {why}, so that its cases "
                 f"have no probability: take {others}, or leave 'with ...' out: every case then has "
                 "to meet the limit"
             )

@@ -3,62 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
-from bywire.bench.values import written
-from bywire.core.arguments import whole_number
-from bywire.core.errors import ParameterError, quoted, unknown_name
-from bywire.core.units import parse
+from pydantic import Field
+
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.quantities import Unit
+from bywire.core.section import Section
 from bywire.studies.plan import StudyPlan
 from bywire.studies.points import MOST, SAMPLED, SPANNED
 from bywire.studies.sensitivity_design import LEVELS, SENSITIVITY
 from bywire.studies.sought_design import DEFAULT_CASES, SOUGHT, SUBSET
 
-_DESIGN = ("kind", "cases", "seed", "levels", "confidence", "cases_per_level", "time")
 _KINDS = (*SAMPLED, *SPANNED, *SENSITIVITY, *SOUGHT)
 _WITH_LEVELS = ("grid", "one-at-a-time")
+_Cases = Annotated[int | None, Field(ge=1, le=MOST)]
 
 
-def read_design(section: Mapping[str, Any]) -> dict[str, Any]:
+class DesignSection(Section):
+    """The section ``[design]``; what it leaves out is as of a `StudyPlan`."""
+
+    kind: str = StudyPlan.design
+    cases: _Cases = None
+    seed: Annotated[int | None, Field(ge=0, le=2**63 - 1)] = None
+    levels: Annotated[int | None, Field(ge=2, le=1000)] = None
+    confidence: Annotated[float | None, Unit("1"), Field(ge=0.5, lt=1)] = None
+    cases_per_level: _Cases = None
+    time: Annotated[float | None, Unit("s"), Field(gt=0)] = None
+
+
+def read_design(section: DesignSection) -> dict[str, Any]:
     """Return what the section says, by the fields of a `StudyPlan`.
 
     Raises
     ------
     InputError
-        For what is unknown or out of range, and what the kind of design has no use for.
+        For what is unknown, and what the kind of design has no use for.
     """
-    for key in section:
-        if key not in _DESIGN:
-            raise unknown_name("key of [design]", key, _DESIGN)
-    design: dict[str, Any] = {}
-    if "kind" in section:
-        if section["kind"] not in _KINDS:
-            raise unknown_name("[design] kind", str(section["kind"]), _KINDS)
-        design["design"] = section["kind"]
-    _require_of_use(design.get("design", StudyPlan.design), section)
-    if (default := DEFAULT_CASES.get(design.get("design", ""))) is not None:
-        design["cases"] = default
-    for key, low, high in (
-        ("cases", 1, MOST),
-        ("seed", 0, 2**63 - 1),
-        ("levels", 2, 1000),
-        ("cases_per_level", 1, MOST),
-    ):
-        if key in section:
-            design[key] = whole_number(f"[design] {key}", section[key], low, high)
-    if "confidence" in section:
-        share = parse(section["confidence"], "1", "[design] confidence")
-        if not 0.5 <= share < 1.0:
-            raise ParameterError(
-                f"[design] confidence = {quoted(section['confidence'])} must be at least 50 %, and "
-                "below 100 %"
-            )
-        design["confidence"] = share
-    if "time" in section:
-        design["time"] = written(section["time"], "s", "[design] time")
-        if not design["time"] > 0.0:
-            raise ParameterError(f"[design] time = {quoted(section['time'])} must be above zero")
-    return design
+    if section.kind not in _KINDS:
+        raise unknown_name("[design] kind", section.kind, _KINDS)
+    given = section.given
+    _require_of_use(section.kind, given)
+    if section.kind in DEFAULT_CASES:
+        given.setdefault("cases", DEFAULT_CASES[section.kind])
+    return {"design": section.kind} | {key: given[key] for key in given if key != "kind"}
 
 
 def _require_of_use(kind: str, section: Mapping[str, Any]) -> None:

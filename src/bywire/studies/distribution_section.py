@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from bywire.bench.relative_changes import refuse_share_of_temperature, share_of
-from bywire.bench.values import number, plain_text
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.units import difference_unit, parse, shown
+from bywire.core.values import number, plain_text
 from bywire.studies.admissible import admitted, require_single_values, whole
 from bywire.studies.distribution import NEVER, Distribution
 from bywire.studies.laws import Law, LogNormal, Normal, Triangular, Uniform, truncated_normal

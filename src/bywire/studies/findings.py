@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.requirements import limit_of
+from bywire.bench.requirements import Limit
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.studies.choice_influence import ChoiceInfluence, choice_influence
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.effects import ONE, Effect, effects
-from bywire.studies.judgment import Judgment, close_to, judgment_of
-from bywire.studies.plan import Demand, StudyPlan
+from bywire.studies.judgment import Judgment, judgment_of
+from bywire.studies.plan import StudyPlan
 from bywire.studies.rare_failures import RareFailure
 from bywire.studies.sensitivity import Sensitivity, sensitivity
 from bywire.studies.spread import Spread, spread_of
@@ -169,7 +169,10 @@ class Findings:
         """
         if self.rare:
             return [
-                i.quantity for each in self.rare if each.demand.kpi == name for i in each.importance
+                i.quantity
+                for each in self.rare
+                if each.demand.figure == name
+                for i in each.importance
             ]
         if self.plan.sensitivity is not None:
             return [each.quantity for each in self.sensitivity(name).drivers]
@@ -239,7 +242,7 @@ class Findings:
         """Return a requirement of which shares of the cases say nothing."""
         among, wanted = self._judgment(rare.demand), rare.demand.probability
         assert wanted is not None
-        numbers, error = np.asarray(self.cases[CASE]), self._error(rare.demand.kpi)
+        numbers, error = np.asarray(self.cases[CASE]), self._error(rare.demand.figure)
         return replace(
             among,
             outcome=rare.failure.outcome(wanted, error),
@@ -252,18 +255,10 @@ class Findings:
         error = {kpi.name: kpi.bound for kpi in self.nominal}.get(name, math.nan)
         return 0.0 if math.isnan(error) else error
 
-    def is_close(self, demand: Demand) -> NDArray[np.bool_]:
+    def is_close(self, demand: Limit) -> NDArray[np.bool_]:
         """Return which cases are no further from a limit than their figure may be off."""
-        _, bound = limit_of(demand.kpi, demand.limit, self.units[demand.kpi])
-        return close_to(bound, self.figure(demand.kpi), self._error(demand.kpi))
+        return demand.is_near(self.figure(demand.figure), self._error(demand.figure))
 
-    def _judgment(self, demand: Demand) -> Judgment:
-        kpi = demand.kpi
-        return judgment_of(
-            demand,
-            self.units[kpi],
-            self.figure(kpi),
-            self._failed,
-            self._error(kpi),
-            self.plan.confidence,
-        )
+    def _judgment(self, demand: Limit) -> Judgment:
+        figure, error = self.figure(demand.figure), self._error(demand.figure)
+        return judgment_of(demand, figure, self._failed, error, self.plan.confidence)

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.bench.requirements import is_met, limit_of
+from bywire.bench.requirements import Limit
 from bywire.core.typing import Array
 from bywire.studies.failure_probability import FailureProbability
-from bywire.studies.plan import Demand
 from bywire.studies.statistics import Outcome, Share, judged, share
 
 
@@ -41,7 +40,7 @@ class Judgment:
         its cases are no probabilities.
     """
 
-    demand: Demand
+    demand: Limit
     met: NDArray[np.bool_]
     share: Share
     undecided: int
@@ -51,8 +50,7 @@ class Judgment:
 
 
 def judgment_of(
-    demand: Demand,
-    unit: str,
+    demand: Limit,
     figure: Array,
     failed: NDArray[np.bool_],
     error: float,
@@ -64,18 +62,17 @@ def judgment_of(
     ----------
     demand
         The requirement.
-    unit, figure
+    figure
         Its key figure in every case, shape (cases,); NaN where a case does not have it.
     failed
         Whether a case has no result, shape (cases,).
     error
-        What the figure may be off by, in ``unit``: cases closer to the limit count for neither
+        What the figure may be off by, in its unit: cases closer to the limit count for neither
         side.
     confidence
         Of the interval, between 0 and 1.
     """
-    compare, bound = limit_of(demand.kpi, demand.limit, unit)
-    met, near = is_met(figure, compare, bound), close_to(bound, figure, error)
+    met, near = demand.is_met(figure), demand.is_near(figure, error)
     count = figure.size
     may, surely = (share(int(each.sum()), count, confidence) for each in (met | near, met & ~near))
     if demand.probability is not None:
@@ -85,13 +82,8 @@ def judgment_of(
     else:
         outcome = "met" if surely.count == count else "undecided"
     told = replace(share(int(met.sum()), count, confidence), low=surely.low, high=may.high)
-    worst = _worst(figure, failed, compare.startswith("<"))
+    worst = _worst(figure, failed, demand.is_upper)
     return Judgment(demand, met, told, int(near.sum()), outcome, worst)
-
-
-def close_to(bound: float, figure: Array, error: float) -> NDArray[np.bool_]:
-    """Return which cases are no further from a limit than their figure may be off."""
-    return np.asarray(np.abs(figure - bound) <= error)
 
 
 def _worst(figure: Array, failed: NDArray[np.bool_], is_upper: bool) -> int | None:

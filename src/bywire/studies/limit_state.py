@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bywire.bench.requirements import is_met
+from bywire.bench.requirements import Limit
 from bywire.core.typing import Array
 from bywire.data.file_format import library
 from bywire.studies.sought_design import LIBRARY
@@ -30,20 +30,22 @@ class BudgetSpentError(UnfinishedError):
     """No more cases are admitted."""
 
 
-def margins_of(values: Array, compare: str, bound: float) -> Array:
+def margins_of(values: Array, limit: Limit) -> Array:
     """Return how far each figure is from missing its limit, in its unit; it is missed at <= 0.
 
     A figure that is not defined is `BEYOND`: a finite number, for levels are ranked by it.
 
     Examples
     --------
-    >>> margins_of(np.array([14.0, 16.0, np.nan]), "<=", 15.0).tolist()
+    >>> limit = Limit("overshoot", "<=", 15.0, "%", "<= 15 %")
+    >>> margins_of(np.array([14.0, 16.0, np.nan]), limit).tolist()
     [1.0, -1.0, -1e+300]
     """
-    distance = values - bound if compare.startswith(">") else bound - values
-    met = is_met(values, compare, bound)
+    distance = limit.bound - values if limit.is_upper else values - limit.bound
     finite = np.clip(np.where(np.isnan(values), BEYOND, distance), BEYOND, -BEYOND)
-    return np.asarray(np.where(met, np.maximum(finite, _LEAST), np.minimum(finite, 0.0)))
+    return np.asarray(
+        np.where(limit.is_met(values), np.maximum(finite, _LEAST), np.minimum(finite, 0.0))
+    )
 
 
 @dataclass

@@ -8,22 +8,30 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from bywire.bench.bench import Bench
 from bywire.core.errors import FileError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import leaf_fields
+from bywire.core.section import Hint, Name, Names, Section
 from bywire.studies.distribution_section import read_distribution
 from bywire.studies.plan import Varied
 
 ESTIMATE = "estimate.json"
 """file of an identification's folder that holds its estimates"""
-_KEYS = ("file", "of", "truncate")
 _LARGEST = 20_000_000  # bytes of a file that is read
 _TRUNCATE = "cut it off, with truncate = true"
 _WEAK = 1e-9  # correlation that counts as none
+
+
+class MeasuredSection(Section):
+    """The section ``[measured]``: estimates of an identification, of which parameters vary."""
+
+    file: Annotated[Name, Hint("name the folder that 'bywire identify --out' has written")]
+    of: Names | None = None
+    truncate: bool = False
 
 
 @dataclass(frozen=True)
@@ -65,7 +73,7 @@ class Measured:
 
 
 def varied_as_measured(
-    bench: Bench, section: Mapping[str, Any], folder: Path
+    bench: Bench, section: MeasuredSection, folder: Path
 ) -> tuple[tuple[Varied, ...], dict[tuple[str, str], float]]:
     """Return parameters that vary as they were measured, and the correlations of their estimates.
 
@@ -86,26 +94,15 @@ def varied_as_measured(
     InputError
         For a section that does not fit, and estimates that leave the admissible range.
     """
-    for key in section:
-        if key not in _KEYS:
-            raise unknown_name("key of [measured]", key, _KEYS)
-    file, truncate = section.get("file"), section.get("truncate", False)
-    if not isinstance(file, str) or not file.strip():
-        said = f"file = {quoted(file)}" if "file" in section else "file is missing"
-        raise ParameterError(
-            f"[measured] {said}: name the folder that 'bywire identify --out' has written"
-        )
-    if not isinstance(truncate, bool):
-        raise ParameterError(f"[measured] truncate = {quoted(truncate)}: true or false is wanted")
-    measured = read_measured(folder / file)
+    measured = read_measured(folder / section.file)
     leaves, values = leaf_fields(type(bench.par)), bench.par.flat()
-    of = section.get("of", [name for name in measured.values if name in leaves])
-    if not isinstance(of, list) or not of:
+    of = [name for name in measured.values if name in leaves] if section.of is None else section.of
+    if not of:
         raise ParameterError(
-            f"[measured] {file} has estimates of {', '.join(measured.values)}: name some of them "
-            "with of = [...] that the bench has too"
+            f"[measured] {section.file} has estimates of {', '.join(measured.values)}: "
+            "name some of them with of = [...] that the bench has too"
         )
-    chosen = measured.only(list(map(str, of)))
+    chosen = measured.only(of)
     varied = []
     for name, value in chosen.values.items():
         if name not in leaves:
@@ -116,7 +113,7 @@ def varied_as_measured(
             "mean": _text(value, unit),
             "sd": _text(chosen.deviations[name], unit),
         }
-        ends = {"low": leaf.low, "high": leaf.high} if truncate else {}
+        ends = {"low": leaf.low, "high": leaf.high} if section.truncate else {}
         symbol = leaf.unit.symbol
         entry |= {key: _text(x, symbol) for key, x in ends.items() if math.isfinite(x)}
         nominal = float(values[name])

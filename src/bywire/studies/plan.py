@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
 from bywire.bench.computation import computation
+from bywire.bench.requirements import Limit
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import Array
 from bywire.core.version import __version__
@@ -52,29 +53,6 @@ class Varied:
     nominal: Any
     distribution: Distribution
     together: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Demand:
-    """A requirement with the probability with which it has to be met.
-
-    Parameters
-    ----------
-    kpi, limit
-        Key figure, and its limit as text.
-    probability
-        Least probability that it is met; None where every case has to meet it.
-    """
-
-    kpi: str
-    limit: str
-    probability: float | None = None
-
-    @property
-    def text(self) -> str:
-        """The requirement as a study file says it."""
-        with_ = "" if self.probability is None else f" with {100.0 * self.probability:.10g} %"
-        return f"{self.kpi} {self.limit}{with_}"
 
 
 @dataclass(frozen=True)
@@ -119,7 +97,7 @@ class StudyPlan:
     design: str = "monte-carlo"
     cases: int = 1024
     seed: int = 1
-    demands: tuple[Demand, ...] = ()
+    demands: tuple[Limit, ...] = ()
     confidence: float = 0.95
     levels: int = 5
     time: float = math.inf
@@ -154,7 +132,7 @@ class StudyPlan:
         )
 
     @property
-    def judged_demands(self) -> tuple[Demand, ...]:
+    def judged_demands(self) -> tuple[Limit, ...]:
         """What is judged; of rare failures, what is wanted with a probability."""
         if self.design not in RARE:
             return self.demands
@@ -302,5 +280,5 @@ class StudyPlan:
             # Where it goes depends on the requirements, and on how the library draws.
             said["points"] = library_version(self.design)
             said["cases_per_level"] = self.sought.level
-            said["requirements"] = {each.kpi: each.limit for each in self.judged_demands}
+            said["requirements"] = {each.figure: each.text for each in self.judged_demands}
         return as_json(said)

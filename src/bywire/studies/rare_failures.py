@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bywire.bench.requirements import Limit
 from bywire.core.typing import Progress, silent
 from bywire.studies.computing import Executor
 from bywire.studies.distribution import Distribution
 from bywire.studies.failure_probability import FailureProbability
 from bywire.studies.importance_sampling import importance_sampling
-from bywire.studies.plan import CHUNK, Demand, StudyPlan
+from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.sought_cases import RequirementCases, SoughtCases
 from bywire.studies.sought_design import SUBSET
 from bywire.studies.store import StudyStore
@@ -71,7 +72,7 @@ class RareFailure:
         known.
     """
 
-    demand: Demand
+    demand: Limit
     failure: FailureProbability
     case: int | None
     importance: tuple[Importance, ...]

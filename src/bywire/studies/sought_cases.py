@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.bench.requirements import limit_of
+from bywire.bench.requirements import Limit
 from bywire.core.errors import FileError
 from bywire.core.typing import Array, Progress
 from bywire.studies.chunk import CASE, Columns, PlacedChunk
 from bywire.studies.computing import Compute, Executor
 from bywire.studies.limit_state import BudgetSpentError, UnfinishedError, margins_of
-from bywire.studies.plan import CHUNK, Demand, StudyPlan
+from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.sought_design import SoughtDesign
 from bywire.studies.store import StudyStore
 
@@ -151,7 +151,7 @@ class RequirementCases:
     _said: str = ""
 
     @property
-    def demand(self) -> Demand:
+    def demand(self) -> Limit:
         """The requirement."""
         return self.cases.plan.judged_demands[self.requirement]
 
@@ -178,13 +178,12 @@ class RequirementCases:
         plan, used = self.cases.plan, len(self.numbers)
         if used + len(scores) > plan.cases:
             raise BudgetSpentError
-        self.cases.progress(f"{self.demand.kpi}{self._said}", used / plan.cases)
+        self.cases.progress(f"{self.demand.figure}{self._said}", used / plan.cases)
         count = -(-len(scores) // CHUNK)
         own = [self.cases.design.chunk(self.requirement, first + k) for k in range(count)]
         found = [self.cases.chunks[n] for n in self.cases.batch(scores, own)]
         self.numbers += [int(n) for columns in found for n in columns[CASE]]
-        values = np.concatenate([columns[self.demand.kpi] for columns in found])
-        unit = plan.column_units[self.demand.kpi]
-        margins = margins_of(values, *limit_of(self.demand.kpi, self.demand.limit, unit))
+        values = np.concatenate([columns[self.demand.figure] for columns in found])
+        margins = margins_of(values, self.demand)
         self.failed.update(np.array(self.numbers[used:])[margins <= 0.0].tolist())
         return margins, count

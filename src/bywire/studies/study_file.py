@@ -6,23 +6,44 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
 from bywire.bench.bench_source import names_experiment
-from bywire.core.errors import InputError, ParameterError, quoted, unknown_of_few
+from bywire.core.errors import InputError, ParameterError, quoted
+from bywire.core.section import Hint, Name, Section, Table
 from bywire.data.file_kinds import STUDY, require_kind
 from bywire.data.toml_file import read_toml
-from bywire.studies.correlation_section import in_order, read_correlations
+from bywire.studies.correlation_section import CorrelationSection, in_order, read_correlations
 from bywire.studies.demand_section import read_demands
 from bywire.studies.design_rules import require_agreement
-from bywire.studies.design_section import read_design
+from bywire.studies.design_section import DesignSection, read_design
+from bywire.studies.measured import MeasuredSection
 from bywire.studies.plan import StudyPlan
 from bywire.studies.studied_bench import StudiedBench
 from bywire.studies.vary_section import read_all_varied
 
-_KEYS = ("name", "bench", "vary", "measured", "correlation", "design", "set", "requirements")
+BenchName = Annotated[
+    Name,
+    Hint(
+        'write bench = "...", a bench file (its path starts at this file\'s folder), or an '
+        "experiment of 'bywire list'"
+    ),
+]
+
+
+class StudyFile(Section):
+    """A study file."""
+
+    name: Name
+    bench: BenchName
+    vary: Table
+    measured: MeasuredSection | None = None
+    correlation: tuple[CorrelationSection, ...] = ()
+    design: DesignSection = DesignSection()
+    set: Table
+    requirements: Table
 
 
 def read_study(path: str | Path, overrides: Mapping[str, str] = MappingProxyType({})) -> StudyPlan:
@@ -53,63 +74,51 @@ def read_study(path: str | Path, overrides: Mapping[str, str] = MappingProxyType
 
 
 def _plan(content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]) -> StudyPlan:
-    _require_known(content)
-    for key in ("vary", "measured", "design", "set", "requirements"):
-        if not isinstance(content.get(key, {}), Mapping):
-            raise ParameterError(f"[{key}] must be a section with key = value lines")
-    name = content.get("name", file.stem)
-    if not isinstance(name, str) or not name.strip():
-        raise ParameterError(f"name = {quoted(name)}: a text is wanted")
-    bench = read_bench(content, file.parent, overrides)
-    demands = tuple(read_demands(bench, content.get("requirements", {})))
-    limits = {demand.kpi: demand.limit for demand in demands}
-    bench = replace(bench, requirements=limits, name=bench.name or name)
-    varied, measured = read_all_varied(bench, content, file.parent)
+    _require_no_bench(content)
+    study = StudyFile.read({"name": file.stem, **content}, "a study file")
+    bench = read_bench(study.bench, study.set, file.parent, overrides)
+    demands = tuple(read_demands(bench, study.requirements))
+    limits = {demand.figure: demand.text for demand in demands}
+    bench = replace(bench, requirements=limits, name=bench.name or study.name)
+    varied, measured = read_all_varied(bench, study.vary, study.measured, file.parent)
     if not varied:
         raise ParameterError("[vary] is empty: say what varies, such as \"motor.R_m\" = '+-10 %'")
-    said = {**measured, **read_correlations(content.get("correlation", []), varied, measured)}
-    changes = {**bench_file.flattened(content.get("set", {})), **overrides}
+    correlations = {**measured, **read_correlations(study.correlation, varied, measured)}
     plan = StudyPlan(
-        name,
+        study.name,
         bench,
-        in_order(varied, said),
+        in_order(varied, correlations),
         demands=demands,
-        correlations=said,
-        tested=StudiedBench(content["bench"], changes),
-        **read_design(content.get("design", {})),
+        correlations=correlations,
+        tested=StudiedBench(study.bench, {**bench_file.flattened(study.set), **overrides}),
+        **read_design(study.design),
     )
     require_agreement(plan)
     return plan
 
 
-def _require_known(content: Mapping[str, Any]) -> None:
-    """Refuse what no study file has, and say where that of a bench belongs."""
+def _require_no_bench(content: Mapping[str, Any]) -> None:
+    """Refuse sections of a bench, and say where they belong."""
+    keys = StudyFile.model_fields
     for key in content:
-        if key in bench_file.SECTIONS and key not in _KEYS:
+        if key in bench_file.SECTIONS and key not in keys:
             raise ParameterError(
                 f"[{key}] is of the bench, not of a study: write it into the bench file, or change "
                 f'single values in [set], as "{key}.NAME" = "VALUE"; a study file has '
-                f"{', '.join(_KEYS)}"
+                f"{', '.join(keys)}"
             )
-        if key not in _KEYS:
-            raise unknown_of_few("key of a study file", key, _KEYS)
 
 
-def read_bench(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]) -> Bench:
+def read_bench(
+    source: str, changes: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
+) -> Bench:
     """Return the bench that a file names, with the changes of its ``[set]`` and further ones."""
-    source = content.get("bench")
-    if not isinstance(source, str) or not source.strip():
-        said = f"bench = {quoted(source)}" if "bench" in content else "bench is missing"
-        raise ParameterError(
-            f'{said}: write bench = "...", a bench file (its path starts at this file\'s folder), '
-            "or an experiment of 'bywire list'"
-        )
-    changes = bench_file.flattened(content.get("set", {}))
-    there = source if names_experiment(source) else folder / source
-    for key, value in changes.items():
+    flat = bench_file.flattened(changes)
+    for key, value in flat.items():
         if not isinstance(value, str):
             raise ParameterError(
                 f"[set] {key} = {quoted(value)}: write the value as a text, "
                 "with its unit, as --set takes it"
             )
-    return bench_file.read(there, {**changes, **overrides})
+    there = source if names_experiment(source) else folder / source
+    return bench_file.read(there, {**flat, **overrides})

@@ -15,13 +15,13 @@ from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import leaf_fields
 from bywire.studies.admissible import require_following
 from bywire.studies.distribution_section import ENTRY_KEYS, read_distribution
-from bywire.studies.measured import varied_as_measured
+from bywire.studies.measured import MeasuredSection, varied_as_measured
 from bywire.studies.plan import Varied
 from bywire.studies.single_values import choice_text, read_choice
 
 
 def read_all_varied(
-    bench: Bench, content: Mapping[str, Any], folder: Path
+    bench: Bench, section: Mapping[str, Any], estimates: MeasuredSection | None, folder: Path
 ) -> tuple[tuple[Varied, ...], Mapping[tuple[str, str], float]]:
     """Return what varies, as the file says or as it was measured, and what goes together so.
 
@@ -29,8 +29,8 @@ def read_all_varied(
     ----------
     bench
         What is tested.
-    content
-        What the file holds.
+    section, estimates
+        ``[vary]`` and ``[measured]`` of its file.
     folder
         Where its paths start.
 
@@ -41,9 +41,9 @@ def read_all_varied(
     """
     measured: tuple[Varied, ...] = ()
     correlations: Mapping[tuple[str, str], float] = {}
-    if "measured" in content:
-        measured, correlations = varied_as_measured(bench, content["measured"], folder)
-    varied = tuple(read_varied(bench, content.get("vary", {})))
+    if estimates is not None:
+        measured, correlations = varied_as_measured(bench, estimates, folder)
+    varied = tuple(read_varied(bench, section))
     places: dict[str, str] = {}
     for title, each in (("[measured]", measured), ("[vary]", varied)):
         for quantity in each:

@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from bywire.bench.requirements import Limit
 from bywire.synthesis.bench_figures import STEP_FIGURES, BenchFigures
 from bywire.synthesis.linear_case import NOMINAL
 from bywire.synthesis.optimizer import Problem
-from bywire.synthesis.requirement import Requirement
+from bywire.synthesis.requirement import share_left
 
 _LEAST = -3.0
 MEASURED = frozenset({"bandwidth", "crossover", *STEP_FIGURES})
@@ -66,7 +67,7 @@ class Candidate:
 
 
 def bench_slacks(
-    requirements: Sequence[Requirement], figures: BenchFigures, linear: Mapping[str, float]
+    requirements: Sequence[Limit], figures: BenchFigures, linear: Mapping[str, float]
 ) -> dict[str, float]:
     """Return how far each requirement is met on the bench.
 
@@ -88,13 +89,13 @@ def bench_slacks(
         slack = _on_bench(wanted, figures)
         # What the bench does not show, the linear model says; of a phase margin the worse counts.
         if math.isinf(slack) or wanted.figure == "phase_margin":
-            slack = min(slack, linear[wanted.text])
-        slacks[wanted.text] = max(slack, _LEAST)
+            slack = min(slack, linear[str(wanted)])
+        slacks[str(wanted)] = max(slack, _LEAST)
     return slacks
 
 
 def ceiling(
-    requirements: Sequence[Requirement],
+    requirements: Sequence[Limit],
     known: Sequence[BenchFigures],
     linear: Mapping[str, float],
 ) -> float:
@@ -111,12 +112,12 @@ def ceiling(
     for wanted in requirements:
         highest = min([highest, *(_on_bench(wanted, figures) for figures in known)])
         if wanted.figure not in MEASURED:
-            highest = min(highest, linear[wanted.text])
+            highest = min(highest, linear[str(wanted)])
     return max(highest, _LEAST)
 
 
 def judged(
-    requirements: Sequence[Requirement],
+    requirements: Sequence[Limit],
     gains: Mapping[str, float],
     trials: Mapping[str, BenchFigures],
     linear: Mapping[str, float],
@@ -136,21 +137,21 @@ def judged(
     nominal = trials[NOMINAL]
     each = [replace(figures, step=figures.step or nominal.step) for figures in trials.values()]
     rows = [bench_slacks(requirements, figures, linear) for figures in each]
-    slacks = {wanted.text: min(row[wanted.text] for row in rows) for wanted in requirements}
+    slacks = {str(wanted): min(row[str(wanted)] for row in rows) for wanted in requirements}
     corners = {label: figures for label, figures in trials.items() if label != NOMINAL}
     rooms = {
-        wanted.text: _room(wanted, each, slacks[wanted.text])
+        str(wanted): _room(wanted, each, slacks[str(wanted)])
         for wanted in requirements
-        if wanted.figure == "bandwidth" and wanted.sense > 0
+        if wanted.figure == "bandwidth" and not wanted.is_upper
     }
-    shown = {wanted.text: shown_on_bench(wanted, each) for wanted in requirements}
+    shown = {str(wanted): shown_on_bench(wanted, each) for wanted in requirements}
     return Candidate(dict(gains), nominal, slacks, corners, rooms, shown)
 
 
-def shown_on_bench(wanted: Requirement, trials: Sequence[BenchFigures]) -> tuple[int, int]:
+def shown_on_bench(wanted: Limit, trials: Sequence[BenchFigures]) -> tuple[int, int]:
     """Return in how many sines and steps the bench shows a figure, and in how many it might."""
     sines = [s for figures in trials for s in figures.small]
-    if wanted.figure == "bandwidth" and wanted.sense > 0:
+    if wanted.figure == "bandwidth" and not wanted.is_upper:
         return len(sines), len(sines)
     if wanted.figure in ("bandwidth", "crossover", "phase_margin"):
         name = "bandwidth" if wanted.figure == "bandwidth" else "crossover"
@@ -159,31 +160,31 @@ def shown_on_bench(wanted: Requirement, trials: Sequence[BenchFigures]) -> tuple
     return steps, steps
 
 
-def _room(wanted: Requirement, rows: Sequence[BenchFigures], slack: float) -> float:
+def _room(wanted: Limit, rows: Sequence[BenchFigures], slack: float) -> float:
     """Return the distance of the worst bandwidth from its limit, of the same sign as its slack."""
     values = [s.bandwidth for row in rows for s in row.small]
     if not values:
         return slack
-    room = wanted.slack(min(values))
+    room = share_left(wanted, min(values))
     return max(room, 0.0) if slack >= 0.0 else min(room, slack * 1e-3)
 
 
-def _on_bench(wanted: Requirement, figures: BenchFigures) -> float:
+def _on_bench(wanted: Limit, figures: BenchFigures) -> float:
     """Return the slack of what the bench measures; infinity for what it does not."""
-    if wanted.figure == "bandwidth" and wanted.sense > 0:
+    if wanted.figure == "bandwidth" and not wanted.is_upper:
         return min((s.least / math.sqrt(0.5) - 1.0 for s in figures.small), default=math.inf)
     if wanted.figure == "phase_margin":
         seen = [s for s in figures.small if not math.isnan(s.crossover)]
-        return min((wanted.slack(s.phase_margin) for s in seen), default=math.inf)
+        return min((share_left(wanted, s.phase_margin) for s in seen), default=math.inf)
     if wanted.figure in ("bandwidth", "crossover"):
         values = [getattr(s, wanted.figure) for s in figures.small]
-        return min((wanted.slack(v) for v in values if not math.isnan(v)), default=math.inf)
+        return min((share_left(wanted, v) for v in values if not math.isnan(v)), default=math.inf)
     if wanted.figure not in STEP_FIGURES or not figures.step:
         return math.inf
-    return wanted.slack(figures.step[wanted.figure])
+    return share_left(wanted, figures.step[wanted.figure])
 
 
 def linear_slacks(problem: Problem, gains: Mapping[str, float]) -> dict[str, float]:
     """Return the slack of every requirement for the worst model, by its text."""
     slacks = problem.slacks(problem.point(gains), range(len(problem.cases))).min(axis=0)
-    return {wanted.text: float(s) for wanted, s in zip(problem.requirements, slacks, strict=True)}
+    return {str(wanted): float(s) for wanted, s in zip(problem.requirements, slacks, strict=True)}

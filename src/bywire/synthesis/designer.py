@@ -8,6 +8,8 @@ from itertools import permutations
 
 import numpy as np
 
+from bywire.analysis.loop_figures import LOOP_FIGURES
+from bywire.bench.requirements import Limit
 from bywire.core.errors import ParameterError
 from bywire.core.interrupts import interrupt_heard
 from bywire.core.typing import Array, Progress
@@ -15,7 +17,6 @@ from bywire.synthesis.floors import linear_floors
 from bywire.synthesis.linear_case import LinearCase, room, slack, state_of, values_of
 from bywire.synthesis.optimizer import KEPT_MISSED, UNSTABLE, Problem, Search, starts_of
 from bywire.synthesis.outcome import MISSED, Binding, Conflict, Design, Status
-from bywire.synthesis.requirement import FIGURES, LESS_IS_BETTER, Requirement
 from bywire.synthesis.stages import piece, stage
 
 _FINE = 4000  # points of the grid for what is reported
@@ -28,7 +29,7 @@ _HELD = -1e-3  # slack of what is kept that rounding may leave
 
 def design(
     tunables: Mapping[str, tuple[float, float]],
-    requirements: Sequence[Requirement],
+    requirements: Sequence[Limit],
     cases: Sequence[LinearCase],
     start: Mapping[str, float],
     *,
@@ -97,9 +98,9 @@ def largest_error(cases: Sequence[LinearCase], gains: Mapping[str, float]) -> fl
 def _require_sampled(problem: Problem, start: Mapping[str, float]) -> None:
     period = problem.cases[0].figures(start).closed.period
     for wanted in problem.requirements:
-        if wanted.unit == "Hz" and wanted.sense > 0 and wanted.limit >= 0.5 / period:
+        if wanted.unit == "Hz" and not wanted.is_upper and wanted.bound >= 0.5 / period:
             raise ParameterError(
-                f"requirement {wanted.text!r}: the loop is sampled every {period * 1e3:g} ms; ask "
+                f"requirement {str(wanted)!r}: the loop is sampled every {period * 1e3:g} ms; ask "
                 f"for less than {0.5 / period:g} Hz"
             )
 
@@ -154,7 +155,7 @@ def _confirmed(search: Search) -> Array:
     return np.asarray(search.best if best is None else best)
 
 
-def _confirmed_by_figures(search: Search, wanted: Requirement, kept: Requirement) -> Array | None:
+def _confirmed_by_figures(search: Search, wanted: Limit, kept: Limit) -> Array | None:
     """Return the point whose figure is best on a finer grid while another requirement holds.
 
     None where no point seen holds it.
@@ -225,10 +226,10 @@ def _conflicts(search: Search, progress: Progress | None) -> tuple[Conflict, ...
 
 
 def _extreme(
-    problem: Problem, gains: Mapping[str, float], wanted: Requirement, cases: Sequence[int]
+    problem: Problem, gains: Mapping[str, float], wanted: Limit, cases: Sequence[int]
 ) -> float:
     values = [getattr(problem.cases[k].figures(gains, _FINE), wanted.figure) for k in cases]
-    return float(min(values) if wanted.sense > 0 else max(values))
+    return float(min(values) if not wanted.is_upper else max(values))
 
 
 def _judged(
@@ -248,8 +249,8 @@ def _judged(
     is_sound = set(states.values()) == {""}
     slack = bindings[0].slack if is_sound else -np.inf
     worst = {}
-    for name in FIGURES:
-        sign = -1.0 if name in LESS_IS_BETTER else 1.0
+    for name, figure in LOOP_FIGURES.items():
+        sign = -1.0 if figure.is_less_better else 1.0
         label = min(rows, key=lambda case: _size(sign * rows[case][name]))
         worst[name] = (rows[label][name], label)
     return Design(

@@ -16,8 +16,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
+from bywire.bench.requirements import Limit
 from bywire.synthesis.bench_figures import BenchFigures
-from bywire.synthesis.requirement import Requirement, read
+from bywire.synthesis.requirement import read
 
 DISK = 0.5
 """disk margin that is kept: gain by a factor of 1.67, phase by 28 degree"""
@@ -27,7 +28,7 @@ _WORSE = 1.5  # what may become of the start's figures where these are kept
 _TRACKS = 50.0  # error above which an output does not follow the set point by design, %
 
 
-def linear_floors(requirements: Sequence[Requirement], error: float) -> tuple[Requirement, ...]:
+def linear_floors(requirements: Sequence[Limit], error: float) -> tuple[Limit, ...]:
     """Return what every model keeps: a disk margin, and an error in the end.
 
     Parameters
@@ -51,10 +52,10 @@ def linear_floors(requirements: Sequence[Requirement], error: float) -> tuple[Re
 
 
 def bench_floors(
-    requirements: Sequence[Requirement],
-    floors: Sequence[Requirement],
+    requirements: Sequence[Limit],
+    floors: Sequence[Limit],
     trials: Iterable[BenchFigures],
-) -> tuple[Requirement, ...]:
+) -> tuple[Limit, ...]:
     """Return what retuned gains keep of the linear design's: floors, and how its step settled.
 
     Parameters
@@ -80,20 +81,20 @@ def bench_floors(
     return tuple(kept)
 
 
-def _implied(wanted: Requirement) -> float:
+def _implied(wanted: Limit) -> float:
     """Return the disk margin that guarantees a required margin; infinity for other figures.
 
     Half of it where the margin must not be larger.
     """
     if wanted.figure == "phase_margin":
-        disk = 2.0 * math.tan(math.radians(0.5 * wanted.limit))
+        disk = 2.0 * math.tan(math.radians(0.5 * wanted.bound))
     elif wanted.figure == "gain_margin":
-        disk = 2.0 * (wanted.limit - 1.0) / (wanted.limit + 1.0)
+        disk = 2.0 * (wanted.bound - 1.0) / (wanted.bound + 1.0)
     elif wanted.figure == "lower_gain_margin":
-        disk = 2.0 * (1.0 - wanted.limit) / (1.0 + wanted.limit)
+        disk = 2.0 * (1.0 - wanted.bound) / (1.0 + wanted.bound)
     elif wanted.figure == "sensitivity_peak":  # |S - T| = |2 S - 1| <= 2 max|S| + 1
-        return (1.0 if wanted.sense < 0 else 0.5) * 2.0 / (2.0 * wanted.limit + 1.0)
+        return (1.0 if wanted.is_upper else 0.5) * 2.0 / (2.0 * wanted.bound + 1.0)
     else:
         return math.inf
-    is_least = (wanted.sense > 0) != (wanted.figure == "lower_gain_margin")
+    is_least = wanted.is_upper == (wanted.figure == "lower_gain_margin")
     return max(disk * (1.0 if is_least else 0.5), 1e-3)

@@ -14,13 +14,14 @@ from bywire.analysis.crossings import DROP
 from bywire.analysis.linear.corners import CornerError
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop
-from bywire.analysis.loop_figures import LoopFigures
+from bywire.analysis.loop_figures import LOOP_FIGURES, LoopFigures
 from bywire.analysis.margins import NO_LOOP
+from bywire.bench.requirements import Limit
 from bywire.core.errors import InputError, ParameterError
 from bywire.core.interrupts import interrupts_deferred
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.units import shown
-from bywire.synthesis.requirement import FIGURES, Requirement
+from bywire.synthesis.requirement import share_left
 
 NOMINAL = "nominal"
 """label of the model at the operating point itself"""
@@ -63,27 +64,27 @@ def state_of(figures: LoopFigures) -> str:
 def values_of(figures: LoopFigures) -> dict[str, float]:
     """Return every figure that can be required, by name; NaN where it is not defined."""
     if not figures.is_stable:
-        return dict.fromkeys(FIGURES, math.nan)
-    return {name: float(getattr(figures, name)) for name in FIGURES}
+        return dict.fromkeys(LOOP_FIGURES, math.nan)
+    return {name: float(getattr(figures, name)) for name in LOOP_FIGURES}
 
 
-def room(figures: LoopFigures, requirement: Requirement) -> float:
+def room(figures: LoopFigures, requirement: Limit) -> float:
     """Return the distance of a figure from its limit, as a share of it."""
-    return requirement.slack(float(getattr(figures, requirement.figure)))
+    return share_left(requirement, float(getattr(figures, requirement.figure)))
 
 
-def slack(figures: LoopFigures, requirement: Requirement) -> float:
+def slack(figures: LoopFigures, requirement: Limit) -> float:
     """Return how far a requirement is met, as a share of its limit: what a search climbs.
 
     For a bandwidth it is the room of the closed loop's magnitude above -3 dB up to the limit:
     the frequency itself jumps where a dip touches that level.
     """
-    if requirement.figure != "bandwidth" or requirement.sense < 0:
+    if requirement.figure != "bandwidth" or requirement.is_upper:
         return room(figures, requirement)
     if not figures.answers:
         return -math.inf
-    below = figures.T[figures.frequencies < requirement.limit]
-    at = figures.closed.response(np.array([requirement.limit]))[:, 0, 0]
+    below = figures.T[figures.frequencies < requirement.bound]
+    at = figures.closed.response(np.array([requirement.bound]))[:, 0, 0]
     size = float(np.min(np.abs(np.append(below, at))))
     return size / (DROP * figures.rest) - 1.0
 

@@ -18,9 +18,9 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
+from bywire.bench.requirements import Limit
 from bywire.core.typing import Array
 from bywire.synthesis.linear_case import LinearCase, room, slack
-from bywire.synthesis.requirement import Requirement
 from bywire.synthesis.stages import Report, piece
 
 UNSTABLE = -12.0
@@ -50,7 +50,7 @@ class Problem:
     """
 
     tunables: Mapping[str, tuple[float, float]]
-    requirements: tuple[Requirement, ...]
+    requirements: tuple[Limit, ...]
     cases: tuple[LinearCase, ...]
     _known: dict[tuple[bytes, int], tuple[Array, Array]] = field(default_factory=dict, repr=False)
 

@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from bywire.bench.requirements import Limit
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.synthesis.linear_case import LinearCase
-from bywire.synthesis.requirement import Requirement
+from bywire.synthesis.requirement import share_left
 
 Status = Literal["met", "infeasible", "interrupted"]
 MISSED = -1e-3
@@ -29,7 +30,7 @@ class Binding:
         What was reached, and its distance from the limit as a share of it.
     """
 
-    requirement: Requirement
+    requirement: Limit
     case: str
     value: float
     slack: float
@@ -49,15 +50,15 @@ class Conflict:
         Where it was reached.
     """
 
-    wanted: Requirement
-    kept: Requirement
+    wanted: Limit
+    kept: Limit
     best: float
     gains: Mapping[str, float]
 
     @property
     def excludes(self) -> bool:
         """Whether the two alone cannot both be met."""
-        return self.wanted.slack(self.best) < MISSED
+        return share_left(self.wanted, self.best) < MISSED
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ class Design:
     conflicts: tuple[Conflict, ...]
     slack: float
     evaluations: int
-    kept: tuple[Requirement, ...] = ()
+    kept: tuple[Limit, ...] = ()
     unsound: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bywire.bench.requirements import Limit
 from bywire.core.typing import Progress, silent
 from bywire.synthesis.linear_case import LinearCase, room, values_of
 from bywire.synthesis.outcome import MISSED
-from bywire.synthesis.requirement import Requirement
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Judged:
 
 def judged_over(
     cases: Sequence[LinearCase | None],
-    requirements: Sequence[Requirement],
+    requirements: Sequence[Limit],
     gains: Mapping[str, float],
     progress: Progress = silent,
 ) -> Judged:

@@ -10,6 +10,7 @@ import numpy as np
 
 from bywire.analysis.loop import Loop, LoopSchedule
 from bywire.analysis.loop_figures import LoopFigures
+from bywire.bench.requirements import Limit
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Progress
@@ -17,7 +18,6 @@ from bywire.core.units import shown
 from bywire.synthesis.designer import design
 from bywire.synthesis.linear_case import LinearCase, cases_of, room, values_of
 from bywire.synthesis.outcome import Across, Design, ScheduleDesign
-from bywire.synthesis.requirement import Requirement
 from bywire.synthesis.stages import suffixed
 
 _FINE = 4000  # points of the grid for what is reported
@@ -75,7 +75,7 @@ def points_by_region(
 def design_schedule(
     loop: Loop,
     par: ParameterSet,
-    requirements: Sequence[Requirement],
+    requirements: Sequence[Limit],
     points: Mapping[str, Sequence[float]],
     tunables: Mapping[str, Mapping[str, tuple[float, float]]],
     *,
@@ -143,7 +143,7 @@ def design_schedule(
 def _seen_whole(
     loop: Loop,
     par: ParameterSet,
-    requirements: Sequence[Requirement],
+    requirements: Sequence[Limit],
     designed: tuple[Mapping[str, Sequence[float]], Mapping[str, Design], Mapping[str, float]],
     over: Mapping[str, Sequence[float]],
 ) -> ScheduleDesign:
@@ -168,7 +168,7 @@ def frozen(
     par: ParameterSet,
     points: Sequence[float],
     gains: Mapping[str, float],
-    requirements: Sequence[Requirement],
+    requirements: Sequence[Limit],
 ) -> tuple[Across, ...]:
     """Return the scheduled loop from the lowest to the highest point and across the borders.
 
@@ -190,14 +190,14 @@ def frozen(
 
 
 def _across(
-    case: LinearCase, region: str, requirements: Sequence[Requirement], gains: Mapping[str, float]
+    case: LinearCase, region: str, requirements: Sequence[Limit], gains: Mapping[str, float]
 ) -> Across:
     figures = case.figures(gains, _FINE)
     slack = slack_of(figures, requirements)
     return Across(case.label, case.at or 0.0, region, values_of(figures), slack)
 
 
-def slack_of(figures: LoopFigures, requirements: Sequence[Requirement]) -> float:
+def slack_of(figures: LoopFigures, requirements: Sequence[Limit]) -> float:
     """Return the room of the requirement that is worst off; negative infinity where unstable."""
     if not figures.is_stable:
         return -math.inf

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from bywire.bench.requirements import Limit
 from bywire.core.typing import Progress
 from bywire.synthesis.bench_tuning import GENERATIONS, Tuning
 from bywire.synthesis.linear_case import LinearCase
 from bywire.synthesis.outcome import ScheduleDesign
-from bywire.synthesis.requirement import Requirement
 from bywire.synthesis.schedule_designer import scheduled, slack_of
 from bywire.synthesis.stages import suffixed
 from bywire.synthesis.trial import Trial
@@ -20,7 +20,7 @@ Spans = Mapping[str, tuple[float, float]]
 
 def verify_schedule(
     design: ScheduleDesign,
-    requirements: Sequence[Requirement],
+    requirements: Sequence[Limit],
     tunables: Mapping[str, Spans],
     trial: Trial,
     *,
@@ -49,9 +49,7 @@ def verify_schedule(
     spans = {name: span for regional in tunables.values() for name, span in regional.items()}
     corners = _corners(design, requirements, trial)
 
-    def whole(
-        gains: Mapping[str, float], kept: Sequence[Requirement] | None = None
-    ) -> Verification:
+    def whole(gains: Mapping[str, float], kept: Sequence[Limit] | None = None) -> Verification:
         return verify(
             gains,
             requirements,
@@ -96,7 +94,7 @@ def verify_schedule(
 
 
 def _corners(
-    design: ScheduleDesign, requirements: Sequence[Requirement], trial: Trial
+    design: ScheduleDesign, requirements: Sequence[Limit], trial: Trial
 ) -> list[LinearCase]:
     worst: dict[float | None, tuple[float, LinearCase]] = {}
     for case in design.cases[1:]:

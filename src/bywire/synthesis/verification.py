@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.requirements import Limit
 from bywire.bench.running import run
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Progress
@@ -16,7 +17,6 @@ from bywire.synthesis.designer import largest_error
 from bywire.synthesis.floors import bench_floors, linear_floors
 from bywire.synthesis.linear_case import LinearCase, values_of
 from bywire.synthesis.optimizer import Problem
-from bywire.synthesis.requirement import Requirement
 from bywire.synthesis.stages import stage
 from bywire.synthesis.trial import Trial, corners_of, measured, wanted, worst_of
 
@@ -46,7 +46,7 @@ class Verification:
     kpis: tuple[Kpi, ...]
     nominal: Mapping[str, float]
     corners: int = 0
-    kept: tuple[Requirement, ...] = ()
+    kept: tuple[Limit, ...] = ()
 
     @property
     def final(self) -> Candidate:
@@ -74,13 +74,13 @@ class Verification:
 
 def verify(
     gains: Mapping[str, float],
-    requirements: Sequence[Requirement],
+    requirements: Sequence[Limit],
     tunables: Mapping[str, tuple[float, float]],
     cases: Sequence[LinearCase],
     trial: Trial,
     *,
     corners: Sequence[LinearCase] = (),
-    kept: Sequence[Requirement] | None = None,
+    kept: Sequence[Limit] | None = None,
     seed: int = 0,
     generations: int = GENERATIONS,
     progress: Progress | None = None,
@@ -169,12 +169,10 @@ def verify(
     return Verification(first, tuning, kpis, nominal, len(corners) or len(unseen), floors)
 
 
-def _target(
-    requirements: Sequence[Requirement], case: LinearCase, gains: Mapping[str, float]
-) -> float:
+def _target(requirements: Sequence[Limit], case: LinearCase, gains: Mapping[str, float]) -> float:
     """Return the frequency around which to measure: that required, or that of the linear loop."""
     for figure in ("bandwidth", "crossover"):
-        limits = [w.limit for w in requirements if w.figure == figure and w.sense > 0]
+        limits = [w.bound for w in requirements if w.figure == figure and not w.is_upper]
         if limits:
             return limits[0]
     return case.figures(gains).crossover

@@ -9,7 +9,7 @@ import xarray as xr
 from bywire.bench.kpis import hysteresis, release, sine_sweep, static_gain, step_response, tracking
 from bywire.bench.kpis.registry import evaluate
 from bywire.bench.kpis.step_response import Setting
-from bywire.bench.requirements import judge
+from bywire.bench.requirements import judge, read_limits
 from bywire.core.errors import ParameterError, UnknownNameError
 
 
@@ -127,7 +127,8 @@ def judged(y, **setting):
 
 def outcomes(kpis, **limits):
     """Return the outcome of each requirement."""
-    return [each.outcome for each in judge(limits, list(kpis.values()))]
+    units = {name: kpi.unit for name, kpi in kpis.items()}
+    return [each.outcome for each in judge(read_limits(limits, units).values(), kpis.values())]
 
 
 ROWS = np.linspace(0.0, 1.0, 1001)

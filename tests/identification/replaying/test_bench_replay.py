@@ -193,7 +193,7 @@ def test_errors_are_bounded_both_ways() -> None:
     assert met("lag", ">= -60 ms and <= -40 ms") == [True, True]
     with pytest.raises(ParameterError, match="give a lower limit as well"):
         met("lag", "<= -40 ms")
-    with pytest.raises(UnitError, match=r"'p.bias <= 2' is no limit in Pa.*bar"):
+    with pytest.raises(UnitError, match=r"tolerance p.bias = '2' has the wrong unit.*bar"):
         met("p.bias", "<= 2")
 
 

@@ -10,10 +10,10 @@ from typing import Any
 from bywire.bench.faults.course import AT_ZERO, Course
 from bywire.bench.faults.modes import Mode, modes_of
 from bywire.bench.relative_changes import settled
-from bywire.bench.values import number, parsed
 from bywire.core.errors import ParameterError, UnknownNameError, quoted, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
+from bywire.core.values import number, parsed
 
 _OWN = ("fault", "value", "seed", "set")
 _RANGES = {

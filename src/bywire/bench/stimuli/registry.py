@@ -10,10 +10,10 @@ from typing import Any, get_origin
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.bench.values import nodes, number
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.registry import Kind
+from bywire.core.values import nodes, number
 
 Value = str | float | Sequence[str | float]
 

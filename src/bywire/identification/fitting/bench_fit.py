@@ -11,13 +11,13 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.values import number
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, shown
+from bywire.core.values import number
 from bywire.identification.estimate import Estimate
 from bywire.identification.fitting.question import (
     Options,

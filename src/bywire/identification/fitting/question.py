@@ -14,7 +14,6 @@ from pydantic import Field
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
-from bywire.bench.values import number
 from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
@@ -24,6 +23,7 @@ from bywire.core.registry import Kind, instances
 from bywire.core.signals import signals_of, without_noise
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, shown, split
+from bywire.core.values import number
 from bywire.identification.least_squares import Loss
 from bywire.identification.method import METHODS, Method
 from bywire.identification.output_error import Between

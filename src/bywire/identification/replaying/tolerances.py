@@ -5,20 +5,16 @@ Errors may go either way: an upper limit alone of a figure that has a sign bound
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.requirements import Verdict
-from bywire.bench.values import number
-from bywire.core import units
-from bywire.core.errors import ParameterError, UnitError, quoted, unknown_name
+from bywire.bench.requirements import Limit, Verdict, parted, read_limit, verdict_of
+from bywire.core.errors import ParameterError, unknown_name
 
 SIGNED = ("bias", "lag")
 """figures that may be negative"""
-_SIGNS = ("<=", ">=", "<", ">")
-_LIMIT = re.compile(r"\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")
 _BOTH = re.compile(r"\s+and\s+")
 
 
@@ -37,14 +33,13 @@ def read_tolerances(texts: Sequence[str]) -> dict[str, str]:
     """
     limits: dict[str, str] = {}
     for text in texts:
-        sign = next((s for s in _SIGNS if s in text), "")
-        name, _, bound = (part.strip() for part in text.partition(sign or "<="))
-        if not sign or not name or not bound:
+        name, compare, bound = parted(text)
+        if compare is None or not name or not bound:
             raise ParameterError(
                 f"--tolerance {text!r} cannot be read: write for instance 'nrmse <= 5 %' or "
                 "'p_mc.max_error <= 2 bar'"
             )
-        limit = f"{sign} {bound}"
+        limit = f"{compare} {bound}"
         limits[name] = f"{limits[name]} and {limit}" if name in limits else limit
     return limits
 
@@ -75,9 +70,9 @@ def judge_fit(
         if key.startswith(f"{signal}."):
             wanted[key.removeprefix(f"{signal}.")] = key
     return tuple(
-        verdict
+        verdict_of(limit, by_name[name])
         for name, key in wanted.items()
-        for verdict in _verdicts(key, tolerances[key], by_name[name])
+        for limit in _limits(key, tolerances[key], by_name[name])
     )
 
 
@@ -101,44 +96,14 @@ def require_known(tolerances: Mapping[str, str], figures: Mapping[str, Sequence[
             raise unknown_name("figure", name, known)
 
 
-def _verdicts(key: str, text: str, kpi: Kpi) -> list[Verdict]:
-    limits = [_limit(key, limit, kpi.unit) for limit in _BOTH.split(text.strip())]
-    magnitude = kpi.name in SIGNED and not any(sign.startswith(">") for sign, *_ in limits)
-    value = abs(kpi.value) if magnitude else kpi.value
-    verdicts = []
-    for sign, bound, written in limits:
-        if magnitude and bound < 0.0:
+def _limits(key: str, text: str, kpi: Kpi) -> list[Limit]:
+    limits = [read_limit(key, limit, kpi.unit, "tolerance") for limit in _BOTH.split(text.strip())]
+    if kpi.name not in SIGNED or not all(limit.is_upper for limit in limits):
+        return limits
+    for limit in limits:
+        if limit.bound < 0.0:
             raise ParameterError(
-                f"tolerance {key} {written} bounds the magnitude, which is never negative: give a "
+                f"tolerance {limit} bounds the magnitude, which is never negative: give a "
                 f"lower limit as well, such as '{key} >= ...', and both are taken with their sign"
             )
-        met = {"<=": value <= bound, ">=": value >= bound, "<": value < bound, ">": value > bound}
-        is_decided = not (abs(value - bound) <= kpi.bound or math.isinf(kpi.bound))
-        holds = is_decided and met[sign] and not math.isnan(value)
-        verdicts.append(
-            Verdict(key, written, kpi.value, kpi.unit, holds, kpi.note, kpi.bound, is_decided)
-        )
-    return verdicts
-
-
-def _limit(key: str, text: str, unit: str) -> tuple[str, float, str]:
-    """Return comparison, limit in the figure's unit, and both as text."""
-    example = f"{key} <= {'5 %' if unit == '%' else units.example(unit)}"
-    match = _LIMIT.fullmatch(text)
-    if match is None:
-        raise ParameterError(
-            f"tolerance {key} = {quoted(text)} cannot be read: write for instance '{example}'"
-        )
-    sign, limit = match[1], match[2]
-    written = f"{sign} {limit}"
-    if unit == "%" and not limit.endswith("%"):  # 5 would be a share of 500 %
-        raise UnitError(
-            f"tolerance '{key} {written}' needs percent: write for instance '{example}'"
-        )
-    try:
-        bound = number(limit, "1" if unit == "%" else unit, key)
-    except UnitError:
-        raise UnitError(
-            f"tolerance '{key} {written}' is no limit in {unit}: write for instance '{example}'"
-        ) from None
-    return sign, (100.0 * bound if unit == "%" else bound), written
+    return [replace(limit, of_magnitude=True) for limit in limits]

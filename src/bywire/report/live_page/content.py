@@ -25,7 +25,6 @@ from bywire.bench.bench_text import bench_text
 from bywire.bench.kpis.cases import FamilyJudge
 from bywire.bench.kpis.in_c import entry_of, source_of
 from bywire.bench.kpis.registry import FAMILIES
-from bywire.bench.requirements import limit_of
 from bywire.bench.result import Result
 from bywire.bench.stated import StatedLevel, StatedRange, stated_figures, stated_for
 from bywire.core.catalog import PARAMETER_SETS
@@ -226,9 +225,8 @@ def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str
     if settings is None:
         return None
     limits = {
-        kpi.name: limit_of(kpi.name, bench.requirements[kpi.name], kpi.unit)
-        for kpi in result.kpis
-        if kpi.name in bench.requirements
+        name: {"compare": limit.compare, "bound": limit.bound}
+        for name, limit in bench.limits.items()
     }
     units = {kpi.name: kpi.unit for kpi in result.kpis}
     stated = {
@@ -243,9 +241,7 @@ def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str
             **_shown(kpi.unit),
             "definition": kpi.definition,
             "text": bench.requirements.get(kpi.name, ""),
-            "limit": dict(zip(("compare", "bound"), limits[kpi.name], strict=True))
-            if kpi.name in limits
-            else None,
+            "limit": limits.get(kpi.name),
             "stated": stated.get(kpi.name),
         }
         for kpi in result.kpis

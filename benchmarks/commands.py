@@ -1,0 +1,115 @@
+"""Whole commands as users start them, in multiples of loading the libraries that bywire needs."""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.result import Result, at_most, failed
+from bywire.core import child_process
+from bywire.core.child_process import python_command
+from bywire.simulation.kernel_cache import usable_folder
+
+LIBRARIES = "import numpy, casadi, xarray, pydantic, pint, typer, rich"
+"""what L, the unit of these figures, is the time of: absolute times differ twofold by machine"""
+_UNIT = python_command("-c", LIBRARIES)
+_ANSWERED = (0, 1)  # 1: a requirement is missed, which takes as long
+_SLOW = 8.0  # goals from which a command is run once
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command whose time is a figure of the benchmark; each folder declares those of its things.
+
+    Parameters
+    ----------
+    name
+        Name of the figure.
+    arguments
+        What follows ``bywire``; ``{folder}`` is a folder of the benchmark's own.
+    goal
+        Times L that it may take.
+    first
+        Arguments of a command that is run once before, for instance to record what is replayed.
+    """
+
+    name: str
+    arguments: tuple[str, ...]
+    goal: float
+    first: tuple[str, ...] = ()
+
+    @property
+    def rounds(self) -> int:
+        """How often it is measured; the least counts, for nothing makes a program faster."""
+        return 1 if self.goal > _SLOW else 7
+
+
+def measured(commands: Sequence[Command]) -> Iterator[Result]:
+    """Measure commands in turn with L, kernels compiled and files of Python's byte code there."""
+    with tempfile.TemporaryDirectory() as folder:
+        for command in commands:
+            try:
+                yield _measured(command, Path(folder))
+            except subprocess.CalledProcessError as error:
+                yield failed(command.name, error, "L", f"<= {command.goal:g}")
+
+
+def _measured(command: Command, folder: Path) -> Result:
+    line = _line(command.arguments, folder)
+    if command.first:
+        _seconds(_line(command.first, folder))
+    _seconds(_UNIT)
+    libraries, taken = [], []
+    before = _kernels()
+    for _ in range(command.rounds):
+        libraries.append(_seconds(_UNIT))
+        taken.append(_seconds(line))
+    if len(taken) == 1 and _kernels() != before:  # it compiled
+        taken.append(_seconds(line))
+    libraries.append(_seconds(_UNIT))
+    least, unit = min(taken), min(libraries)
+    said = f"{' '.join(command.arguments)}: {least:.3g} s; L = {unit:.3g} s; "
+    said += f"least of {len(taken)} in turn" if len(taken) > 1 else "run once"
+    return at_most(command.name, least / unit, command.goal, "L", said.replace(" {folder}", " ..."))
+
+
+def _line(arguments: Sequence[str], folder: Path) -> list[str]:
+    filled = [each.replace("{folder}", str(folder)) for each in arguments]
+    return python_command("-m", "bywire.cli", *filled)
+
+
+def _kernels() -> set[str]:
+    return {path.name for path in usable_folder().glob("*.so")}
+
+
+def _seconds(line: Sequence[str]) -> float:
+    """Return the time of a process; what it says is not shown.
+
+    Raises
+    ------
+    CalledProcessError
+        When it does not come to an answer.
+    """
+    begin = time.perf_counter()
+    done = subprocess.run(
+        line,
+        env=environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        errors="replace",
+        check=False,
+    )
+    seconds = time.perf_counter() - begin
+    if done.returncode not in _ANSWERED:
+        raise subprocess.CalledProcessError(done.returncode, line, stderr=done.stderr)
+    return seconds
+
+
+def environment() -> dict[str, str]:
+    """Return the environment of a user, whose Python keeps what it compiled of the sources."""
+    return {k: v for k, v in child_process.environment().items() if k != "PYTHONDONTWRITEBYTECODE"}

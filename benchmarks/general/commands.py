@@ -1,0 +1,14 @@
+"""Speed of commands: those of every brake, and those that no brake has a part in."""
+
+from __future__ import annotations
+
+from benchmarks.commands import Command, measured
+from benchmarks.declared import declared
+from benchmarks.suite import Part
+
+GENERAL = (
+    Command("command.help", ("--help",), 0.6),
+    Command("command.list", ("list",), 0.6),
+)
+
+PART = Part("commands", lambda: measured([*declared(Command).values()]))

@@ -1,0 +1,1 @@
+"""Speed of the master cylinder: the same problem by hand and by other simulators."""

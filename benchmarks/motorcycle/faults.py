@@ -1,0 +1,28 @@
+"""Campaigns of faults: how many cases a minute, judged, with all kernels built."""
+
+from __future__ import annotations
+
+import time
+
+from benchmarks.result import Result, at_least
+from benchmarks.suite import Part
+from bywire.campaigns.campaign_file import read_campaign
+from bywire.campaigns.running import CampaignStore, complete
+from bywire.core.typing import silent
+
+_GOAL = 1000.0  # cases a minute
+
+
+def faults() -> list[Result]:
+    """Measure the campaign of the motorcycle brake a second time, healthy runs included."""
+    plan = read_campaign("motorcycle")
+    for _ in range(2):
+        started = time.perf_counter()
+        complete(plan, CampaignStore(None), silent)
+        seconds = time.perf_counter() - started
+    note = f"{plan.total} runs with a fault beside {plan.healthy} healthy ones, all judged"
+    rate = 60.0 * plan.total / seconds
+    return [at_least("faults.cases_per_minute", rate, _GOAL, "1/min", note)]
+
+
+PART = Part("faults", faults)

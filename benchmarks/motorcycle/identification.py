@@ -1,0 +1,99 @@
+"""Identification of the seal friction from the slow ramp, against SciPy with differences."""
+
+from __future__ import annotations
+
+from functools import partial
+from statistics import median
+from typing import cast
+
+import numpy as np
+from scipy import optimize
+
+from benchmarks.result import Result, at_least
+from benchmarks.suite import Part
+from benchmarks.timing import timed
+from bywire.bench.experiment import as_run
+from bywire.brakes.motorcycle.experiments.friction_ramp import EXPERIMENT
+from bywire.brakes.motorcycle.methods.friction_ramp import METHOD, Options, shots_of
+from bywire.brakes.motorcycle.methods.stick_slip.overlay import overlaid
+from bywire.brakes.motorcycle.methods.stick_slip.shooting import Shooting
+from bywire.brakes.motorcycle.methods.stick_slip.shots import BEFORE, Shot, onset_of
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.core.catalog import parameters
+from bywire.core.typing import Array
+from bywire.identification.method import Effort
+from bywire.identification.unknown import Unknown, parameters_of, scattered
+from bywire.simulation.run import simulate
+
+STARTS = 16
+_ROUNDS, _PEER_STARTS = 3, 2
+_SEED = 1
+
+
+def measured(par: MotorcycleParameters) -> list[Result]:
+    """Measure a whole identification: 50 s at 1 kHz, seven unknowns, 16 starts."""
+    options = METHOD.defaults
+    assert isinstance(options, Options)
+    data = METHOD.synthetic(par, options, _SEED)
+    case = EXPERIMENT.cases(par, EXPERIMENT.defaults, None)[0]
+    plain = timed(partial(simulate, as_run(case, 20e-6), ("p_mc",)))
+    ours = timed(partial(METHOD.identify, data, par, options, Effort(starts=STARTS, seed=_SEED)))
+    shots = shots_of(data, options)
+    unknowns = parameters_of(par, METHOD.unknowns)
+    starts = scattered(unknowns, STARTS, 0.3, _SEED)[1 : 1 + _PEER_STARTS]
+    shooting = Shooting(par, unknowns, options.step)
+    peer = timed(partial(_by_scipy, shooting, shots, unknowns, starts, options))
+    plain()
+    seconds = [(plain(), ours(), plain()) for _ in range(_ROUNDS)]
+    in_runs = median(2.0 * b / (a + c) for a, b, c in seconds)
+    whole = median(b for _, b, _ in seconds)
+    peer_seconds = peer() * STARTS / _PEER_STARTS
+    return [
+        Result(
+            "identify.ramp_in_runs",
+            in_runs,
+            "runs",
+            note=f"seal friction from a ramp of 50 s at 1 kHz, {len(unknowns)} unknowns, "
+            f"{STARTS} starts on all cores, uncertainty and replay included, {whole:.3g} s, "
+            "over one plain run of the ramp",
+        ),
+        at_least(
+            "identify.scipy",
+            peer_seconds / whole,
+            5.0,
+            "times faster",
+            "the same over scipy.optimize.least_squares with its own differences on the same "
+            f"slips and the same kernel, one start after another, {_PEER_STARTS} starts "
+            f"measured and {STARTS} reckoned, {peer_seconds:.3g} s",
+        ),
+    ]
+
+
+def _by_scipy(
+    shooting: Shooting,
+    shots: list[Shot],
+    unknowns: tuple[Unknown, ...],
+    starts: tuple[Array, ...],
+    options: Options,
+) -> None:
+    scale = np.array([u.scale for u in unknowns])
+
+    def residuals(z: Array) -> Array:
+        parts = []
+        for shot in shots:
+            run, current, _ = shooting.run(shot, z * scale)
+            r, _, shift = overlaid(shot, simulate(run, ("p_mc",))["p_mc"])
+            level, _ = onset_of(shot, shift + BEFORE)
+            parts.append(np.append(r / options.sigma_p, (level - current) / options.scatter))
+        return np.concatenate(parts)
+
+    bounds = (np.array([u.low for u in unknowns]) / scale, [u.high / u.scale for u in unknowns])
+    for start in starts:
+        optimize.least_squares(
+            residuals, start / scale, bounds=bounds, x_scale="jac", ftol=1e-5, max_nfev=60
+        )
+
+
+PART = Part(
+    "identification", lambda: measured(cast(MotorcycleParameters, parameters("dardanelli2010")))
+)

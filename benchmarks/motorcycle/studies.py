@@ -1,0 +1,234 @@
+"""Studies of many cases: what hard brakings take, how much of it is simulation, and commands."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+from benchmarks.commands import environment
+from benchmarks.judging import simulated_and_judged
+from benchmarks.result import Result, at_least, at_most
+from benchmarks.suite import Part
+from bywire.core.child_process import python_command
+from bywire.core.unneeded import allow_dask
+from bywire.data.file_format import library
+from bywire.studies.chunk import computed_chunk
+from bywire.studies.cluster import CLUSTER_MEMORY, CLUSTER_SETTINGS, Cluster
+from bywire.studies.computing import Executor
+from bywire.studies.executor import Pool
+from bywire.studies.plan import CHUNK, StudyPlan
+from bywire.studies.study_file import read_study
+
+_STUDY = """
+bench = "hard-braking"
+[vary]
+"motor.R_m" = "+-5 %"
+"motor.K_e" = "+-5 %"
+"seal.T_pr" = { kind = "log-normal", sd = "20 %" }
+[requirements]
+overshoot = "<= 15 % with 90 %"
+"""
+# As studies/tolerances.toml: five quantities, three figures judged.
+_MANY = """
+bench = "hard-braking"
+[vary]
+"motor.R_m" = { kind = "normal", sd = "4 %" }
+"motor.K_e" = "+-5 %"
+"seal.T_pr" = { kind = "log-normal", sd = "20 %" }
+"caliper.K_pd" = { kind = "triangular", low = "-15 %", high = "+15 %" }
+"supply.V_bat" = { kind = "uniform", low = "11 V", high = "14.4 V" }
+[[correlation]]
+of = ["motor.R_m", "motor.K_e"]
+value = -0.6
+[design]
+cases = 10_000
+[requirements]
+overshoot = "<= 15 % with 99 %"
+steady_state_error = "<= 0.1 bar"
+rise_time = "<= 100 ms with 95 %"
+"""
+_COMMANDS = 2  # of which the quicker one counts
+_CHUNKS = 4
+_ROUNDS = 3
+_WARM = 4  # chunks of each process beforehand
+_STEADY = 4.0  # s that processes are timed: a cluster's last tasks take half a second
+_TURNS = 3  # of processes and cluster, of which the quicker one counts
+_CASES = 1024  # of the study whose memory is measured
+# The kernel's own mark of this program, its workers apart.
+_MEMORY = """
+import sys
+from bywire.cli.main import main
+try:
+    main()
+except SystemExit:
+    pass
+with open("/proc/self/status") as status:
+    print(next(line.split()[1] for line in status if line.startswith("VmHWM")), file=sys.stderr)
+"""
+
+
+def studies() -> Iterator[Result]:
+    """Measure the cases of a study on one core, and the memory of its command."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "study.toml"
+        path.write_text(_STUDY, encoding="utf-8")
+        plan = read_study(path)
+        computed_chunk(plan, 0, threads=1)  # the kernel is built
+        whole = min(_seconds(plan) for _ in range(_ROUNDS)) / (_CHUNKS * CHUNK)
+        simulated, judged = simulated_and_judged(plan, _ROUNDS)
+        cores = os.cpu_count() or 1
+        yield at_most(
+            "study.million_seconds",
+            1e6 * whole / cores,
+            600.0,
+            "s",
+            f"a million stops with all key figures on {cores} cores, {1e3 * whole:.3g} ms of a "
+            f"core each, measured over {_CHUNKS * CHUNK}",
+        )
+        yield at_most(
+            "study.kpi_share",
+            judged / simulated,
+            0.05,
+            "1",
+            f"key figures, {1e6 * judged:.3g} us a case, over its simulation with noise, "
+            f"{1e3 * simulated:.3g} ms",
+        )
+        yield _of_steps(Path(folder))
+        yield Result(
+            "study.beside_share",
+            (whole - simulated - judged) / simulated,
+            "1",
+            note="cases made and checked, warnings and books over the simulation",
+        )
+        yield _command(Path(folder))
+        if Path("/proc/self/status").exists():
+            yield _memory(path, Path(folder) / "out")
+        if find_spec("distributed") is not None:
+            yield _efficiency(plan, cores, whole * CHUNK)
+
+
+def _seconds(plan: StudyPlan) -> float:
+    begin = time.process_time()
+    for chunk in range(_CHUNKS):
+        computed_chunk(plan, chunk, threads=1)
+    return time.process_time() - begin
+
+
+def _of_steps(folder: Path) -> Result:
+    """Measure the same of steps of the current, which have a static gain as well."""
+    path = folder / "steps.toml"
+    path.write_text(_STUDY.replace("hard-braking", "pressure-step"), encoding="utf-8")
+    simulated, judged = simulated_and_judged(read_study(path), _ROUNDS)
+    return at_most(
+        "study.step_kpi_share",
+        judged / simulated,
+        0.05,
+        "1",
+        f"the same of pressure steps: {1e6 * judged:.3g} us over {1e3 * simulated:.3g} ms",
+    )
+
+
+def _command(folder: Path) -> Result:
+    """Measure the command of a study from its beginning to its report, kernels built before."""
+    study, seconds, spent = folder / "many.toml", [], []
+    study.write_text(_MANY, encoding="utf-8")
+    for k in range(_COMMANDS + 1):
+        before, begin = _of_children(), time.perf_counter()
+        fewer = () if k else ("--cases", "512")
+        line = python_command(
+            "-m", "bywire", "study", "run", str(study), "--out", str(folder / f"many-{k}"), *fewer
+        )
+        subprocess.run(line, env=environment(), capture_output=True, check=True)
+        seconds.append(time.perf_counter() - begin)
+        spent.append(_of_children() - before)
+    cores = os.cpu_count() or 1
+    return at_most(
+        "study.command_seconds",
+        min(seconds[1:]),
+        8.0,
+        "s",
+        f"a study of 10,000 stops from the command line to its report on {cores} cores, warm, by "
+        f"the clock; {min(spent[1:]):.3g} s of processor time in all of its processes",
+    )
+
+
+def _of_children() -> float:
+    """Return the processor time of all processes that have ended and were waited for [s]."""
+    ended = os.times()
+    return ended.children_user + ended.children_system
+
+
+def _memory(study: Path, out: Path) -> Result:
+    line = python_command(
+        "-c",
+        _MEMORY,
+        "study",
+        "run",
+        str(study),
+        "--out",
+        str(out),
+        "--cases",
+        str(_CASES),
+        "--workers",
+        "1",
+        "--json",
+    )
+    done = subprocess.run(
+        line,
+        env=environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    peak = float(done.stderr.split()[-1]) * 1024.0 / 1e6
+    return at_most("study.memory", peak, 500.0, "MB", f"peak of a study of {_CASES} cases")
+
+
+def _efficiency(plan: StudyPlan, cores: int, seconds: float) -> Result:
+    """Compare workers of a cluster on this machine with plain processes, both once they run.
+
+    In turn, for a shared machine is now quicker and now slower; ``seconds`` are those of a chunk.
+    """
+    allow_dask()
+    distributed = library("distributed", "clusters", "cluster")
+    config = library("dask", "clusters", "cluster").config
+    memory = {f"distributed.nanny.pre-spawn-environ.{k}": v for k, v in CLUSTER_MEMORY.items()}
+    chunks = math.ceil(_STEADY * cores / seconds)
+    plain, clustered = [], []
+    with (
+        config.set(CLUSTER_SETTINGS | memory),
+        distributed.LocalCluster(
+            n_workers=cores, threads_per_worker=1, dashboard_address=None
+        ) as cluster,
+    ):
+        for _ in range(_TURNS):
+            plain.append(_rate(Pool(cores), plan, cores, chunks))
+            clustered.append(_rate(Cluster(cluster.scheduler_address), plan, cores, chunks))
+    return at_least(
+        "study.efficiency",
+        max(clustered) / max(plain),
+        0.95,
+        "1",
+        f"cases a second of {cores} workers of dask.distributed, started as docs/studies.md "
+        f"says, over {cores} plain processes; the better of {_TURNS} turns of each",
+    )
+
+
+def _rate(executor: Executor, plan: StudyPlan, cores: int, chunks: int) -> float:
+    """Return chunks a second [1/s], once each process has had several."""
+    computed = executor.computed(plan, range(_WARM * cores + chunks))
+    for _ in range(_WARM * cores):
+        next(computed)
+    begin = time.perf_counter()
+    count = sum(1 for _ in computed)
+    return count / (time.perf_counter() - begin)
+
+
+PART = Part("studies", studies)

@@ -1,0 +1,1 @@
+"""Speed of the two-wheeler: a controlled stop by hand."""

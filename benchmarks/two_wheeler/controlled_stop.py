@@ -1,0 +1,54 @@
+"""A controlled stop of the two-wheeler against hand-written C."""
+
+from __future__ import annotations
+
+from statistics import median
+from typing import cast
+
+from benchmarks.result import Result, at_most
+from benchmarks.suite import Part
+from benchmarks.timing import interleaved, kernel, ratio
+from benchmarks.two_wheeler.hand_stop import HandWrittenStop
+from bywire.bench.experiment import as_run
+from bywire.brakes.two_wheeler.experiments import straight_stop
+from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
+from bywire.core.catalog import parameters
+from bywire.simulation.run import Run
+
+_ROUNDS, _STEP, _DURATION = 20, 20e-6, 4.5
+
+
+def controlled_stop(par: TwoWheelerParameters) -> Run:
+    """Return a stop from 30 m/s on wet asphalt by slip control, and half a second of standstill."""
+    options = cast(straight_stop.Options, straight_stop.EXPERIMENT.defaults)
+    wet = options.replace({"surface": "wet-asphalt", "v_0": 30.0, "duration": _DURATION})
+    case, *_ = straight_stop.cases(par, wet)
+    return as_run(case, _STEP)
+
+
+def single() -> list[Result]:
+    """Measure one controlled stop against hand-written C."""
+    run = controlled_stop(cast(TwoWheelerParameters, parameters("sport600")))
+    par = cast(TwoWheelerParameters, run.par)
+    opponent = HandWrittenStop(par).single(run)
+    seconds = interleaved({"bywire": kernel(run), "hand": opponent}, _ROUNDS)
+    substeps = opponent.substeps
+    return [
+        at_most(
+            "vehicle.single.hand_c",
+            ratio(seconds, "bywire", "hand"),
+            1.0,
+            "ratio",
+            f"one stop of {run.duration:g} s by slip control, all outputs, over hand-written "
+            "C; same scheme, compiler and flags, one call each",
+        ),
+        Result(
+            "vehicle.single.substep",
+            1e9 * median(seconds["bywire"]) / substeps,
+            "ns",
+            note="a substep of vehicle, brakes and books, one call of the kernel",
+        ),
+    ]
+
+
+PART = Part("vehicle", single)

@@ -1,0 +1,44 @@
+"""Studies of a vehicle's stops: how much of them is simulation."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from benchmarks.judging import simulated_and_judged
+from benchmarks.result import Result, at_most
+from benchmarks.suite import Part
+from bywire.studies.chunk import computed_chunk
+from bywire.studies.study_file import read_study
+
+_STUDY = """
+bench = "straight-stop"
+[vary]
+"vehicle.body.m" = "+-5 %"
+"vehicle.body.h" = "+-5 %"
+"front.disc.mu_pad" = "+-10 %"
+"""
+_ROUNDS = 3
+
+
+def studies() -> list[Result]:
+    """Measure the key figures of stops beside their simulation."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "study.toml"
+        path.write_text(_STUDY, encoding="utf-8")
+        plan = read_study(path)
+        computed_chunk(plan, 0, threads=1)  # the kernel is built
+        simulated, judged = simulated_and_judged(plan, _ROUNDS)
+    return [
+        at_most(
+            "study.vehicle_kpi_share",
+            judged / simulated,
+            0.05,
+            "1",
+            f"key figures of a vehicle's stop, {1e6 * judged:.3g} us a case, over its simulation, "
+            f"{1e3 * simulated:.3g} ms",
+        ),
+    ]
+
+
+PART = Part("vehicle studies", studies)

@@ -1,1 +1,0 @@
-"""Speed: a controlled stop by hand."""

@@ -1,1 +1,0 @@
-"""Speed: the same problem by hand and by other simulators."""
