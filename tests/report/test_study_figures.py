@@ -26,7 +26,7 @@ from bywire.report.study.histograms import Spread, histograms
 from bywire.report.study.parallel_coordinates import parallel_coordinates
 from bywire.report.study.scatter import scatter
 from bywire.report.study.tornado import tornado
-from bywire.studies.effects import Effect
+from bywire.studies.findings import Effect
 from bywire.studies.statistics import running_share
 
 RNG = np.random.default_rng(1)

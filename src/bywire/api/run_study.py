@@ -19,17 +19,15 @@ from bywire.core.errors import FileError, InputError
 from bywire.core.field_notes import field_notes
 from bywire.core.typing import silent
 from bywire.report.answer import use_case
-from bywire.studies.asked_cases import require_extensible, with_cases
+from bywire.studies.designs import SPANNED, WORST
 from bywire.studies.findings import Findings
 from bywire.studies.meant_study import require_study_file
 from bywire.studies.plan import StudyPlan
-from bywire.studies.points import SPANNED
 from bywire.studies.rare_failures import rare_failures
 from bywire.studies.running import complete
-from bywire.studies.sought_design import WORST
-from bywire.studies.store import Origin, StudyStore
+from bywire.studies.store import Origin, StudyStore, require_extensible, with_cases
 from bywire.studies.study_file import read_study
-from bywire.studies.worst_cases import worst_cases
+from bywire.studies.worst_case import worst_cases
 
 
 @use_case

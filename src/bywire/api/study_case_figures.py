@@ -9,8 +9,7 @@ import numpy as np
 
 from bywire.report.document import Block, FigureBlock
 from bywire.report.study.drawn_cases import LINES, POINTS, DrawnCases, drawn_cases
-from bywire.studies.findings import Findings
-from bywire.studies.judgment import Judgment
+from bywire.studies.findings import Findings, Judgment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

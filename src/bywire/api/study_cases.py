@@ -20,8 +20,7 @@ from bywire.bench.result import Result
 from bywire.report.document import Attachment, recording_file
 from bywire.report.wording import amount
 from bywire.studies.chunk import case_bench
-from bywire.studies.findings import Findings
-from bywire.studies.judgment import Judgment
+from bywire.studies.findings import Findings, Judgment
 
 if TYPE_CHECKING:
     import xarray as xr

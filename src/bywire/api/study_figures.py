@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from bywire.studies.effects import Effect
-    from bywire.studies.judgment import Judgment
+    from bywire.studies.findings import Effect, Judgment
 
 _PANELS = 4  # requirements whose convergence is drawn
 _SHARES = 100  # points of a convergence, spaced by equal ratios

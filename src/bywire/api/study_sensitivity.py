@@ -11,9 +11,7 @@ from bywire.api.study_tables import figure_text, shown_figures, strongest
 from bywire.report.document import FigureBlock, TableBlock
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import clean
-from bywire.studies.choice_influence import ChoiceInfluence
-from bywire.studies.effects import Effect
-from bywire.studies.findings import Findings
+from bywire.studies.findings import ChoiceInfluence, Effect, Findings
 from bywire.studies.sensitivity import ElementaryEffects, Estimate, VarianceShares
 
 if TYPE_CHECKING:

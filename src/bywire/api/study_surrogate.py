@@ -18,8 +18,7 @@ from bywire.report.answer import Answer, use_case
 from bywire.report.document import Document, Section, TableBlock, spaced
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import amount, clean
-from bywire.studies.polynomial_chaos import require_fittable, surrogate_of
-from bywire.studies.surrogate import Surrogate
+from bywire.studies.surrogate import Surrogate, require_fittable, surrogate_of
 
 _POOR = 0.5  # share of the variance below which a surrogate is no use
 

@@ -14,8 +14,7 @@ from bywire.report.changes import bench_changes
 from bywire.report.document import Block, Listing, Paragraph, Section
 from bywire.report.subject import Subject
 from bywire.report.wording import clean
-from bywire.studies.plan import StudyPlan, Varied
-from bywire.studies.studied_bench import StudiedBench
+from bywire.studies.plan import StudiedBench, StudyPlan, Varied
 
 
 def tested_line(plan: StudyPlan) -> str:

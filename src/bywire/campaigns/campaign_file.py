@@ -34,9 +34,8 @@ from bywire.core.signals import signals_of
 from bywire.core.values import number, written
 from bywire.data.file_kinds import CAMPAIGN, require_kind
 from bywire.data.toml_file import read_toml
-from bywire.studies.measured import MeasuredSection
 from bywire.studies.study_file import BenchName, read_bench
-from bywire.studies.vary_section import read_all_varied
+from bywire.studies.vary_section import MeasuredSection, read_all_varied
 
 _MOST = 10_000
 

@@ -27,8 +27,7 @@ from bywire.core.typing import Array
 from bywire.core.values import written
 from bywire.core.version import __version__
 from bywire.simulation.tapped import Tap
-from bywire.studies.identity import as_json, digest_of
-from bywire.studies.plan import CHUNK, StudyPlan, Varied
+from bywire.studies.plan import CHUNK, StudyPlan, Varied, as_json, digest_of
 
 Sense = Literal["above", "below", "above_healthy", "below_healthy", "below_share"]
 SENSES: tuple[Sense, ...] = ("above", "below", "above_healthy", "below_healthy", "below_share")

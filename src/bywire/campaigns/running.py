@@ -15,7 +15,7 @@ from bywire.campaigns.plan import CampaignPlan
 from bywire.core.errors import FileError
 from bywire.core.interrupts import thread_pool
 from bywire.core.scratch import replacing, sweep
-from bywire.studies.identity import differing
+from bywire.studies.plan import differing
 
 RECORD, FAULTS = "campaign.json", "faults"
 

@@ -39,7 +39,7 @@ study_app = typer.Typer(
 
 def _study_folder(folder: Path) -> Path:
     """Return the folder that a command names, before anything is made for it."""
-    from bywire.studies.study_folder import require_no_file
+    from bywire.studies.meant_study import require_no_file
 
     require_no_file(folder)
     return folder

@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from bywire.report import style
 from bywire.report.legend import legend_outside
 from bywire.report.study.drawn_cases import BARS
-from bywire.studies.choice_influence import ChoiceInfluence
+from bywire.studies.findings import ChoiceInfluence
 from bywire.studies.statistics import Influence
 
 _BAR = 0.24  # height [inch]

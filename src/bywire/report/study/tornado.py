@@ -24,7 +24,7 @@ from bywire.report.readable_axis import (
     size_of,
 )
 from bywire.report.study.drawn_cases import BARS
-from bywire.studies.effects import Effect
+from bywire.studies.findings import Effect
 
 _BAR = 0.28  # height of a quantity [inch]
 _PANEL = style.WIDTH - 2.5  # about how long an abscissa is [inch]
