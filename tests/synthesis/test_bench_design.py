@@ -22,16 +22,13 @@ from bywire.bench.bench import Bench
 from bywire.bench.bench_file import from_mapping
 from bywire.bench.running import run
 from bywire.core.catalog import main_set, parameters
-from bywire.synthesis.bench_figures import BenchFigures, bench_figures
-from bywire.synthesis.bench_sines import Small, loop_gain
-from bywire.synthesis.bench_tuning import Tuning
-from bywire.synthesis.candidate import Candidate, bench_slacks, judged, linear_slacks
+from bywire.synthesis.bench_figures import BenchFigures, Small, bench_figures, loop_gain
+from bywire.synthesis.bench_tuning import Candidate, Tuning, bench_slacks, judged, linear_slacks
 from bywire.synthesis.linear_case import NOMINAL, cases_of
 from bywire.synthesis.optimizer import Problem
 from bywire.synthesis.outcome import bench_text
 from bywire.synthesis.requirement import read
-from bywire.synthesis.trial import Trial
-from bywire.synthesis.verification import Verification, verify
+from bywire.synthesis.verification import Trial, Verification, verify
 
 PAPER = (
     "bandwidth >= 10 Hz",

@@ -34,13 +34,13 @@ from bywire.report.answer import use_case
 from bywire.synthesis import designer
 from bywire.synthesis.linear_case import cases_of
 from bywire.synthesis.outcome import Across
-from bywire.synthesis.schedule_designer import (
+from bywire.synthesis.schedules import (
     design_schedule,
     frozen,
     points_by_region,
     scheduled,
+    verify_schedule,
 )
-from bywire.synthesis.schedule_verification import verify_schedule
 from bywire.synthesis.verification import verify
 
 

@@ -20,7 +20,7 @@ from bywire.analysis.response.large_signal import (
 from bywire.analysis.response.sweep import Sweep, complex_values
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.synthesis.bench_sines import loop_gain
+from bywire.synthesis.bench_figures import loop_gain
 
 
 def response(variants, frequencies, amplitudes, **more):
