@@ -6,7 +6,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.provenance import chosen, paper
 from bywire.core.quantities import Fraction, Length, Resistance
 from bywire.report.page import table_html
-from bywire.report.parameter_rows import parameter_rows
+from bywire.report.subject import parameter_rows
 from bywire.report.tables import (
     KpiRow,
     ParameterRow,

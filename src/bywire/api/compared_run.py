@@ -25,8 +25,8 @@ from bywire.bench.stimuli.registry import STIMULI
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError
 from bywire.core.parameters import ParameterSet, leaf_fields
-from bywire.report.changes import bench_changes
 from bywire.report.document import Change
+from bywire.report.subject import bench_changes
 
 _BENCH = {
     "experiment": "experiment",

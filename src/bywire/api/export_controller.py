@@ -20,8 +20,8 @@ from bywire.export.controller.files import files
 from bywire.export.controller.program import program
 from bywire.export.controller.vectors import vectors as test_vectors
 from bywire.report.answer import Answer, use_case
-from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Flat, Listing, Paragraph, Section
+from bywire.report.subject import bench_changes
 
 if TYPE_CHECKING:
     from bywire.export.controller.program import Program

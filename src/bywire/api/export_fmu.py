@@ -18,8 +18,8 @@ from bywire.export.fmu.archive import unit_of, write_unit
 from bywire.export.fmu.binaries import PLATFORMS, this_platform
 from bywire.export.interface import KINDS, PARTS, Causality
 from bywire.report.answer import Answer, use_case
-from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Paragraph, Section, TableBlock
+from bywire.report.subject import bench_changes
 from bywire.report.tables import Table, text_table
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from bywire.bench import bench_file
 from bywire.bench.bench import Bench
 from bywire.core.scratch import scratch_folder
 from bywire.report.answer import Answer, use_case
-from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Listing, Section
+from bywire.report.subject import bench_changes
 
 if TYPE_CHECKING:
     from bywire.export.exported import Exported

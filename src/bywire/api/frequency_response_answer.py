@@ -172,7 +172,7 @@ class FrequencyResponse(Answer):
         return bode(lines)
 
     def _over_range(self) -> Figure:
-        from bywire.report.bandwidth_range import bandwidth_range
+        from bywire.report.response_figures import bandwidth_range
 
         return bandwidth_range(self.data, [v.label for v in self.variants], *self.range)
 

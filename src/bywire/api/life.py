@@ -21,7 +21,6 @@ from bywire.core.units import difference_unit
 from bywire.life.life_file import CONDITION, CONDITIONS, WEAR, LifePlan, read_life
 from bywire.life.projection import CONFIDENCE, Projection, one_by_one, projected
 from bywire.report.answer import Answer, use_case
-from bywire.report.changes import defaults_of, value_changes
 from bywire.report.document import (
     Banner,
     Change,
@@ -34,8 +33,7 @@ from bywire.report.document import (
     recording_file,
     spaced,
 )
-from bywire.report.parameter_rows import parameter_rows
-from bywire.report.subject import Subject
+from bywire.report.subject import Subject, defaults_of, parameter_rows, value_changes
 from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
 from bywire.report.wording import amount
 

@@ -36,7 +36,7 @@ def json_file(name: str, content: Mapping[str, Any]) -> Attachment:
 
 
 def _write_json(content: Mapping[str, Any], path: Path) -> Path:
-    from bywire.report.files import write_bytes
+    from bywire.report.drawing import write_bytes
 
     return write_bytes(path, json.dumps(content, indent=1).encode())
 
@@ -196,7 +196,7 @@ def locus_object(locus: Locus) -> dict[str, Any]:
 
 def locus_lines(locus: Locus) -> list[str]:
     """Return where over its range a loop is stable, a text each."""
-    from bywire.report.root_locus import border_text
+    from bywire.report.poles import border_text
 
     if not locus.borders:
         state = "stable" if locus.stable.all() else "unstable"

@@ -155,7 +155,7 @@ class LinearizedLoop(Answer):
         return blocks
 
     def _draw_locus(self, locus: Locus) -> Figure:
-        from bywire.report.root_locus import root_locus
+        from bywire.report.poles import root_locus
 
         case = self.case
         ends = (float(locus.values[0]), float(locus.values[-1]))
@@ -204,7 +204,7 @@ def closed_bandwidth(model: LinearModel) -> float:
 
 
 def _poles(model: LinearModel, width: float) -> Figure:
-    from bywire.report.pole_map import pole_map
+    from bywire.report.poles import pole_map
 
     return pole_map(rates(model), model.period, width)
 

@@ -319,6 +319,6 @@ def _friction(friction: str, speed: str) -> tuple[Friction, float]:
 
 
 def _draw_locus(locus: Locus) -> Figure:
-    from bywire.report.root_locus import root_locus
+    from bywire.report.poles import root_locus
 
     return root_locus(locus, math.nan)

@@ -13,8 +13,8 @@ from bywire.bench.bench import Bench
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import leaf_fields
 from bywire.report.answer import Answer, use_case
-from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Listing, Section
+from bywire.report.subject import bench_changes
 
 if TYPE_CHECKING:
     from bywire.export.exported import Exported
@@ -103,7 +103,7 @@ def page(
     from bywire.bench.running import run
     from bywire.export.exported import exported, start_source
     from bywire.export.interface import interface
-    from bywire.report.files import write_bytes
+    from bywire.report.drawing import write_bytes
     from bywire.report.live_page.content import page_text
     from bywire.report.time_traces import shown_panels
 

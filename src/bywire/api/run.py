@@ -21,7 +21,6 @@ from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Progress
 from bywire.bench.stated import stated_figures
 from bywire.report.answer import Answer, use_case
-from bywire.report.changes import bench_changes
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -35,6 +34,7 @@ from bywire.report.document import (
     recording_file,
 )
 from bywire.report.stated_levels import stated_figure
+from bywire.report.subject import bench_changes
 from bywire.report.tables import KpiRow, kpi_table
 from bywire.report.wording import amount, measured_amount
 

@@ -20,7 +20,6 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.typing import silent
 from bywire.core.values import parsed
 from bywire.report.answer import Answer, use_case
-from bywire.report.changes import defaults_of, value_changes
 from bywire.report.document import (
     Details,
     Document,
@@ -31,8 +30,7 @@ from bywire.report.document import (
     TableBlock,
     recording_file,
 )
-from bywire.report.parameter_rows import parameter_rows
-from bywire.report.subject import Subject
+from bywire.report.subject import Subject, defaults_of, parameter_rows, value_changes
 from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
 from bywire.report.wording import in_display_unit, unit_text
 from bywire.synthesis.study import STUDIES, Cut, Findings, Map, Study

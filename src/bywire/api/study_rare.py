@@ -227,7 +227,7 @@ def _shown(value: float | str, unit: str) -> str:
 
 
 def _curves(findings: Findings) -> Figure:
-    from bywire.report.study.exceedance import Curve, exceedance
+    from bywire.report.study.probabilities import Curve, exceedance
 
     seen = [each for each in findings.rare if each.failure.span]
     return exceedance([_curve(findings, each, Curve) for each in seen])

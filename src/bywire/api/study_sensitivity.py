@@ -125,7 +125,7 @@ def _share(value: float) -> str:
 
 
 def _bars(findings: Findings) -> Figure:
-    from bywire.report.study.sensitivity_bars import sensitivity_bars
+    from bywire.report.study.influences import sensitivity_bars
 
     each = {name: findings.sensitivity(name).drivers for name in shown_figures(findings)}
     each = {name: found for name, found in each.items() if found}

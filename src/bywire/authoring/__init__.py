@@ -105,9 +105,9 @@ if TYPE_CHECKING:
     from bywire.report import style
     from bywire.report.bench_figures import FigureKind
     from bywire.report.bench_figures import Shown as ShownFigure
-    from bywire.report.line_role import Role as LineRole
     from bywire.report.live_page.sliders import Sliders
     from bywire.report.panels import Panel, Panels, Trace
+    from bywire.report.panels import Role as LineRole
     from bywire.reproduction.item import Fact, Item, compared, found
     from bywire.reproduction.reproduction import Exhibit, Reproduction, Source
     from bywire.reproduction.reproduction import Part as SourcePart
@@ -160,8 +160,7 @@ _HOMES = {
     "bench.stimuli.registry": "Stimulus",
     "report.bench_figures": "FigureKind Shown:ShownFigure",
     "report.live_page.sliders": "Sliders",
-    "report.panels": "Panel Panels Trace",
-    "report.line_role": "Role:LineRole",
+    "report.panels": "Panel Panels Role:LineRole Trace",
     # loops, plants, studies
     "analysis.loop": "LOOPS Loop Point Quantity",
     "analysis.linear.sampled_loops": "closed_loop",

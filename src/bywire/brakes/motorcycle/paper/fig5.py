@@ -18,7 +18,7 @@ from bywire.brakes.motorcycle.paper import facts
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, parameters
 from bywire.brakes.motorcycle.paper.tolerances import LEVEL, LOOP
 from bywire.brakes.motorcycle.staircase import jumps
-from bywire.report.hysteresis_loop import hysteresis_loop
+from bywire.report.friction_figures import hysteresis_loop
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import kpis, peak, selected

@@ -16,9 +16,7 @@ from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, parameter
 from bywire.brakes.motorcycle.paper.sines import of_set_point
 from bywire.brakes.motorcycle.paper.tolerances import ROUND, STEADY
 from bywire.report.bode import Response, bode
-from bywire.report.step_marks import StepFacts, StepLimits
-from bywire.report.step_response import step_response
-from bywire.report.tracking import tracking
+from bywire.report.step_response import StepFacts, StepLimits, step_response, tracking
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import kpis

@@ -1,24 +1,67 @@
-"""Figure: a curve of an identification, measured beside modeled, or a value with its band."""
+"""Figures of an identification: its curves, residuals, and correlations of estimates."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, display_factor
+from bywire.identification.confidence import autocorrelation
+from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve
 from bywire.report import style
-from bywire.report.decimation import kept_samples
-from bywire.report.line_role import Role
-from bywire.report.record_marks import mark_records
+from bywire.report.decimation import decimate, kept_samples
+from bywire.report.panels import Role
 from bywire.report.wording import amount, in_display_unit
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+_NAMED = 8  # records up to which there is room for their names
+_ROOM = 0.06  # of the height of the first panel, for the names
+
+
+def mark_records(panels: Sequence[Axes], at: xr.DataArray) -> None:
+    """Draw a thin line between records, and their names at the top of the first panel.
+
+    Parameters
+    ----------
+    panels
+        Panels that share the abscissa.
+    at
+        The abscissa as it is drawn; its coordinate ``record`` names each sample's record. Without
+        one nothing is drawn.
+    """
+    if "record" not in at.coords or at.coords["record"].dims != at.dims:
+        return
+    names, places = at.coords["record"].values, at.values
+    starts = np.concatenate(([0], np.flatnonzero(names[1:] != names[:-1]) + 1))
+    ends = [*starts[1:].tolist(), len(names)]
+    if len(ends) <= _NAMED:
+        low, high = panels[0].get_ylim()
+        panels[0].set_ylim(low, high + _ROOM * (high - low))
+    for start, end in zip(starts.tolist(), ends, strict=True):
+        if start > 0:
+            border = 0.5 * float(places[start - 1] + places[start])
+            for axes in panels:
+                axes.axvline(border, color=style.GRAY, linewidth=0.5, zorder=1.0)
+        if len(ends) <= _NAMED:
+            middle = 0.5 * float(places[start] + places[end - 1])
+            panels[0].annotate(
+                style.plain(names[start], 16),
+                (middle, 1.0),
+                xycoords=("data", "axes fraction"),
+                ha="center",
+                va="top",
+                color=style.GRAY,
+                fontsize=style.TEXT_SIZE - 1.5,
+            )
+
+
+# --- Curves, measured beside modeled, and values with their band
 
 _MOST = 6  # curves of a family that have a color each
 _LINE = 1.3  # width of the line in the middle of a band [pt]
@@ -223,3 +266,93 @@ def _band_label(axes: Axes, half: Array, symbol: str) -> str:
     drawn = 2.0 * display_factor(symbol) * most / max(abs(high - low), 1e-300) * points
     hidden = ", within the line" if drawn < _LINE else ""
     return f"95 % band (± {amount(most, difference_unit(symbol), 2)} at most{hidden})"
+
+
+# --- Residuals: in their order, their distribution, their autocorrelation
+
+_LAGS = 60
+_SURE = 1.96  # standard deviations within which white residuals' correlations lie in 95 of 100
+
+
+def residual_figure(estimate: Estimate) -> Figure:
+    """Draw what a model leaves unexplained.
+
+    Weighted residuals over their order, their histogram beside the normal distribution of the
+    same variance, and their autocorrelation with the band in which white ones stay.
+    """
+    r = estimate.residuals
+    figure = Figure(figsize=(style.WIDTH, 4.6), layout="constrained", facecolor="white")
+    grid = figure.add_gridspec(2, 2)
+    whole = figure.add_subplot(grid[0, :])
+    spread, together = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
+    for axes in (whole, spread, together):
+        style.dress(axes)
+    order = np.arange(1, r.size + 1, dtype=float)
+    few = r.size <= style.FEW
+    look = {"linestyle": "none", "marker": "o", "markersize": 3.5} if few else {"linewidth": 0.8}
+    whole.plot(*decimate(order, r), color=style.BLUE, **look)
+    whole.axhline(0.0, color=style.GRAY, linewidth=0.6)
+    whole.margins(x=0.02 if few else 0.0)
+    whole.set_xlabel("number of the measured value")
+    whole.set_ylabel("weighted residual [-]")
+    _histogram(spread, r)
+    lags = min(_LAGS, max(r.size // 2, 1))
+    rho = autocorrelation(r, lags)
+    together.vlines(np.arange(1, lags + 1), 0.0, rho[1:], color=style.BLUE, linewidth=1.2)
+    for end in (-_SURE, _SURE):
+        limit = end / np.sqrt(r.size)
+        label = "95 % band of white residuals" if end > 0 else None
+        together.axhline(limit, color=style.VERMILLION, linestyle=":", linewidth=1.2, label=label)
+    lowest = min(-0.2, float(rho.min()), -_SURE / np.sqrt(r.size))
+    together.set_ylim(lowest - 0.05, 1.0)
+    for axes in (whole, together):
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    together.set_xlabel("lag [samples]")
+    together.set_ylabel("autocorrelation [-]")
+    style.legend_above(together)
+    return figure
+
+
+def _histogram(axes: Axes, r: Array) -> None:
+    size = float(r.std()) or 1.0
+    axes.hist(r, bins=min(max(r.size // 20, 8), 60), density=True, color=style.SKY)
+    at = np.linspace(float(r.min()), float(r.max()), 200)
+    normal = np.exp(-0.5 * ((at - r.mean()) / size) ** 2) / (size * np.sqrt(2.0 * np.pi))
+    axes.plot(at, normal, color=style.VERMILLION, linestyle="--", label="normal, same variance")
+    axes.set_xlabel("weighted residual [-]")
+    axes.set_ylabel("density [-]")
+    style.legend_above(axes)
+
+
+# --- Correlations: which unknowns the data tells apart badly
+
+_NUMBERED = 14  # unknowns up to which there is room for numbers
+
+
+def correlation_matrix(estimate: Estimate) -> Figure:
+    """Draw the correlation matrix with its numbers; blue is negative, red positive."""
+    names, c = estimate.names, estimate.correlation
+    size = len(names)
+    height = min(max(1.6 + 0.36 * size, 2.4), 6.5)
+    figure = Figure(figsize=(style.WIDTH, height), layout="constrained", facecolor="white")
+    axes = figure.subplots()
+    image = axes.imshow(c, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+    axes.set_xticks(range(size), [style.plain(n, 24) for n in names], rotation=40, ha="right")
+    axes.set_yticks(range(size), [style.plain(n, 24) for n in names])
+    axes.tick_params(labelsize=style.TEXT_SIZE, length=0.0)
+    axes.spines[:].set_visible(False)
+    if size <= _NUMBERED:
+        for (row, column), value in np.ndenumerate(c):
+            axes.text(
+                column,
+                row,
+                f"{value:.2f}",
+                ha="center",
+                va="center",
+                fontsize=style.TEXT_SIZE - 1.5,
+                color="white" if abs(value) > 0.6 else style.BLACK,
+            )
+    bar = figure.colorbar(image, ax=axes, shrink=0.9)
+    bar.set_label("correlation [-]", fontsize=style.TEXT_SIZE)
+    bar.ax.tick_params(labelsize=style.TEXT_SIZE)
+    return figure
