@@ -31,11 +31,11 @@ from bywire.identification import (
     differentiated,
     estimate,
     initial_states,
+    inverse_dynamics,
     output_error,
     parameters_of,
     trial,
 )
-from bywire.identification import equation as inverse_dynamics
 
 Volt = Annotated[float, Unit("V")]
 

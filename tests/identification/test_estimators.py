@@ -22,13 +22,13 @@ from bywire.identification import (
     differentiated,
     estimate,
     initial_states,
+    inverse_dynamics,
     multistart,
     output_error,
     parameters_of,
     predict,
     trial,
 )
-from bywire.identification import equation as inverse_dynamics
 from bywire.identification.estimate import as_object
 from bywire.identification.least_squares import Loss
 from bywire.identification.output_error import even_interval
