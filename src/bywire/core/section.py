@@ -7,7 +7,7 @@ pydantic's own reaches a user.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Self, Union, get_args, get_origin
@@ -63,19 +63,26 @@ class Section(BaseModel):
         ParameterError
             For what is missing, of another kind, or out of range.
         """
-        fields, place = cls.model_fields, f"{where} " if where.startswith("[") else ""
-        for key in _table(content, where):
+        fields = cls.model_fields
+        place, within = (f"{where} ", f"{where[1:-1]}.") if where.startswith("[") else ("", "")
+        content = table_of(cls.written_out(content), where)
+        for key in content:
             if key not in fields:
                 raise unknown_of_few(f"key of {where}", key, fields)
-        values = {key: _value(fields[key], each, place, key) for key, each in content.items()}
+        values = {
+            key: _value(fields[key], each, f"{place}{key}", within + key)
+            for key, each in content.items()
+        }
         try:
             return cls.model_validate(values)
         except ValidationError as error:
-            key = str(error.errors()[0]["loc"][0])
-            if key not in content:
-                what = _hint(fields[key]) or "give it a value"
-                raise ParameterError(f"{place}{key} is missing: {what}") from None
-            raise _refused(fields[key], content[key], f"{place}{key}") from None
+            key, *inner = error.errors()[0]["loc"]
+            raise _refused(fields[str(key)], content, place, str(key), inner) from None
+
+    @classmethod
+    def written_out(cls, content: Any) -> Any:
+        """Return the table that a short form stands for; here, there is none."""
+        return content
 
     @property
     def given(self) -> dict[str, Any]:
@@ -87,21 +94,26 @@ class Section(BaseModel):
         }
 
 
-def _value(info: FieldInfo, value: Any, place: str, key: str) -> Any:
+def _value(info: FieldInfo, value: Any, name: str, key: str) -> Any:
     """Return what a field is validated with: numbers in SI, sections for tables."""
     kind, unit = _kind(info.annotation), _unit(info)
     if _is_section(kind):
         return kind.read(value, f"[{key}]")
     if kind is Mapping:
-        return _table(value, f"[{key}]")
+        each = get_args(info.annotation)[-1]
+        table = table_of(value, f"[{key}]")
+        if _is_section(each):
+            return {name: each.read(entry, f"[{key}.{name}]") for name, entry in table.items()}
+        return table
     if kind is tuple and _is_section(get_args(info.annotation)[0]):
         return _sections(get_args(info.annotation)[0], value, f"[[{key}]]")
     if kind is float and unit is not None:
-        return float(written(value, unit.symbol, f"{place}{key}", unit.nominal))
+        return float(written(value, unit.symbol, name, unit.nominal))
     return tuple(value) if kind is tuple and isinstance(value, list) else value
 
 
-def _table(value: Any, where: str) -> dict[str, Any]:
+def table_of(value: Any, where: str) -> dict[str, Any]:
+    """Return the keys and values of a section, or refuse what is none."""
     if not isinstance(value, Mapping):
         raise ParameterError(f"{where} must be a section with key = value lines")
     return dict(value)
@@ -113,24 +125,33 @@ def _sections(kind: type[Section], value: Any, where: str) -> tuple[Section, ...
     return tuple(kind.read(each, where) for each in value)
 
 
-def _refused(info: FieldInfo, value: Any, name: str) -> InputError:
-    """Return the error of a value that is not what its field is declared as."""
-    kind, unit = _kind(info.annotation), _unit(info)
-    if kind is Literal:
-        return unknown_name(name, str(value), get_args(info.annotation))
+def _refused(
+    info: FieldInfo, content: Mapping[str, Any], place: str, key: str, inner: Sequence[Any]
+) -> InputError:
+    """Return the error of a value that is not what its field is declared as, or is missing.
+
+    ``inner``: where it stands in the field's value.
+    """
+    hint = _hint(info)
+    if key not in content:
+        return ParameterError(f"{place}{key} is missing: {hint or 'give it a value'}")
+    name, value, kind, unit = f"{place}{key}", content[key], _kind(info.annotation), _unit(info)
+    if kind is Mapping:
+        name, value, kind = f"[{key}] {inner[0]}", value[inner[0]], get_args(info.annotation)[-1]
     if unit is not None:
         leaf = leaf_of(name, unit, info)
         in_percent = isinstance(value, str) and value.rstrip().endswith("%")
         wanted = leaf.range_in("%") if in_percent else leaf.range_text
         return ParameterError(f"{name} = {quoted(value)} must be {wanted}")
-    if kind is int:
+    if kind is int and not hint:
         least = next(note.ge for note in info.metadata if isinstance(note, Ge))
         most = next(note.le for note in info.metadata if isinstance(note, Le))
         return ParameterError(
             f"{name} = {quoted(value)}: a whole number from {least} to {most} is wanted"
         )
-    wanted = _hint(info) or f"{_WANTED[kind]} is wanted"
-    return ParameterError(f"{name} = {quoted(value)}: {wanted}")
+    if kind is Literal and not hint:
+        return unknown_name(name, str(value), get_args(info.annotation))
+    return ParameterError(f"{name} = {quoted(value)}: {hint or f'{_WANTED[kind]} is wanted'}")
 
 
 def _unit(info: FieldInfo) -> Unit | None:
@@ -144,7 +165,8 @@ def _hint(info: FieldInfo) -> str:
 def _kind(annotation: Any) -> Any:
     """Return what a value is where it is not None."""
     if get_origin(annotation) in (Union, UnionType):
-        (annotation,) = (each for each in get_args(annotation) if each is not NoneType)
+        kinds = [each for each in get_args(annotation) if each is not NoneType]
+        annotation = kinds[0] if len(kinds) == 1 else Union
     return get_origin(annotation) or annotation
 
 

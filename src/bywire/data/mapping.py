@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
 
 from bywire.core import units
-from bywire.core.arguments import whole_number
 from bywire.core.errors import (
     InputError,
     ParameterError,
     UnitError,
     quoted,
-    unknown_name,
     unknown_of_few,
 )
+from bywire.core.quantities import Unit
+from bywire.core.section import Hint, Section
+from bywire.core.values import written
 from bywire.data.column_units import si_symbol, unit_of
 from bywire.data.text_encoding import ENCODINGS
 from bywire.data.toml_file import read_toml
@@ -128,32 +130,76 @@ class MeasurementMapping:
 
 # --- Mapping files: strict about keys and values, and nothing is executed
 
-_KEYS = (
-    "format",
-    "time",
-    "rate",
-    "start",
-    "signals",
-    "decimal",
-    "skip_lines",
-    "titles",
-    "encoding",
-    "missing",
-)
-_TIME_KEYS = ("column", "unit", "rate", "start")
-_SIGNAL_KEYS = (
-    "column",
-    "unit",
-    "scale",
-    "sign",
-    "offset",
-    "delay",
-    "limits",
-    "label",
-    "time",
-    "rate",
-    "missing",
-)
+_SIGN = "it must be 1 or -1"
+_Column = Annotated[
+    str | Annotated[int, Field(ge=1, le=100_000)],
+    Hint("write its title in quotation marks, or its number: columns are counted from 1"),
+]
+_Rate = Annotated[float | None, Unit("Hz", 1e3), Field(gt=0)]
+_Instant = Annotated[float | None, Unit("s")]
+_Quoted = Annotated[str, Hint("write it in quotation marks")]
+_Missing = Annotated[
+    tuple[float | str, ...],
+    Hint('write texts and numbers, as ["NA", "OVLD", 9.9E37]'),
+]
+
+
+class TimeSection(Section):
+    """A table ``time``: the column of the instants, or their rate."""
+
+    column: _Column = ""
+    unit: _Quoted = ""
+    rate: _Rate = None
+    start: _Instant = None
+
+    @classmethod
+    def written_out(cls, content: Any) -> Any:
+        """Return the table that a column alone stands for."""
+        return {"column": content} if isinstance(content, (str, int)) else content
+
+
+class _Marked(Section):
+    """A section in which a mark of missing values need not be a list."""
+
+    missing: _Missing = ()
+
+    @classmethod
+    def written_out(cls, content: Any) -> Any:
+        """Return the table with its marks as a list."""
+        if not isinstance(content, Mapping) or isinstance(content.get("missing", []), list):
+            return content
+        return {**content, "missing": [content["missing"]]}
+
+
+class SignalSection(_Marked):
+    """A section ``[signals.NAME]``; offset and limits have the unit of the signal."""
+
+    column: _Column = ""
+    unit: _Quoted = ""
+    scale: Annotated[float | None, Unit("1")] = None
+    sign: Annotated[int, Field(ge=-1, le=1), Hint(_SIGN)] = 1
+    offset: Any = None
+    delay: Annotated[float, Unit("s")] = 0.0
+    limits: Any = None
+    label: _Quoted = ""
+    time: TimeSection | None = None
+    rate: _Rate = None
+
+
+class MappingFile(_Marked):
+    """A mapping file."""
+
+    format: _Quoted = ""
+    time: TimeSection | None = None
+    rate: _Rate = None
+    start: _Instant = None
+    signals: Annotated[Mapping[str, SignalSection], Field(default_factory=dict)]
+    decimal: Annotated[Literal["", ".", ","], Hint("it must be '.' or ','")] = ""
+    skip_lines: Annotated[int, Field(ge=0, le=10_000)] = 0
+    titles: Annotated[
+        bool | None, Hint("it must be true or false, whether the first row holds titles")
+    ] = None
+    encoding: _Quoted = ""
 
 
 def mapping_from(content: Mapping[str, Any]) -> MeasurementMapping:
@@ -166,38 +212,22 @@ def mapping_from(content: Mapping[str, Any]) -> MeasurementMapping:
     UnitError
         For a unit that is not known or does not fit.
     ParameterError
-        For a value that is not admissible.
+        For a value that is out of range.
     """
-    _require_known(content, _KEYS, "key")
-    signals = _table(content.get("signals", {}), "signals")
-    decimal = _text(content, "decimal", "")
-    if decimal not in ("", ".", ","):
-        raise ParameterError(f"decimal = {decimal!r} is not admissible: it must be '.' or ','")
-    skip = whole_number("skip_lines", content.get("skip_lines", 0), 0, 10_000)
+    file = MappingFile.read(content, "a mapping")
     return MeasurementMapping(
-        {n: _signal(n, _table(v, f"signals.{n}")) for n, v in signals.items()},
-        _clock(content, ""),
-        _text(content, "format", ""),
-        decimal,
-        skip,
-        _titles(content),
-        _encoding(content),
-        _missing(content, ""),
+        {name: _signal(name, each) for name, each in file.signals.items()},
+        _clock(file.time, file.rate, file.start, ""),
+        file.format.strip(),
+        file.decimal,
+        file.skip_lines,
+        file.titles,
+        _encoding(file.encoding.strip().lower()),
+        _marks(file.missing),
     )
 
 
-def _titles(content: Mapping[str, Any]) -> bool | None:
-    titles = content.get("titles")
-    if titles is not None and not isinstance(titles, bool):
-        raise ParameterError(
-            f"titles = {quoted(titles)} is not valid: it must be true or false, whether the first "
-            "row holds titles"
-        )
-    return titles
-
-
-def _encoding(content: Mapping[str, Any]) -> str:
-    name = _text(content, "encoding", "").lower()
+def _encoding(name: str) -> str:
     encoding = {
         "utf8": "utf-8",
         "utf16": "utf-16",
@@ -210,166 +240,97 @@ def _encoding(content: Mapping[str, Any]) -> str:
     return encoding
 
 
-def _missing(table: Mapping[str, Any], where: str) -> tuple[float | str, ...]:
+def _marks(missing: tuple[float | str, ...]) -> tuple[float | str, ...]:
     """Return the numbers and texts that mark missing values."""
-    marks = table.get("missing", [])
-    marks = marks if isinstance(marks, list) else [marks]
-    for mark in marks:
-        is_huge = isinstance(mark, int) and mark.bit_length() > 1000
-        if isinstance(mark, bool) or is_huge or not isinstance(mark, (int, float, str)):
-            raise ParameterError(
-                f"{where}missing = {quoted(table['missing'])} is not valid: write texts and "
-                'numbers, as ["NA", "OVLD", 9.9E37]'
-            )
-    return tuple(mark.strip() if isinstance(mark, str) else float(mark) for mark in marks)
+    return tuple(mark.strip() if isinstance(mark, str) else mark for mark in missing)
 
 
-def _signal(name: str, table: Mapping[str, Any]) -> SignalMapping:
-    where = f"signals.{name}."
-    _require_known(table, _SIGNAL_KEYS, f"key in [signals.{name}]")
-    unit = _unit(table, f"{where}unit")
+def _signal(name: str, section: SignalSection) -> SignalMapping:
+    where = f"[signals.{name}] "
+    unit = _unit(section.unit, where)
     symbol = si_symbol(unit_of(unit)) if unit else ""
-    needs_unit = [key for key in ("offset", "limits") if key in table and not symbol]
+    needs_unit = [key for key in ("offset", "limits") if key in section.given and not symbol]
     if needs_unit:
-        raise UnitError(f"{where}{needs_unit[0]} needs to know what is measured: give {where}unit")
-    sign = table.get("sign", 1)
-    if isinstance(sign, bool) or sign not in (1, -1):
-        raise ParameterError(f"{where}sign = {quoted(sign)} is not admissible: it must be 1 or -1")
+        raise UnitError(f"{where}{needs_unit[0]} needs to know what is measured: give its unit")
+    if section.scale == 0.0:
+        raise ParameterError(f"{where}scale = 0: every value would be the same")
+    if section.sign == 0:
+        raise ParameterError(f"{where}sign = 0: {_SIGN}")
+    number, column = _numbered(section.column)
     return SignalMapping(
         name=name,
-        column=_column(table, where) or name,
-        number=_column_number(table, where),
+        column=column or name,
+        number=number,
         unit=unit,
-        scale=_scale(table, where),
-        sign=int(sign),
-        offset=_difference(table["offset"], symbol, f"{where}offset") if "offset" in table else 0.0,
-        delay=_quantity(table.get("delay", "0 s"), "s", f"{where}delay"),
-        limits=_limits(table, symbol, f"{where}limits"),
-        label=_text(table, "label", where),
-        clock=_clock(table, where),
-        missing=_missing(table, where),
+        scale=section.scale,
+        sign=section.sign,
+        offset=0.0 if section.offset is None else _difference(section.offset, symbol, where),
+        delay=section.delay,
+        limits=None if section.limits is None else _limits(section.limits, symbol, where),
+        label=section.label.strip(),
+        clock=_clock(section.time, section.rate, None, where),
+        missing=_marks(section.missing),
     )
 
 
-def _scale(table: Mapping[str, Any], where: str) -> float | None:
-    if "scale" not in table:
-        return None
-    scale = units.parse(table["scale"], "1", f"{where}scale")
-    if scale == 0.0:
-        raise ParameterError(f"{where}scale = 0 is not admissible: every value would be the same")
-    return scale
-
-
-def _limits(table: Mapping[str, Any], symbol: str, name: str) -> tuple[float, float] | None:
-    if "limits" not in table:
-        return None
-    pair = table["limits"]
+def _limits(pair: Any, symbol: str, where: str) -> tuple[float, float]:
     if not isinstance(pair, list) or len(pair) != 2:
-        raise ParameterError(f'{name} = {quoted(pair)}: write two, as ["0 bar", "250 bar"]')
-    low, high = (_quantity(value, symbol, name) for value in pair)
+        raise ParameterError(f'{where}limits = {quoted(pair)}: write two, as ["0 bar", "250 bar"]')
+    low, high = (written(value, symbol, f"{where}limits") for value in pair)
     if not low < high:
-        raise ParameterError(f"{name} = {quoted(pair)} is not admissible: the lower one first")
+        raise ParameterError(f"{where}limits = {quoted(pair)}: the lower one first")
     return low, high
 
 
-def _difference(value: object, symbol: str, name: str) -> float:
+def _difference(value: Any, symbol: str, where: str) -> float:
     """Return an offset; one in degrees Celsius would count from another zero."""
-    number = _quantity(value, symbol, name)
+    number = written(value, symbol, f"{where}offset")
     unit = units.split(value)[1] if isinstance(value, str) else ""
     if unit and units.has_own_zero(unit, symbol):
-        raise UnitError(f"{name} = {quoted(value)}: give the difference in {symbol}")
+        raise UnitError(f"{where}offset = {quoted(value)}: give the difference in {symbol}")
     return number
 
 
-def _clock(table: Mapping[str, Any], where: str) -> Clock | None:
-    """Return the clock of a table's keys ``time``, or ``rate`` and ``start``."""
-    inner = table.get("time")
-    rest = {key: table[key] for key in ("rate", "start") if key in table}
-    if inner is None:
-        inner, name = rest, where
-    else:
-        name = f"{where}time."
-        inner = {"column": inner} if isinstance(inner, (str, int)) else inner
-        inner = {**_table(inner, f"{where}time"), **rest}
-    if not inner:
+def _clock(
+    time: TimeSection | None, rate: float | None, start: float | None, where: str
+) -> Clock | None:
+    """Return the clock that a table ``time``, or ``rate`` and ``start`` beside it, are."""
+    time = time or TimeSection()
+    rate = time.rate if rate is None else rate
+    start = time.start if start is None else start
+    if not time.given and rate is None and start is None:
         return None
-    _require_known(inner, _TIME_KEYS, f"key in {name.rstrip('.')}")
-    column = _column(inner, name)
-    if bool(column) == ("rate" in inner):
+    number, column = _numbered(time.column)
+    if bool(column) == (rate is not None):
         raise ParameterError(
-            f"{name}column or {name}rate: give one of them, as "
+            f"{where}time.column or {where}rate: give one of them, as "
             'time = { column = "t", unit = "ms" } or rate = "1 kHz"'
         )
-    unit = _unit(inner, f"{name}unit")
+    unit = _unit(time.unit, f"{where}time.")
     if unit and si_symbol(unit_of(unit)) != "s":
-        raise UnitError(f"{name}unit = {quoted(unit)} is no unit of time: write for instance 'ms'")
-    if column and "start" in inner:
-        raise ParameterError(f"{name}start goes with a rate: a column has its own instants")
-    start = _quantity(inner.get("start", "0 s"), "s", f"{name}start")
-    rate = 0.0
-    if not column:
-        rate = _quantity(inner["rate"], "Hz", f"{name}rate")
-        if not rate > 0.0:
-            raise ParameterError(
-                f"{name}rate = {quoted(inner['rate'])} is not admissible: it must be > 0 Hz"
-            )
-    return Clock(column, unit, rate, start, _column_number(inner, name))
-
-
-def _quantity(value: Any, symbol: str, name: str) -> float:
-    """Return a quantity in SI; a plain number is refused where a unit is wanted, except 0."""
-    if symbol != "1" and isinstance(value, (int, float)) and value != 0 and math.isfinite(value):
         raise UnitError(
-            f"{name} = {value} has no unit: write for instance {units.example(symbol)!r}"
+            f"{where}time.unit = {quoted(unit)} is no unit of time: write for instance 'ms'"
         )
-    return units.parse(value, symbol, name)
+    if column and start is not None:
+        raise ParameterError(f"{where}start goes with a rate: a column has its own instants")
+    return Clock(column, unit, rate or 0.0, start or 0.0, number)
 
 
-def _unit(table: Mapping[str, Any], name: str) -> str:
-    text = _text(table, "unit", name.removesuffix("unit"))
+def _unit(text: str, where: str) -> str:
     try:
-        if "unit" in table:
-            unit_of(text)
+        if text:
+            unit_of(text.strip())
     except UnitError as error:
         raise UnitError(
-            f"{name} = {quoted(text)}: {error}: write for instance 'bar', or '1' for a pure number"
+            f"{where}unit = {quoted(text)}: {error}: write for instance 'bar', or '1' for a pure "
+            "number"
         ) from None
-    return text
+    return text.strip()
 
 
-def _column(table: Mapping[str, Any], where: str) -> str:
-    """Return the name of a column, or its number as a text."""
-    return str(_column_number(table, where) or _text(table, "column", where))
-
-
-def _column_number(table: Mapping[str, Any], where: str) -> int:
-    """Return the number of a column, from 1; 0 where its name is given."""
-    value = table.get("column", "")
-    if not isinstance(value, int) or isinstance(value, bool):
-        return 0
-    if not 1 <= value <= 100_000:
-        raise ParameterError(f"{where}column = {quoted(value)}: columns are counted from 1")
-    return value
-
-
-def _text(table: Mapping[str, Any], key: str, where: str) -> str:
-    value = table.get(key, "")
-    if not isinstance(value, str):
-        raise ParameterError(f"{where}{key} = {quoted(value)}: write it in quotation marks")
-    return value.strip()
-
-
-def _table(value: Any, name: str) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        raise ParameterError(f"{name} = {quoted(value)}: it must be a table of key = value")
-    return value
-
-
-def _require_known(table: Mapping[str, Any], known: Iterable[str], kind: str) -> None:
-    names = tuple(known)
-    for key in table:
-        if key not in names:
-            raise unknown_name(kind, key, names)
+def _numbered(column: str | int) -> tuple[int, str]:
+    """Return the number of a column, 0 where its title is given, and its title or number."""
+    return (column, str(column)) if isinstance(column, int) else (0, column.strip())
 
 
 def read_mapping(path: str | Path) -> MeasurementMapping:

@@ -19,6 +19,7 @@ SHARE = "share"
 """unit of an allowance that is a share of the stated number"""
 
 
+@checked
 @dataclass(frozen=True)
 class Allowance:
     """A tolerance with its reason.
@@ -59,12 +60,19 @@ class Fact:
         Place in the source.
     kind
         What kind of statement it is.
+    tolerance
+        By which it is judged, see `Item`, or an `Allowance` around the number; None where nobody
+        says.
+    note
+        How its counterpart is computed, where all of them are computed alike.
     """
 
     value: float
     unit: str
     where: str
     kind: Kind = "printed"
+    tolerance: Tolerance | Allowance | None = None
+    note: str = ""
 
 
 def reading(value: float, unit: str, where: str) -> Fact:
@@ -115,7 +123,7 @@ def compared(
     name: str,
     fact: Fact,
     computed: float,
-    tolerance: Tolerance | Allowance | None,
+    tolerance: Tolerance | Allowance | Literal["as stated"] | None = "as stated",
     note: str = "",
     *,
     tuned: Literal["", "calibrated", "an input"] = "",
@@ -131,16 +139,18 @@ def compared(
     computed
         What we compute, in the fact's unit; NaN agrees with nothing.
     tolerance
-        See `Item`; an `Allowance` is taken around what is stated.
+        See `Item`; an `Allowance` is taken around what is stated. ``"as stated"``: the fact's.
     note
-        What a reader should know beside the place of the statement.
+        What a reader should know beside the place of the statement and the fact's own note.
     tuned
         How the value was made to agree: then it proves nothing, and is not judged.
     """
+    if tolerance == "as stated":
+        tolerance = fact.tolerance
     if isinstance(tolerance, Allowance):
         tolerance = tolerance.around(fact.value)
     agrees = None if tuned or tolerance is None else holds(fact.value, computed, tolerance)
-    note = _joined((fact.where, tuned, note))
+    note = _joined((fact.where, tuned, fact.note, note))
     return Item(name, fact.unit, fact.value, computed, tolerance, agrees, note, fact.kind)
 
 

@@ -17,7 +17,7 @@ from bywire.brakes.motorcycle.linear.brake import (
     two_pole_error,
     with_slow_pair,
 )
-from bywire.brakes.motorcycle.paper import facts
+from bywire.brakes.motorcycle.paper.facts import FACTS, table4_model
 from bywire.brakes.motorcycle.trim import holding_current, travel_at
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.linear import (
@@ -197,11 +197,11 @@ def test_eq_21_drops_the_zero_and_the_fast_pole_of_eq_15() -> None:
 
 @pytest.mark.parametrize("region", ["low", "medium", "high"])
 def test_eq_22_with_table_4_overshoots_and_falls(region: str) -> None:
-    row = {name: fact.value for name, fact in facts.TABLE4[region].items()}
+    row = {name: fact.value for name, fact in FACTS.table(f"table4.{region}").items()}
     times = [1.0 / (2.0 * math.pi * row[name]) for name in ("zero", "T1", "T2", "T_L")]
     model = with_slow_pair(1e5 * row["K"], *times)
     f = np.geomspace(0.01, 20.0, 40)
-    np.testing.assert_allclose(model.response(f), facts.table4_model(region).response(f))
+    np.testing.assert_allclose(model.response(f), table4_model(region).response(f))
     t = np.linspace(0.0, 20.0, 2000)
     assert model.step(t).max() > 1.02 * model.gain
     swapped = with_slow_pair(1e5 * row["K"], times[3], times[1], times[2], times[0])

@@ -13,6 +13,7 @@ from pydantic import Field
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Force, Frequency, Nodes, Position, Unit
 from bywire.core.typing import Array
+from bywire.data.labeled import over
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.measured import after_one_another, joined, split
@@ -44,19 +45,16 @@ def friction_line(fit: Estimate, groups: Sequence[Group]) -> Curve:
     variance = np.einsum("ni,ij,nj->n", rows, fit.covariance[np.ix_(places, places)], rows)
     half = 0.5 * float(np.diff(fit.intervals()[0])[0]) / float(fit.deviations[0])
     reach = half * np.sqrt(variance)
-    attrs = {"units": "N", "long_name": "friction"}
+    columns = {
+        "value": value,
+        "low": value - reach,
+        "high": value + reach,
+        "measured": np.array([seen.get(float(v), np.nan) for v in p]),
+    }
     return Curve(
         "friction",
         "Friction over pressure with its 95 % band; points: each record, each direction.",
-        xr.Dataset(
-            {
-                "value": ("p", value, attrs),
-                "low": ("p", value - reach, attrs),
-                "high": ("p", value + reach, attrs),
-                "measured": ("p", np.array([seen.get(float(v), np.nan) for v in p]), attrs),
-            },
-            {"p": ("p", p, {"units": "Pa", "long_name": "pressure"})},
-        ),
+        over(("p", p, "Pa", "pressure"), columns, "N", "friction"),
         "p",
     )
 

@@ -6,20 +6,38 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
+from pydantic import Field
 
-from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
+from bywire.core.errors import InputError, ParameterError
+from bywire.core.quantities import Unit
+from bywire.core.section import Hint, Section
 from bywire.core.typing import Array
-from bywire.core.units import parse
 from bywire.data.toml_file import read_toml
 
 _STEADY = 0.02  # of the demand's range: it holds while it moves less than this over a window
 _WINDOW = 0.1  # s
 _MOST = 60
-_KEYS = ("start", "stop", "tolerances")
+_Limits = Annotated[Mapping[str, str], Field(default_factory=dict), Hint("write a text, '<= 5 %'")]
+_Instant = Annotated[float, Unit("s"), Hint('write for instance start = "1 s", stop = "2 s"')]
+
+
+class SegmentSection(Section):
+    """A section ``[segments.NAME]``."""
+
+    start: _Instant
+    stop: _Instant
+    tolerances: _Limits
+
+
+class SegmentFile(Section):
+    """A file of segments."""
+
+    segments: Annotated[Mapping[str, SegmentSection], Field(default_factory=dict)]
+    tolerances: _Limits
 
 
 @dataclass(frozen=True)
@@ -117,40 +135,14 @@ def read_segments(path: str | Path, tolerances: Mapping[str, str]) -> list[Segme
 
 
 def _from(content: Mapping[str, Any], tolerances: Mapping[str, str]) -> list[Segment]:
-    for key in content:
-        if key not in ("segments", "tolerances"):
-            raise unknown_name("key", key, ("segments", "tolerances"))
-    shared = {**tolerances, **_texts(content.get("tolerances", {}), "tolerances")}
-    sections = _table(content.get("segments", {}), "segments")
-    if not sections:
+    file = SegmentFile.read(content, "a file of segments")
+    if not file.segments:
         raise ParameterError("no segment: write [segments.NAME] with start and stop")
+    shared = {**tolerances, **file.tolerances}
     segments = []
-    for name, section in sections.items():
-        entry = _table(section, f"segments.{name}")
-        for key in entry:
-            if key not in _KEYS:
-                raise unknown_name(f"key in [segments.{name}]", key, _KEYS)
-        ends = []
-        for key in ("start", "stop"):
-            if key not in entry:
-                raise ParameterError(f'segments.{name}.{key} is missing: write {key} = "1 s"')
-            ends.append(parse(entry[key], "s", f"segments.{name}.{key}"))
-        if not ends[0] < ends[1]:
-            raise ParameterError(f"segments.{name}: start must lie before stop")
-        limits = _texts(entry.get("tolerances", {}), f"segments.{name}.tolerances")
-        segments.append(Segment(name, ends[0], ends[1], {**shared, **limits}))
+    for name, section in file.segments.items():
+        if not section.start < section.stop:
+            raise ParameterError(f"[segments.{name}]: start must lie before stop")
+        limits = {**shared, **section.tolerances}
+        segments.append(Segment(name, section.start, section.stop, limits))
     return segments
-
-
-def _table(value: Any, name: str) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        raise ParameterError(f"{name} = {quoted(value)}: it must be a table of key = value")
-    return value
-
-
-def _texts(value: Any, name: str) -> dict[str, str]:
-    table = _table(value, name)
-    for key, text in table.items():
-        if not isinstance(text, str):
-            raise ParameterError(f"{name}.{key} = {quoted(text)}: write for instance '<= 5 %'")
-    return dict(table)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from bywire.brakes.motorcycle.paper import facts
+from bywire.brakes.motorcycle.paper.facts import FACTS
 from bywire.reproduction.item import Item
 from bywire.reproduction.root_cause import Quoted, RootCause, causes_of
 
@@ -100,7 +100,7 @@ def _hysteresis(q: Quoted) -> RootCause:
 
 def _single(q: Quoted) -> RootCause:
     top, end, ripple = "fig4.top_tick", "fig5.p_max.dither", "fig5.i_max.dither"
-    textbook = f"{facts.K_LF.value:g} where Hagen and Poiseuille's law has "
+    textbook = f"{FACTS['k_lf'].value:g} where Hagen and Poiseuille's law has "
     return RootCause(
         f"Single numbers: eq. (12)'s laminar coefficient is {textbook}{q('laminar.coefficient')}; "
         f"the text's mu of {q.stated('section3.mu')} is {q('section3.mu')} by Table 3; eq. (19)'s "

@@ -17,9 +17,8 @@ from bywire.brakes.motorcycle.paper import (
     table4,
 )
 from bywire.brakes.motorcycle.paper.causes import causes
-from bywire.brakes.motorcycle.paper.facts import CITATION
+from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, CITATION
 from bywire.brakes.motorcycle.paper.runs import MAIN, Runs
-from bywire.brakes.motorcycle.paper.tolerances import ALLOWANCES
 from bywire.reproduction.reproduction import Reproduction, Source, reproduced
 
 PARTS = {
@@ -47,7 +46,7 @@ SOURCE = Source(
     name=MAIN,
     summary="electro-mechanical brake-by-wire actuator for a sport motorbike, IFAC 2010",
     reproduce=lambda progress: reproduced(
-        Reproduction(MAIN, CITATION, allowances=ALLOWANCES, sets=NAMES),
+        Reproduction(MAIN, CITATION, allowances=tuple(ALLOWANCES.values()), sets=NAMES),
         Runs(progress),
         PARTS,
         causes,

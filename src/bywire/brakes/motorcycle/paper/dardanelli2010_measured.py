@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 
-from bywire.brakes.motorcycle.paper import facts
-from bywire.brakes.motorcycle.paper.facts import CITATION
+from bywire.brakes.motorcycle.paper.facts import CITATION, FACTS
 from bywire.brakes.motorcycle.paper.measured.appraisal import Appraisal, appraised
 from bywire.brakes.motorcycle.paper.measured.experiments import overshoots, stuck_at
 from bywire.brakes.motorcycle.paper.measured.misfit import predicted
@@ -70,8 +69,7 @@ def _item(s: Statement, name: str, value: float) -> Item:
         f"{s.name}{SETS[name]}",
         s.fact,
         value,
-        s.tolerance,
-        f"{s.note}; residual {r:.2g} tolerances",
+        note=f"residual {r:.2g} tolerances",
         tuned="calibrated"
         if fitted
         else "an input"
@@ -175,9 +173,9 @@ def _bounds() -> Table:
 def beyond(runs: Runs) -> Part:
     """Return what the paper does not state, and the reasons for what is left are about."""
     par = parameters(NAME)
-    printed = facts.TABLE3["k_brk_p"].value
+    printed = FACTS["table3.k_brk_p"].value
     softer = par.replace({"seal.k_brk_p": printed, "ecu.est_par.k_brk_p": printed})
-    height = facts.FIG6_STEP.value
+    height = FACTS["fig6_step"].value
     small, paper = overshoots(par, "medium", (_SMALL, height))
     (without,) = overshoots(softer, "medium", (height,))
     of = "step from 25 bar, dither averaged, highest point over its end"

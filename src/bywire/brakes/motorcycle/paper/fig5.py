@@ -14,9 +14,8 @@ from bywire.bench.experiment import as_run
 from bywire.bench.kpis import hysteresis
 from bywire.bench.kpis.smoothing import smoothed
 from bywire.bench.result import Result
-from bywire.brakes.motorcycle.paper import facts
+from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, FACTS
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, parameters
-from bywire.brakes.motorcycle.paper.tolerances import LEVEL, LOOP
 from bywire.brakes.motorcycle.staircase import jumps
 from bywire.report.friction_figures import hysteresis_loop
 from bywire.reproduction.item import Item, compared, found
@@ -29,7 +28,7 @@ REMOVED = 0.1
 """width, as a share of the undithered loop's at mid-height, below which a loop counts as removed"""
 SLOWER = 10.0
 """how many times slower than eq. (17) the slow ramp is"""
-LEVELS = np.arange(LEVEL.size, 45.0, 0.1) * BAR
+LEVELS = np.arange(ALLOWANCES["level"].size, 45.0, 0.1) * BAR
 DAMPINGS = (0.5, 1.0)
 """other damping ratios of the 80 Hz filter: the paper prints none"""
 
@@ -142,40 +141,37 @@ def _set_items(name: str, suffix: str, loops: Loops) -> list[Item]:
     slow = 100.0 * _slow_area(name) / values["loop_area_undithered"]
     return [
         compared(
-            f"fig5.p_max{suffix}", facts.FIG5_TOP, loops.p_max(WITHOUT), "<=", "without dither"
+            f"fig5.p_max{suffix}", FACTS["fig5_top"], loops.p_max(WITHOUT), note="without dither"
         ),
         compared(
-            f"fig5.p_max.dither{suffix}", facts.FIG5_TOP, loops.p_max(WITH), "<=", "with dither"
+            f"fig5.p_max.dither{suffix}", FACTS["fig5_top"], loops.p_max(WITH), note="with dither"
         ),
         compared(
             f"fig5.loop_area_ratio{suffix}",
-            facts.FIG5_LOOP,
+            FACTS["fig5_loop"],
             loops.area_ratio,
-            LOOP,
-            "area with dither over that without, averaged over one dither period; mostly delay",
+            note="area with dither over that without, averaged over one dither period; mostly "
+            "delay",
         ),
         compared(
             f"fig5.loop_area_ratio.slow{suffix}",
-            facts.FIG5_LOOP,
+            FACTS["fig5_loop"],
             slow,
-            LOOP,
-            f"the same with dither on a ramp {SLOWER:g} times slower: friction alone",
+            note=f"the same with dither on a ramp {SLOWER:g} times slower: friction alone",
         ),
         compared(
             f"fig5.removed_above{suffix}",
-            facts.FIG5_REMOVED,
+            FACTS["fig5_removed"],
             loops.removed_above,
-            LEVEL,
-            f"pressure above which the width stays below {100 * REMOVED:g} % of the "
-            f"undithered loop's at mid-height; {LEVEL.size:g} bar is the lowest level looked "
-            "at",
+            note=f"pressure above which the width stays below {100 * REMOVED:g} % of the "
+            f"undithered loop's at mid-height; {ALLOWANCES['level'].size:g} bar is the lowest "
+            "level looked at",
         ),
         compared(
             f"fig5.i_max.dither{suffix}",
-            facts.FIG5_CURRENT,
+            FACTS["fig5_current"],
             peak(loops.result.recordings[WITH], "i_filtered"),
-            "<=",
-            "measured current behind the 20 Hz low-pass: dither of eq. (20) leaves more "
+            note="measured current behind the 20 Hz low-pass: dither of eq. (20) leaves more "
             "ripple than the figure has room for",
         ),
         found(f"fig5.jumps{suffix}", "1", float(stairs.levels.size), f"ending at {levels} bar"),
@@ -204,7 +200,7 @@ def _set_items(name: str, suffix: str, loops: Loops) -> list[Item]:
 
 def _slow_area(name: str) -> float:
     """Return the dithered loop's area [A Pa] on a slower ramp, from two signals only."""
-    slope = facts.RAMP_PEAK.value / 25.0 / SLOWER
+    slope = FACTS["ramp_peak"].value / 25.0 / SLOWER
     bench = Bench("friction-ramp", name, options={"slope": slope})
     case = next(c for c in bench.cases() if c.label == WITH)
     slow = simulate(as_run(case, bench.step), signals=("i", "p_mc"))

@@ -6,11 +6,12 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.kpis import step_response
+from bywire.bench.kpis.registry import evaluate
 from bywire.bench.result import Result
 from bywire.brakes.motorcycle.linear.brake import theoretical
 from bywire.brakes.motorcycle.linear.rational import Rational
 from bywire.brakes.motorcycle.methods.braking.records import averaged
-from bywire.brakes.motorcycle.paper import facts
+from bywire.brakes.motorcycle.paper.facts import FACTS, table4_model
 from bywire.brakes.motorcycle.paper.identified import identified_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, before, parameters
 from bywire.brakes.motorcycle.paper.table4 import step_peak
@@ -21,22 +22,21 @@ from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import kpis, selected
 
-HEIGHT = facts.FIG6_STEP.value
-START = facts.FIG6_START.value * BAR
+HEIGHT = FACTS["fig6_step"].value
+START = FACTS["fig6_start"].value * BAR
 
 
 def part(runs: Runs) -> Part:
     """Return the step on the nonlinear, the theoretical and the identified model."""
-    model = facts.table4_model("medium")
+    model = table4_model("medium")
     final = Fact(HEIGHT * model.gain / BAR, "bar", "eq. (22) with the numbers of Table 4, medium")
     _, high = step_peak(model, HEIGHT)
     items = [
         compared(
             "fig6.peak",
-            facts.FIG6_TOP,
+            FACTS["fig6_top"],
             (START + high) / BAR,
-            None,
-            "highest pressure of Table 4's medium model from 25 bar; paper beside paper, not "
+            note="highest pressure of Table 4's medium model from 25 bar; paper beside paper, not "
             "judged",
         ),
         compared(
@@ -110,8 +110,9 @@ def _nonlinear(runs: Runs, name: str, suffix: str, final: Fact, rise: Fact) -> l
 def _rise_time(model: Rational) -> float:
     """Return the rise time (10 to 90 %) of a step on a linear model [s]."""
     t = np.arange(0.0, 20.0, 1e-3)
-    response = step_response.StepResponse(t, model.step(t), 0.0, model.gain)
-    return step_response.rise_time(response).value
+    response = xr.Dataset({"p": ("time", model.step(t))}, {"time": t})
+    setting = step_response.Setting("p", 0.0, 0.0, model.gain)
+    return evaluate("step_response", response, setting)["rise_time"].value
 
 
 def _own(name: str, start: float, t: Array) -> list[tuple[str, Array, str]]:
@@ -157,7 +158,7 @@ def _exhibit(step: Result, name: str, label: str) -> Exhibit:
                 *_own(name, start, t),
                 (
                     "table4",
-                    start + HEIGHT * facts.table4_model("medium").step(t),
+                    start + HEIGHT * table4_model("medium").step(t),
                     "Table 4, medium pressure",
                 ),
             )

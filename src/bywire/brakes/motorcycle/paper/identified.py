@@ -11,9 +11,8 @@ from bywire.brakes.motorcycle.linear.brake import theoretical, with_slow_pair
 from bywire.brakes.motorcycle.linear.rational import Rational
 from bywire.brakes.motorcycle.methods import braking_dynamics
 from bywire.brakes.motorcycle.methods.braking.fit import five_of
-from bywire.brakes.motorcycle.paper import facts
+from bywire.brakes.motorcycle.paper.facts import FACTS, REGIONS, table4_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, parameters
-from bywire.brakes.motorcycle.paper.tolerances import CORNER, GAIN
 from bywire.identification.method import Effort, Identified
 from bywire.report.bode import Response, bode
 from bywire.reproduction.item import Item, compared, found
@@ -34,7 +33,7 @@ def identified(model: str) -> Identified:
         without a slow pair, all records at once.
     """
     par = parameters(MAIN)
-    p = facts.REGIONS
+    p = REGIONS
     options = braking_dynamics.METHOD.defaults.replace(
         {
             "model": model,
@@ -43,7 +42,7 @@ def identified(model: str) -> Identified:
             "p_low": p["low"],
             "p_medium": p["medium"],
             "p_high": p["high"],
-            "i_step": facts.FIG6_STEP.value,
+            "i_step": FACTS["fig6_step"].value,
         }
     )
     method = braking_dynamics.METHOD
@@ -58,8 +57,8 @@ def identified_model(region: str) -> Rational:
 def items() -> list[Item]:
     """Return Table 4 beside what its experiment gives on our brake."""
     rows: list[Item] = []
-    for region in facts.REGIONS:
-        row, estimate = facts.TABLE4[region], identified("eq-22").estimates[region]
+    for region in REGIONS:
+        row, estimate = FACTS.table(f"table4.{region}"), identified("eq-22").estimates[region]
         five, prefix = five_of(estimate), f"table4.{region}.identified"
         deviation = {
             u.name: float(d) for u, d in zip(estimate.unknowns, estimate.deviations, strict=True)
@@ -69,8 +68,7 @@ def items() -> list[Item]:
                 f"{prefix}.K",
                 row["K"],
                 five["K"] / BAR,
-                GAIN,
-                f"first step, {_interval(five['K'], deviation.get('K', math.nan))}: "
+                note=f"first step, {_interval(five['K'], deviation.get('K', math.nan))}: "
                 "step of 0.35 A, nonlinear brake with dither and sensors' noise",
             )
         )
@@ -85,8 +83,7 @@ def items() -> list[Item]:
                     f"{prefix}.{key}",
                     row[key],
                     1.0 / (2.0 * math.pi * T),
-                    CORNER,
-                    f"{step}, {_interval(T, deviation.get(name, math.nan))}",
+                    note=f"{step}, {_interval(T, deviation.get(name, math.nan))}",
                 )
             )
         rows += _without_pair(region)
@@ -118,7 +115,7 @@ def exhibit() -> Exhibit:
     measured = gain["measured"].values * np.exp(1j * np.radians(phase["measured"].values))
     responses = [
         Response("identified, our brake", f, identified_model("medium").response(f) / BAR),
-        Response("Table 4, medium", f, facts.table4_model("medium").response(f) / BAR),
+        Response("Table 4, medium", f, table4_model("medium").response(f) / BAR),
         Response("eq. (15), calibrated", f, theoretical(parameters(MAIN)).response(f) / BAR),
         Response("sines, our brake", gain["frequency"].values, measured / BAR, measured=True),
     ]

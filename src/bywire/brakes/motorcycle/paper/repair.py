@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from scipy.optimize import brentq
 
 from bywire.brakes.motorcycle.linear.brake import theoretical
-from bywire.brakes.motorcycle.paper import facts
+from bywire.brakes.motorcycle.paper.facts import FACTS
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, PRINTED, Runs, parameters
 from bywire.brakes.motorcycle.paper.table1 import P_NOMINAL
 from bywire.brakes.motorcycle.paper.table2 import numbers
-from bywire.brakes.motorcycle.paper.tolerances import PRINTED as DIGITS
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import travel_at
 from bywire.core.catalog import PARAMETER_SETS
@@ -62,9 +61,9 @@ def _change(change: Change) -> Item:
     """Return the old and the new value of a parameter, with the reason."""
     cited = PARAMETER_SETS.find(MAIN).values[change.name]
     new, name = change.factor * float(cited.value), f"calibrated.{change.symbol}"
-    if change.symbol not in facts.TABLE1:
+    if change.symbol not in FACTS.table("table1"):
         return found(name, change.unit, new, f"calibrated; not printed; {cited.where}")
-    fact = facts.TABLE1[change.symbol]
+    fact = FACTS.table("table1")[change.symbol]
     share = new / fact.value
     note = f"{share:.3g} times the printed value, our change; {cited.where}"
     return compared(name, fact, new, None, note, tuned="calibrated")
@@ -73,7 +72,7 @@ def _change(change: Change) -> Item:
 def _short_stroke() -> list[Item]:
     """Return the stroke that gives Table 1 the fastest pole of Table 2, and what it costs."""
     printed = parameters(PRINTED)
-    wanted = facts.TABLE2["pole3"].value
+    wanted = FACTS["table2.pole3"].value
 
     def pole(s_mc: float) -> float:
         return numbers(theoretical(_with_stroke(printed, s_mc)))["pole3"]
@@ -87,18 +86,16 @@ def _short_stroke() -> list[Item]:
         found("short_stroke.s_mc", "mm", 1e3 * s_mc, "gives Table 1 in (15) the pole 3 of Table 2"),
         compared(
             "short_stroke.pole3",
-            facts.TABLE2["pole3"],
+            FACTS["table2.pole3"],
             pole(s_mc),
-            DIGITS,
-            "Table 1 with that stroke",
+            note="Table 1 with that stroke",
             tuned="calibrated",
         ),
         compared(
             "short_stroke.p_end",
-            facts.SENSOR_RANGE,
+            FACTS["sensor_range"],
             p_end / BAR,
-            None,
-            "pressure at which the piston meets the chamber's end with that stroke: within "
+            note="pressure at which the piston meets the chamber's end with that stroke: within "
             "the range; not judged, the stroke is a trial of ours",
         ),
     ]
@@ -125,9 +122,8 @@ def _laminar(par: MotorcycleParameters) -> Item:
     coefficient = par.pipeline.k_lf * textbook / pipeline.resistance(par.pipeline, par.fluid)
     return compared(
         "laminar.coefficient",
-        facts.K_LF,
+        FACTS["k_lf"],
         coefficient,
-        DIGITS,
-        "128 nu rho L/(pi d^4) of Hagen and Poiseuille, written as k nu rho pi L/A^2: "
+        note="128 nu rho L/(pi d^4) of Hagen and Poiseuille, written as k nu rho pi L/A^2: "
         "a quarter; the models use the paper's",
     )

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from bywire.brakes.motorcycle.paper import facts
+from bywire.brakes.motorcycle.paper.facts import FACTS
 from bywire.brakes.motorcycle.paper.runs import SETS, Runs, parameters
-from bywire.brakes.motorcycle.paper.tolerances import PRINTED
 from bywire.brakes.motorcycle.trim import travel_at
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.report.subject import parameter_rows
@@ -30,25 +29,22 @@ def part(runs: Runs) -> Part:
         items += [
             compared(
                 f"table1.x_mc{suffix}",
-                facts.TABLE1["x_mc"],
+                FACTS["table1.x_mc"],
                 x,
-                PRINTED,
-                "at 20 bar, a reading: x_rest is derived from it",
+                note="at 20 bar, a reading: x_rest is derived from it",
                 tuned="calibrated",
             ),
             compared(
                 f"table1.Re{suffix}",
-                facts.RE_LAMINAR,
+                FACTS["re_laminar"],
                 peak(hard, "Re"),
-                "<=",
-                "largest Reynolds number during hard braking, Fig. 7a",
+                note="largest Reynolds number during hard braking, Fig. 7a",
             ),
             compared(
                 f"table1.eq11{suffix}",
-                facts.EQ11,
+                FACTS["eq11"],
                 ratio,
-                ">=",
-                "beta A_pd^2/(V_pd K_pd) = beta/p_pd at 37 bar, by which (10) becomes (11)",
+                note="beta A_pd^2/(V_pd K_pd) = beta/p_pd at 37 bar, by which (10) becomes (11)",
             ),
         ]
     text = (

@@ -6,9 +6,8 @@ import numpy as np
 
 from bywire.brakes.motorcycle.linear.brake import theoretical, two_pole_error
 from bywire.brakes.motorcycle.linear.rational import Rational
-from bywire.brakes.motorcycle.paper import facts
+from bywire.brakes.motorcycle.paper.facts import FACTS, table2_model, table4_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, PRINTED, SETS, Runs, parameters
-from bywire.brakes.motorcycle.paper.tolerances import PRINTED as DIGITS
 from bywire.report.bode import Response, bode
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
@@ -34,15 +33,14 @@ def part(runs: Runs) -> Part:
     items: list[Item] = []
     for name, suffix in SETS.items():
         computed = numbers(theoretical(parameters(name)))
-        for key, fact in facts.TABLE2.items():
+        for key, fact in FACTS.table("table2").items():
             note = "s_mc, which moves it, is not printed" if key == "pole3" else ""
             items.append(
                 compared(
                     f"table2.{key}{suffix}",
                     fact,
                     computed[key],
-                    DIGITS,
-                    f"Table 1 in (15){'; ' if note else ''}{note}" if suffix else "",
+                    note=f"Table 1 in (15){'; ' if note else ''}{note}" if suffix else "",
                     tuned="" if suffix else "calibrated",
                 )
             )
@@ -73,14 +71,12 @@ def _figure() -> Exhibit:
     models = {
         "eq. (15), Table 1": theoretical(parameters(PRINTED)),
         "eq. (15), calibrated": theoretical(parameters(MAIN)),
-        "Table 4, medium pressure": facts.table4_model("medium"),
+        "Table 4, medium pressure": table4_model("medium"),
     }
     responses = [Response(label, f, model.response(f) / BAR) for label, model in models.items()]
     sparse = f[::20]
     responses.append(
-        Response(
-            "Table 2 as printed", sparse, facts.table2_model().response(sparse) / BAR, measured=True
-        )
+        Response("Table 2 as printed", sparse, table2_model().response(sparse) / BAR, measured=True)
     )
     return Exhibit(
         "table2-bode",

@@ -7,9 +7,8 @@ from functools import cache
 import numpy as np
 
 from bywire.brakes.motorcycle.methods import friction_ramp
-from bywire.brakes.motorcycle.paper import facts
+from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, FACTS
 from bywire.brakes.motorcycle.paper.runs import MAIN, Runs, parameters
-from bywire.brakes.motorcycle.paper.tolerances import ABOUT, PRINTED
 from bywire.control import dither
 from bywire.identification.method import Effort, Identified
 from bywire.plant import ball_screw_gear, seal_friction
@@ -31,7 +30,7 @@ def part(runs: Runs) -> Part:
     used = par.seal.flat()
     items: list[Item] = [
         compared(f"table3.{name}", fact, used[name], None, "used as published", tuned="an input")
-        for name, fact in facts.TABLE3.items()
+        for name, fact in FACTS.table("table3").items()
     ]
     curve = runs.bench("seal-stribeck", MAIN).recordings["curve"]
     torque = curve["T_fr"].values
@@ -39,19 +38,17 @@ def part(runs: Runs) -> Part:
     items += [
         compared(
             "fig4.top_tick",
-            facts.FIG4_TOP,
+            FACTS["fig4_top"],
             float(np.max(torque)),
-            "<=",
-            f"breakaway torque at 40 bar from Table 3 with T_pr = {par.seal.T_pr:g} N m, "
+            note=f"breakaway torque at 40 bar from Table 3 with T_pr = {par.seal.T_pr:g} N m, "
             f"chosen; {bare:.3g} N m even without it: the curves are not those of the printed "
             "values",
         ),
         compared(
             "fig4.bottom_tick",
-            facts.FIG4_BOTTOM,
+            FACTS["fig4_bottom"],
             float(np.min(torque)),
-            ">=",
-            "release side at 40 bar",
+            note="release side at 40 bar",
         ),
         _viscous(par.seal.mu_T / par.gear.k_g),
         _eq19(),
@@ -75,10 +72,9 @@ def _viscous(mu_F: float) -> Item:
     """Return the viscous coefficient of the text against that of Table 3."""
     return compared(
         "section3.mu",
-        facts.MU_TEXT,
+        FACTS["mu_text"],
         mu_F,
-        ABOUT,
-        "one effect, two values: Table 3's "
+        note="one effect, two values: Table 3's "
         "torque per shaft speed mu_T gives the force per shaft speed mu_F = mu_T/k_g; "
         "either is negligible beside k_damp; the models use Table 3's",
     )
@@ -96,7 +92,7 @@ def _eq19() -> Item:
         "eq19.A_dit",
         Fact(stated, "A", "eq. (19) at 25 bar with Tables 1 and 3, T_pr = 0"),
         needed,
-        PRINTED,
+        ALLOWANCES["printed"],
         "current above the holding current that eq. (8) needs to break away: (19) leaves eta_g out",
     )
 
@@ -117,7 +113,7 @@ def _identified_items() -> list[Item]:
     estimate = _identified().estimates["seal friction"]
     ends = dict(zip(estimate.names, estimate.intervals().tolist(), strict=True))
     rows: list[Item] = []
-    for name, fact in facts.TABLE3.items():
+    for name, fact in FACTS.table("table3").items():
         label = f"seal.{name}"
         if label not in ends:
             continue

@@ -9,11 +9,10 @@ from bywire.analysis.crossings import fall
 from bywire.analysis.response.sweep import complex_values
 from bywire.brakes.motorcycle.linear.brake import theoretical
 from bywire.brakes.motorcycle.linear.rational import Rational
-from bywire.brakes.motorcycle.paper import facts
 from bywire.brakes.motorcycle.paper import identified as dardanelli2010_identified
+from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, FACTS, REGIONS, table4_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, before, parameters
 from bywire.brakes.motorcycle.paper.sines import of_current
-from bywire.brakes.motorcycle.paper.tolerances import CORNER, GAIN, OVERSHOOT
 from bywire.brakes.motorcycle.trim import travel_at
 from bywire.report.bode import Response, bode
 from bywire.reproduction.item import Fact, Item, compared, found, quoted
@@ -30,18 +29,18 @@ FREQUENCIES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0)
 def part(runs: Runs) -> Part:
     """Return Table 4 beside eq. (15) and beside the nonlinear brake with dither."""
     items: list[Item] = []
-    for region, p in facts.REGIONS.items():
+    for region, p in REGIONS.items():
         items += _region(runs, region, p)
     items += _medium_step()
     measured = _sines(runs)
     items += _corner(runs, measured)
     items += dardanelli2010_identified.items()
-    K = facts.TABLE4["medium"]["K"]
+    K = FACTS["table4.medium.K"]
     items.append(
         compared(
             "table4.medium.p_ramp",
-            facts.FIG5_TOP,
-            K.value * facts.RAMP_PEAK.value,
+            FACTS["fig5_top"],
+            K.value * FACTS["ramp_peak"].value,
             None,
             "Table 4's gain times the ramp's 5 A; paper beside paper, not judged",
         )
@@ -64,18 +63,17 @@ def part(runs: Runs) -> Part:
 
 def _region(runs: Runs, region: str, p: float) -> list[Item]:
     """Return one row of Table 4."""
-    row, prefix = facts.TABLE4[region], f"table4.{region}"
+    row, prefix = FACTS.table(f"table4.{region}"), f"table4.{region}"
     items: list[Item] = []
     for name, suffix in SETS.items():
-        step = runs.settled_step(name, p, facts.FIG6_STEP.value)
+        step = runs.settled_step(name, p, FACTS["fig6_step"].value)
         gain = kpis(step)["static_gain"] / BAR
         items.append(
             compared(
                 f"{prefix}.K{suffix}",
                 row["K"],
                 gain,
-                GAIN,
-                f"nonlinear brake with dither, step of 0.35 A at {before(step) / BAR:.1f} bar",
+                note=f"nonlinear brake with dither, step of 0.35 A at {before(step) / BAR:.1f} bar",
             )
         )
     par = parameters(MAIN)
@@ -86,8 +84,7 @@ def _region(runs: Runs, region: str, p: float) -> list[Item]:
                 f"{prefix}.{key}",
                 row[key],
                 float(pole),
-                CORNER,
-                "pole of eq. (15), tuned to Table 2, where the paper's fit started",
+                note="pole of eq. (15), tuned to Table 2, where the paper's fit started",
                 tuned="calibrated",
             )
         )
@@ -108,10 +105,10 @@ def step_peak(model: Rational, height: float) -> tuple[float, float]:
 
 def _medium_step() -> list[Item]:
     """Return the step of Fig. 6 on the medium model, and its shape."""
-    model, height = facts.table4_model("medium"), facts.FIG6_STEP.value
+    model, height = table4_model("medium"), FACTS["fig6_step"].value
     t_peak, high = step_peak(model, height)
     final = height * model.gain
-    row = facts.TABLE4["medium"]
+    row = FACTS.table("table4.medium")
     air = _with_air(height)
     return [
         found("table4.medium.step_peak", "bar", high / BAR, "eq. (22), step of 0.35 A"),
@@ -128,7 +125,7 @@ def _medium_step() -> list[Item]:
             "table4.air",
             Fact(100.0 * (high / final - 1.0), "%", EQ22),
             air,
-            OVERSHOOT,
+            ALLOWANCES["overshoot"],
             "overshoot of the step; computed: eq. (15) with 1 ml of air in the chamber, which "
             "moves the slow pole and adds no pair below it: air is not what Table 4 shows",
         ),
@@ -140,7 +137,7 @@ def _with_air(height: float) -> float:
     par = parameters(MAIN).replace(
         {"fluid.air": "entrained", "fluid.V_air": 1e-6, "master_cylinder.s_mc": 20e-3}
     )
-    model = theoretical(par, facts.REGIONS["medium"])
+    model = theoretical(par, REGIONS["medium"])
     _, high = step_peak(model, height)
     return 100.0 * max(high / (height * model.gain) - 1.0, 0.0)
 
@@ -149,7 +146,7 @@ def _sines(runs: Runs) -> dict[str, xr.Dataset]:
     """Return the dithered brake's response to small sines of the current demand."""
     tests: dict[str, xr.Dataset] = {}
     for name in SETS:
-        step = runs.settled_step(name, facts.REGIONS["medium"], facts.FIG6_STEP.value)
+        step = runs.settled_step(name, REGIONS["medium"], FACTS["fig6_step"].value)
         start = step.bench.chosen_options.flat()["p_start"]
         tests[name] = of_current(name, start, (AMPLITUDE,), FREQUENCIES).isel(amplitude=0)
     return tests
@@ -158,24 +155,26 @@ def _sines(runs: Runs) -> dict[str, xr.Dataset]:
 def _corner(runs: Runs, measured: dict[str, xr.Dataset]) -> list[Item]:
     """Return where the response has fallen 3 dB below the static gain, against Table 4."""
     f = np.geomspace(0.05, 20.0, 4000)
-    model = facts.table4_model("medium")
+    model = table4_model("medium")
     response = np.abs(model.response(f)) / model.gain
     stated = float(f[np.argmax(response < np.sqrt(0.5))])
     fact = Fact(stated, "Hz", EQ22)
     items = []
     for name, suffix in SETS.items():
-        step = runs.settled_step(name, facts.REGIONS["medium"], facts.FIG6_STEP.value)
+        step = runs.settled_step(name, REGIONS["medium"], FACTS["fig6_step"].value)
         test, static = measured[name], kpis(step)["static_gain"]
         corner = fall(test["gain"].values, test["frequency"].values, static)
         note = "-3 dB; computed: nonlinear brake with dither, sines of 0.1 A at 25 bar"
-        items.append(compared(f"table4.medium.corner{suffix}", fact, corner, CORNER, note))
+        items.append(
+            compared(f"table4.medium.corner{suffix}", fact, corner, ALLOWANCES["corner"], note)
+        )
     return items
 
 
 def _figure(measured: dict[str, xr.Dataset]) -> Exhibit:
     f = np.geomspace(0.02, 20.0, 400)
     responses = [
-        Response("Table 4, medium", f, facts.table4_model("medium").response(f) / BAR),
+        Response("Table 4, medium", f, table4_model("medium").response(f) / BAR),
         Response("eq. (15), calibrated", f, theoretical(parameters(MAIN)).response(f) / BAR),
         *(
             Response(

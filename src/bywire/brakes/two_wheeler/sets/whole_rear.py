@@ -12,7 +12,7 @@ _BRAKE = next(e for e in dardanelli2010.ENTRIES if e.name == "dardanelli2010-ret
 WHOLE_REAR = CitedSet(
     name="sport600-whole-rear",
     assembly="two-wheeler-whole-rear",
-    source=f"{sport600.SOURCE}; all of the rear brake: {dardanelli2010.SOURCE}",
+    source=f"{sport600.FILE.citation}; all of the rear brake: {dardanelli2010.FILE.citation}",
     summary="the sport motorcycle, its rear brake that of dardanelli2010-retuned",
     parameter_class=WholeRearParameters,
     values={

@@ -32,6 +32,7 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.core.units import shown
+from bywire.data.labeled import over
 from bywire.identification.estimate import Estimate
 from bywire.identification.measured import joined, split
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
@@ -165,17 +166,15 @@ def _curve(runs: Sequence[RunDown], best: Estimate) -> Curve:
         speeds.append(run.motion.means(moved["omega"].values))
         table.append(np.array((-torque, -torque + e)))
     x, filled = at_own_places(speeds, table)
-    attrs = {"units": "N*m", "long_name": "decelerating torque"}
-    dims = ("record", "window")
     return Curve(
         "torque-over-speed",
         "Inertia times deceleration over speed while coasting, with the estimated inertia.",
-        xr.Dataset(
-            {"measured": (dims, filled[0], attrs), "modeled": (dims, filled[1], attrs)},
-            {
-                "record": [run.label for run in runs],
-                "omega": (dims, x, {"units": "rad/s", "long_name": "motor speed"}),
-            },
+        over(
+            ("omega", x, "rad/s", "motor speed"),
+            {"measured": filled[0], "modeled": filled[1]},
+            "N*m",
+            "decelerating torque",
+            ("record", [run.label for run in runs]),
         ),
         "omega",
     )

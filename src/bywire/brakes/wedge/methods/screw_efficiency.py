@@ -24,6 +24,7 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
 from bywire.core.errors import ParameterError
 from bywire.core.units import shown
+from bywire.data.labeled import over
 from bywire.identification.differentiation import differentiated
 from bywire.identification.equation import (
     Equation,
@@ -187,17 +188,16 @@ def _curve(strokes_read: list[Stroke]) -> Curve:
         [np.array([s.F for s in way]) for way in ways],
         [np.array([(s.torque, s.torque + s.error) for s in way]).T for way in ways],
     )
-    dims = ("direction", "stroke")
-    attrs = {"units": "N*m", "long_name": "motor torque along the motion"}
     return Curve(
         "torque-over-force",
         "Motor torque in steady motion over the force between the screws, by stroke.",
-        xr.Dataset(
-            {"measured": (dims, table[0], attrs), "modeled": (dims, table[1], attrs)},
-            {
-                "direction": ["driving", "driven back"],
-                "F": (dims, F, {"units": "N", "long_name": "force"}),
-            },
+        over(
+            ("F", F, "N", "force"),
+            {"measured": table[0], "modeled": table[1]},
+            "N*m",
+            "motor torque along the motion",
+            ("direction", ("driving", "driven back")),
+            along="stroke",
         ),
         "F",
     )

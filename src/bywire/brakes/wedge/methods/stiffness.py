@@ -28,6 +28,7 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import slope_of
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
+from bywire.data.labeled import over
 from bywire.identification.equation import steady_dynamics
 from bywire.identification.estimate import Estimate
 from bywire.identification.measured import joined, split
@@ -135,12 +136,11 @@ def _curve(stages: TwoStages, values: Array) -> Curve:
         "measured": stages.force_by_current(values)[order],
         "modeled": stages.heart_force(values, stages.heart)[0][order],
     }
-    attrs = {"units": "N", "long_name": "force between the screws"}
-    x = ("d", 1e3 * d[order], {"units": "mm", "long_name": "travel toward each other"})
+    x = ("d", 1e3 * d[order], "mm", "travel toward each other")
     return Curve(
         "force-over-travel",
         "Force by the current over travel in the brake heart, and the identified stiffnesses.",
-        xr.Dataset({name: ("d", row, attrs) for name, row in rows.items()}, {"d": x}),
+        over(x, rows, "N", "force between the screws"),
         "d",
     )
 

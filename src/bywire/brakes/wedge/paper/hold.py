@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray as xr
 
 from bywire.brakes.wedge.case import parameters_of
-from bywire.brakes.wedge.paper import facts
+from bywire.brakes.wedge.paper.facts import FACTS
 from bywire.brakes.wedge.paper.runs import (
     MAIN,
     WITHOUT_RUNOUT,
@@ -15,7 +15,6 @@ from bywire.brakes.wedge.paper.runs import (
     standby,
     tan_alpha,
 )
-from bywire.brakes.wedge.paper.tolerances import KEPT, STANDING
 from bywire.brakes.wedge.series import with_friction
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
@@ -56,10 +55,9 @@ def _power_off(runs: Runs) -> list[Item]:
     return [
         compared(
             "hold.neutral",
-            facts.REMAINS,
+            FACTS["remains"],
             _share(kept),
-            KEPT,
-            "moment 2 s after power off in % of that before; run-out off, friction on",
+            note="moment 2 s after power off in % of that before; run-out off, friction on",
         ),
         compared(
             "hold.drift",
@@ -96,10 +94,9 @@ def _standing(runs: Runs) -> list[Item]:
     return [
         compared(
             "hold.standing",
-            facts.ONLY_TURNING,
+            FACTS["only_turning"],
             shares["drop"],
-            STANDING,
-            "(tan(alpha) F_N - F_M)/(tan(alpha) F_N) on a standing disc, pad term dropped as "
+            note="(tan(alpha) F_N - F_M)/(tan(alpha) F_N) on a standing disc, pad term dropped as "
             "in the paper",
         ),
         found(
@@ -137,10 +134,9 @@ def _together(runs: Runs) -> list[Item]:
     return [
         compared(
             "hold.together",
-            facts.TOGETHER,
+            FACTS["together"],
             above["scheduled"] / above["preload"],
-            "<=",
-            f"500 Nm at mu_B = {AWAY:g}: {above['scheduled']:.3g} W together, "
+            note=f"500 Nm at mu_B = {AWAY:g}: {above['scheduled']:.3g} W together, "
             f"{above['preload']:.3g} W preloaded",
         ),
     ]

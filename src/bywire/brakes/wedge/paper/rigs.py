@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
-from bywire.brakes.wedge.paper import facts
+from bywire.brakes.wedge.paper.facts import FACTS
 from bywire.brakes.wedge.paper.runs import MAIN, parameters
-from bywire.brakes.wedge.paper.tolerances import RECOVERED
 from bywire.report.time_traces import time_traces
-from bywire.reproduction.item import Item, compared, found, reading
+from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs, kpis
 
@@ -25,10 +25,9 @@ def current_loop(runs: Runs) -> Part:
     items = [
         compared(
             "current_loop.bandwidth",
-            facts.FAST_CURRENT,
+            FACTS["fast_current"],
             usual / position,
-            ">=",
-            f"{usual:.0f} Hz against {position:g} Hz of the high-bandwidth position control; "
+            note=f"{usual:.0f} Hz against {position:g} Hz of the high-bandwidth position control; "
             "both are ours",
         ),
         found(
@@ -50,36 +49,32 @@ def efficiency(runs: Runs) -> Part:
     """Return the screw's efficiency as the rig measures it."""
     result = runs.bench("screw-efficiency", MAIN)
     values = {name: 100.0 * value for name, value in kpis(result).items() if "eta" in name}
-    put_in = reading(values["eta_f_true"], "%", facts.MEASURABLE)
-    allowed = RECOVERED
+    put_in = replace(FACTS["measurable"], value=values["eta_f_true"])
     bearing = f"{kpis(result)['bearing_torque']:.3g} N m"
     items = [
         compared(
             "efficiency.driving",
-            facts.ETA,
+            FACTS["eta"],
             values["eta_f"],
-            None,
-            "as the rig measures it",
+            note="as the rig measures it",
             tuned="an input",
         ),
         compared(
             "efficiency.recovered",
             put_in,
             values["eta_f"],
-            allowed,
-            f"with the bearings' torque, {bearing} without load and its growth with the "
+            note=f"with the bearings' torque, {bearing} without load and its growth with the "
             "force, taken off",
         ),
         compared(
             "efficiency.no_load",
             put_in,
             values["eta_f_no_load"],
-            allowed,
-            "with the torque without load alone taken off: what grows with the square of the "
+            note="with the torque without load alone taken off: what grows with the square of the "
             "force counts as loss of the screw",
         ),
         compared(
-            "efficiency.raw", put_in, values["eta_f_raw"], allowed, "motor torque and force alone"
+            "efficiency.raw", put_in, values["eta_f_raw"], note="motor torque and force alone"
         ),
         found(
             "efficiency.back_driven",
@@ -115,9 +110,9 @@ def stiffness(runs: Runs) -> Part:
     result = runs.bench("stiffness", MAIN)
     values = kpis(result)
     items = [
-        _recovered("stiffness.K_S", facts.SETS_STIFFNESS, values, "K_S", "N/um", MICRON),
-        _recovered("stiffness.K_W", facts.SETS_STIFFNESS, values, "K_W", "N/um", MICRON),
-        _recovered("stiffness.free_play", facts.MEASURES_PLAY, values, "free_play", "um", 1e-6),
+        _recovered("stiffness.K_S", FACTS["sets_stiffness"], values, "K_S", MICRON),
+        _recovered("stiffness.K_W", FACTS["sets_stiffness"], values, "K_W", MICRON),
+        _recovered("stiffness.free_play", FACTS["measures_play"], values, "free_play", 1e-6),
         *_directions(values),
     ]
     text = (
@@ -135,34 +130,30 @@ def stiffness(runs: Runs) -> Part:
     return Part("Drive-train stiffness", text, tuple(items), exhibits)
 
 
-def _recovered(
-    name: str, where: str, values: dict[str, float], key: str, unit: str, size: float
-) -> Item:
-    """Return a quantity as measured beside what was put in, in a unit of its own."""
-    put_in = reading(values[f"{key}_true"] / size, unit, where)
-    return compared(name, put_in, values[key] / size, RECOVERED)
+def _recovered(name: str, fact: Fact, values: dict[str, float], key: str, size: float) -> Item:
+    """Return a quantity as measured beside what was put in, in the unit of the statement."""
+    put_in = replace(fact, value=values[f"{key}_true"] / size)
+    return compared(name, put_in, values[key] / size)
 
 
 def _directions(values: dict[str, float]) -> list[Item]:
     """Return how compression and tension compare."""
     K_F = parameters().rig.sensor.K_F
     line = 1.0 / (1.0 / values["K_line_compression"] - 1.0 / K_F)
-    same = reading(line / MICRON, "N/um", facts.SAME_COMPRESSION)
+    same = replace(FACTS["same_compression"], value=line / MICRON)
     compression = values["K_heart_compression"]
     return [
         compared(
             "stiffness.compression",
             same,
             compression / MICRON,
-            RECOVERED,
-            "tip to tip, the force by the motors' current",
+            note="tip to tip, the force by the motors' current",
         ),
         compared(
             "stiffness.tension",
-            facts.SOFTER_TENSION,
+            FACTS["softer_tension"],
             values["K_heart_tension"] / compression,
-            "<=",
-            "tension over compression",
+            note="tension over compression",
         ),
         found(
             "stiffness.force_per_current",

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from bywire.brakes.wedge.paper import fig5, fig6, fig7, fig8, fig9, hold, motion, rigs, stability
 from bywire.brakes.wedge.paper.causes import causes
-from bywire.brakes.wedge.paper.facts import CITATION
+from bywire.brakes.wedge.paper.facts import ALLOWANCES, CITATION
 from bywire.brakes.wedge.paper.runs import MAIN
-from bywire.brakes.wedge.paper.tolerances import ALLOWANCES
 from bywire.reproduction.reproduction import Reproduction, Source, reproduced
 from bywire.reproduction.runs import Runs
 
@@ -29,7 +28,9 @@ SOURCE = Source(
     name=MAIN,
     summary="self-reinforcing wedge brake with two motors, SAE 2003",
     reproduce=lambda progress: reproduced(
-        Reproduction(MAIN, CITATION, allowances=ALLOWANCES, sets={"": "Our parameter set"}),
+        Reproduction(
+            MAIN, CITATION, allowances=tuple(ALLOWANCES.values()), sets={"": "Our parameter set"}
+        ),
         Runs(progress),
         PARTS,
         causes,

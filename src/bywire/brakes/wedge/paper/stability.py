@@ -11,9 +11,8 @@ from bywire.analysis.linear.linearize import linearize
 from bywire.brakes.wedge.case import swing
 from bywire.brakes.wedge.figures.brake_factor import WedgeForces, brake_factor
 from bywire.brakes.wedge.model import WedgeBrake, state_at
-from bywire.brakes.wedge.paper import facts
+from bywire.brakes.wedge.paper.facts import ALLOWANCES, FACTS
 from bywire.brakes.wedge.paper.runs import IDEAL, MAIN, parameters, stacked, tan_alpha
-from bywire.brakes.wedge.paper.tolerances import FEW, FORCE, FORMULA, GRID, NEUTRAL
 from bywire.brakes.wedge.series import tag, with_friction
 from bywire.brakes.wedge.start import memory_at, travel_for
 from bywire.reproduction.item import Fact, Item, compared, found, reading
@@ -87,7 +86,7 @@ def _static(runs: Runs) -> list[Item]:
                 f"stability.C.{tag(mu_B)}",
                 reading(stated, "1", where),
                 values[f"C_star_{tag(mu_B)}"],
-                FORMULA,
+                ALLOWANCES["formula"],
                 f"mu_B = {mu_B:g}, simulated "
                 f"without friction, F_M = {values[f'F_M_{tag(mu_B)}']:.4g} N at 500 "
                 f"Nm; with friction {values[f'C_star_rising_{tag(mu_B)}']:.3g} "
@@ -99,10 +98,9 @@ def _static(runs: Runs) -> list[Item]:
         *items,
         compared(
             "stability.F_M.neutral",
-            facts.NEUTRAL_FORCE,
+            FACTS["neutral_force"],
             values[f"F_M_{tag(tan_alpha())}"],
-            FORCE,
-            "simulated at mu_B = tan(alpha) without friction, at 500 Nm",
+            note="simulated at mu_B = tan(alpha) without friction, at 500 Nm",
         ),
         found("stability.neutral.falling", "1", values["neutral_mu_falling"], f"{neutral} falls"),
         found("stability.neutral.rising", "1", values["neutral_mu_rising"], f"{neutral} rises"),
@@ -136,20 +134,20 @@ def _runaway(runs: Runs) -> list[Item]:
     where = "section 'Introduction': unstable above the ideal point, mu_B = tan(alpha)"
     stated = Fact(tan_alpha(), "1", where)
     note = "lowest mu_B tried at which the moment grows by itself when the power goes off at"
-    high = facts.PULSE.value
+    high = FACTS["pulse"].value
     return [
         compared(
             "stability.runaway",
             stated,
             _lowest(runs, IDEAL, 500.0),
-            GRID,
+            ALLOWANCES["grid"],
             f"{note} 500 Nm; without friction",
         ),
         compared(
             "stability.runaway.friction",
             stated,
             _lowest(runs, {"flywheel.runout": 0.0}, 500.0),
-            GRID,
+            ALLOWANCES["grid"],
             f"{note} 500 Nm; with friction",
         ),
         found(
@@ -168,18 +166,18 @@ def _lowest(runs: Runs, changes: dict[str, Any], M_hold: float) -> float:
     """
 
     def grows(k: int) -> bool:
-        overrides = _at(round(LOWEST + k * GRID.size, 3), changes)
+        overrides = _at(round(LOWEST + k * ALLOWANCES["grid"].size, 3), changes)
         values = kpis(runs.bench("power-off-hold", MAIN, overrides, {"M_hold": M_hold}))
         met_stop = values["end_stop_force"] > 0.0
         return met_stop or values["moment_end"] > GROWN * values["moment_start"]
 
-    low, high = 0, round((HIGHEST - LOWEST) / GRID.size)
+    low, high = 0, round((HIGHEST - LOWEST) / ALLOWANCES["grid"].size)
     if grows(low) or not grows(high):
         return math.nan
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if grows(middle) else (middle, high)
-    return round(LOWEST + high * GRID.size, 3)
+    return round(LOWEST + high * ALLOWANCES["grid"].size, 3)
 
 
 def _closed_loop(runs: Runs) -> list[Item]:
@@ -194,10 +192,9 @@ def _closed_loop(runs: Runs) -> list[Item]:
         items += [
             compared(
                 f"stability.unstable{suffix}",
-                facts.STABLE,
+                FACTS["stable"],
                 values["unstable"],
-                "<=",
-                f"coefficients without a settled hold; {note}",
+                note=f"coefficients without a settled hold; {note}",
             ),
             found(
                 f"stability.overshoot{suffix}",
@@ -230,10 +227,9 @@ def _free_play(runs: Runs) -> list[Item]:
     return [
         compared(
             "stability.contact_changes",
-            facts.NO_PLAY,
+            FACTS["no_play"],
             float(changes["preload"]),
-            FEW,
-            f"{note}, preload of the parameter set",
+            note=f"{note}, preload of the parameter set",
         ),
         found(
             "stability.contact_changes.free_play",
@@ -260,24 +256,21 @@ def _poles() -> list[Item]:
     return [
         compared(
             "stability.pole.neutral",
-            facts.NEUTRAL_POLE,
+            FACTS["neutral_pole"],
             neutral.real,
-            NEUTRAL,
-            f"largest growth rate, {note} tan(alpha)",
+            note=f"largest growth rate, {note} tan(alpha)",
         ),
         compared(
             "stability.pole.above",
-            facts.UNSTABLE_POLE,
+            FACTS["unstable_pole"],
             above.real,
-            ">=",
-            f"largest growth rate, {note} {ABOVE:g}",
+            note=f"largest growth rate, {note} {ABOVE:g}",
         ),
         compared(
             "stability.pole.below",
-            facts.STABLE_POLE,
+            FACTS["stable_pole"],
             below.real,
-            "<=",
-            f"largest growth rate, {note} {BELOW:g}",
+            note=f"largest growth rate, {note} {BELOW:g}",
         ),
         found("stability.swing.below", "rad/s", below.imag, f"of the slow pair, {note} {BELOW:g}"),
     ]

@@ -20,7 +20,7 @@ from bywire.brakes.motorcycle.methods.braking.fit import over_frequency, unknown
 from bywire.brakes.motorcycle.methods.braking.records import Region
 from bywire.brakes.motorcycle.methods.braking.sine_lines import Points
 from bywire.brakes.motorcycle.methods.braking.two_step import restricted
-from bywire.brakes.motorcycle.paper import facts
+from bywire.brakes.motorcycle.paper.facts import FACTS, REGIONS
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.typing import Array, Complex
@@ -57,7 +57,7 @@ def computed(brakes: Sequence[Par]) -> list[dict[str, float]]:
         When a trajectory leaves the numbers.
     """
     ideal = [par.replace({"adc.law": "ideal"}) for par in brakes]
-    parts = (*(_region(ideal, name) for name in facts.REGIONS), _ramps(ideal), _braking(ideal))
+    parts = (*(_region(ideal, name) for name in REGIONS), _ramps(ideal), _braking(ideal))
     return [{k: v for part in parts for k, v in part[n].items()} for n in range(len(ideal))]
 
 
@@ -115,7 +115,7 @@ def _settled(brakes: Sequence[Par], p: float) -> list[float]:
 
 def _region(brakes: Sequence[Par], name: str) -> list[dict[str, float]]:
     """Return gain, time constants and overshoot of a pressure region; Fig. 6's peak."""
-    p, height = facts.REGIONS[name], facts.FIG6_STEP.value
+    p, height = REGIONS[name], FACTS["fig6_step"].value
     starts = _settled(brakes, p)
     holds = [holding_current(start, par) for par, start in zip(brakes, starts, strict=True)]
     every = list(zip(brakes, starts, holds, strict=True))
@@ -148,13 +148,13 @@ def _region(brakes: Sequence[Par], name: str) -> list[dict[str, float]]:
         }
         rows.append({f"table4.{name}.{key}": float(value) for key, value in row.items()})
         if name == "medium":
-            rows[-1]["fig6.peak"] = float(facts.FIG6_START.value + (peak - before) / _BAR)
+            rows[-1]["fig6.peak"] = float(FACTS["fig6_start"].value + (peak - before) / _BAR)
     return rows
 
 
 def overshoots(par: Par, name: str, heights: Sequence[float]) -> list[float]:
     """Return by how much steps of the current [A] in a region overshoot their ends [bar]."""
-    ideal, p = par.replace({"adc.law": "ideal"}), facts.REGIONS[name]
+    ideal, p = par.replace({"adc.law": "ideal"}), REGIONS[name]
     (start,) = _settled([ideal], p)
     i = holding_current(start, ideal)
     runs = [_driven(ideal, start, partial(_step, i, i + h), _AFTER, _SETTLE) for h in heights]
