@@ -315,7 +315,7 @@ def most_tries(stages: Stages) -> int:
 
 
 def rare_header(stages: Stages) -> str:
-    """Return what the C text of `rare_text` is told of a model."""
+    """Return what the C text that is the same for every model is told of a model."""
     nx, nr, nq = (len(stages.exact[kind]) for kind in ("x", "r", "q"))
     velocities = stages.velocities
     return f"""#define APART {APART}

@@ -212,8 +212,8 @@ class StudyPlan:
     varied
         What varies.
     design
-        One of `points.SAMPLED`, `points.SPANNED`, `sensitivity_design.SENSITIVITY` or
-        `sought_design.SOUGHT`.
+        One of `points.SAMPLED`, `points.SPANNED`, `designs.SENSITIVITY` or
+        `designs.SOUGHT`.
     cases
         Cases asked for; of indices, and of each rare failure, at most so many; of other listed
         points, all there are.
