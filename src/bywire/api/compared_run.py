@@ -14,8 +14,8 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench_file import flattened
+from bywire.bench.bench_source import experiment_of
 from bywire.bench.experiment import Experiment
-from bywire.bench.experiment_choice import experiment_of
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.option_names import OPTION
 from bywire.bench.requirements import Verdict

@@ -121,7 +121,7 @@ class Identification(Answer):
             lines += [f"lies at its bound: {label}" for label in estimate.at_bounds()]
         comment = "\n".join([*lines, *([method.bench_note] if method.bench_note else [])])
         if method.bench is not None:
-            from bywire.bench.bench_text import bench_text
+            from bywire.bench.bench_file import bench_text
 
             return bench_text(method.bench.with_overrides(self.identified.parameters), comment)
         changes = {**self.chosen.changes, **self.identified.parameters}

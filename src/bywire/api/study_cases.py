@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from bywire.api.study_tables import figure_text
 from bywire.bench import running
 from bywire.bench.bench import Bench
-from bywire.bench.bench_text import bench_text
+from bywire.bench.bench_file import bench_text
 from bywire.bench.result import Result
 from bywire.report.document import Attachment, recording_file
 from bywire.report.wording import amount

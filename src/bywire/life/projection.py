@@ -13,7 +13,7 @@ from scipy import stats
 
 from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed
-from bywire.bench.key_figures import key_figures_of
+from bywire.bench.side_by_side import key_figures_of
 from bywire.core.errors import ParameterError, RunError
 from bywire.core.typing import Array, Progress, silent
 from bywire.core.units import shown

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import flattened
-from bywire.bench.experiment_choice import experiment_of
+from bywire.bench.bench_source import experiment_of
 from bywire.bench.option_names import OPTION
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError

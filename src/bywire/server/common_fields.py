@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bywire.bench.bench_text import PATHS
+from bywire.bench.bench_file import PATHS
 from bywire.core import option_texts as texts
 from bywire.server.contents import Contents
 from bywire.server.field import Field, Fits, is_file_name

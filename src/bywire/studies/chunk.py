@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed
-from bywire.bench.key_figures import key_figures_of
+from bywire.bench.side_by_side import key_figures_of
 from bywire.core.errors import BywireError, DeviceError
 from bywire.core.scratch import replacing
 from bywire.data.file_format import library

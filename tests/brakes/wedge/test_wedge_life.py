@@ -5,7 +5,7 @@ import pytest
 
 import bywire
 from bywire.bench.ensemble import changed
-from bywire.bench.key_figures import key_figures_of
+from bywire.bench.side_by_side import key_figures_of
 from bywire.brakes.wedge.life import WEDGE_PADS
 from bywire.life.life_file import read_life
 from bywire.life.projection import one_by_one, projected

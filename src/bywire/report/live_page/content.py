@@ -20,7 +20,7 @@ import numpy as np
 
 from bywire.analysis.loop import LOOPS
 from bywire.bench.bench import Bench
-from bywire.bench.bench_text import bench_text
+from bywire.bench.bench_file import bench_text
 from bywire.bench.experiment import Case
 from bywire.bench.kpis.cases import FamilyJudge
 from bywire.bench.kpis.registry import FAMILIES
