@@ -1,4 +1,9 @@
-"""Measurement files as datasets in SI: every signal on the instants at which it was measured."""
+"""Measurement files as datasets in SI: every signal on the instants at which it was measured.
+
+Signals that were measured at the same instants share a dimension. The dimension of most signals
+is ``time``; others have ``time_NAME``, with the name of their first signal. Nothing is resampled
+here: `bywire.data.alignment.resample` brings signals to one time axis, and says what it did.
+"""
 
 from __future__ import annotations
 
@@ -131,9 +136,6 @@ def first_not_increasing(time: NDArray[np.float64]) -> int | None:
 
 
 # --- Measurements
-# Signals that were measured at the same instants share a dimension. The dimension of most signals
-# is ``time``; others have ``time_NAME``, with the name of their first signal. Nothing is resampled
-# here: `bywire.data.alignment.resample` brings signals to one time axis, and says what it did.
 
 
 class MeasurementWarning(UserWarning):

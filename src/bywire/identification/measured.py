@@ -1,8 +1,9 @@
 """Measured records as a method or a replay takes them: SI, one even time axis, all signals.
 
-The signal ``record`` numbers them, 0, 1, ...; its attribute ``flag_meanings`` names them, as the
-Climate and Forecast conventions write it; ``begins`` says when each began on its own clock, while
-they are in memory. Time goes on from one record to the next, so that any file can hold them.
+Several records of one experiment follow one another in one measurement. The signal ``record``
+numbers them, 0, 1, ...; its attribute ``flag_meanings`` names them, as the Climate and Forecast
+conventions write it; ``begins`` says when each began on its own clock, while they are in memory.
+Time goes on from one record to the next, so that any file can hold them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,9 @@
-"""Output error: a model is run over measured inputs and fitted to measured outputs."""
+"""Output error: a model is run over measured inputs and fitted to measured outputs.
+
+Open loop, the measured input of the plant drives it; closed loop, the measured set point drives
+model and controller together, so that the fit sees what feedback makes of an error. Derivatives
+are the exact ones of the run, friction and contacts included.
+"""
 
 from __future__ import annotations
 
@@ -175,9 +180,6 @@ class Driven(Model):
 
 
 # --- Residuals of output error
-# Open loop, the measured input of the plant drives it; closed loop, the measured set point drives
-# model and controller together, so that the fit sees what feedback makes of an error. Derivatives
-# are the exact ones of the run, friction and contacts included.
 
 Between = Literal["held", "linear"]
 """what measured inputs do between samples"""

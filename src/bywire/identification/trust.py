@@ -1,4 +1,9 @@
-"""Whether a method can be trusted: what is put into simulated experiments has to come back."""
+"""Whether a method can be trusted: what is put into simulated experiments has to come back.
+
+Each experiment is made with a seed of its own, and identified from a start off the truth. Over
+many of them the mean estimate has to hit the truth within its own scatter, and the 95 % intervals
+have to hold it about 95 times in 100.
+"""
 
 from __future__ import annotations
 
@@ -170,9 +175,6 @@ def _finished(store: JobStore, key: str) -> Iterator[Outcome]:
 
 
 # --- Trust
-# Each experiment is made with a seed of its own, and identified from a start off the truth. Over
-# many of them the mean estimate has to hit the truth within its own scatter, and the 95 % intervals
-# have to hold it about 95 times in 100.
 
 _BIAS = 3.0  # standard errors of the mean
 _COVERED = (0.90, 0.99)

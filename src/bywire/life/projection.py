@@ -1,4 +1,8 @@
-"""Life projected: rates of slow states, and Heun's steps over many stops."""
+"""Life projected: rates of slow states, and Heun's steps over many stops.
+
+Within a step the states go on stop by stop with rates that are held, so that an adjuster acts
+exactly where it does; the runs are made at the ends of steps alone.
+"""
 
 from __future__ import annotations
 
@@ -125,8 +129,6 @@ def _stop_bench(plan: LifePlan, follows: Mapping[str, float], k: int) -> Bench:
 
 
 # --- The projection: what happens between stops is never skipped
-# Within a step the states go on stop by stop with rates that are held, so that an adjuster acts
-# exactly where it does; the runs are made at the ends of steps alone.
 
 CONFIDENCE = 0.95
 """of the interval of a life"""

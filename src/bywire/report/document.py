@@ -1,4 +1,7 @@
-"""A result, written once: the blocks that terminal, JSON, HTML page and files are made of."""
+"""A result, written once: the blocks that terminal, JSON, HTML page and files are made of.
+
+A `Document` loads no plotting: its figures are drawn when a page or a file wants them.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +36,6 @@ class Picture:
 
 
 # --- Blocks
-# A `Document` loads no plotting: its figures are drawn when a page or a file wants them.
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,8 @@
-"""How every figure looks: colors, line styles by meaning, axes, scales."""
+"""How every figure looks: colors, line styles by meaning, axes, scales.
+
+Nothing here changes matplotlib's global state, and pyplot is never imported. Matplotlib itself
+is loaded with the first figure that is drawn: it takes half as long as a short command.
+"""
 
 from __future__ import annotations
 
@@ -55,8 +59,6 @@ def inside(shown: Channel) -> tuple[Channel, float] | None:
 
 
 # --- Colors, lines and axes
-# Nothing here changes matplotlib's global state, and pyplot is never imported. Matplotlib itself
-# is loaded with the first figure that is drawn: it takes half as long as a short command.
 
 # Okabe and Ito, "Color universal design", 2008: told apart with any kind of color vision.
 BLUE = "#0072B2"

@@ -1,6 +1,7 @@
 """A graphics processor: CUDA C compiled for it, its memory, its kernels, and what goes wrong.
 
-It needs no graphics processor and no driver. What it made is kept beside compiled kernels.
+The compiler, NVIDIA's NVRTC in a library, needs no graphics processor and no driver. What it made
+is kept beside compiled kernels.
 """
 
 from __future__ import annotations

@@ -1,5 +1,8 @@
 """Many cases on a graphics processor, a thread each, behind the face of a kernel in lanes.
 
+Cases go to the processor in batches that its memory holds, and batches in pieces of time: what a
+piece records is fetched before the next one, and no piece keeps a display waiting.
+
 Every number of a case stands beside the same number of the next case, so that threads that run
 together read and write neighbors; rows stand as who asks for them has them. A thread has branches
 and cuts of its own, as a single run has.
@@ -69,8 +72,6 @@ def emit_cuda(stages: Stages) -> str:
 
 
 # --- The kernel
-# Cases go there in batches that its memory holds, and batches in pieces of time: what a piece
-# records is fetched before the next one, and no piece keeps a display waiting.
 
 MOST = 2**15
 """cases of a batch: as many threads as the largest processors hold at once"""

@@ -1,4 +1,9 @@
-"""Kernel of an ensemble: as many cases side by side as the processor's vectors hold."""
+"""Kernel of an ensemble: as many cases side by side as the processor's vectors hold.
+
+Where the substep of a model is short it waits for chains of operations as long as it computes.
+Then two vectors are carried on in turn, statement by statement: each computes while the other
+waits.
+"""
 
 from __future__ import annotations
 
@@ -262,9 +267,6 @@ def _sums(t: Lanes) -> list[str]:
 
 
 # --- The kernel
-# Where the substep of a model is short it waits for chains of operations as long as it computes.
-# Then two vectors are carried on in turn, statement by statement: each computes while the other
-# waits.
 
 SIGNATURE = """int bw_lanes(void) { return TURNS * W; }
 

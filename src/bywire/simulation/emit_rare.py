@@ -1,4 +1,11 @@
-"""C text of what is rare: a substep that one ordinary pass does not serve."""
+"""C text of what is rare: a substep that one ordinary pass does not serve.
+
+Its functions stand alone and compute for any length of a step what does not follow from
+parameters alone. A substep in which a velocity with dry friction changes its sign is cut where
+it passes zero: friction jumps there, and with it the acceleration. Within each part every
+velocity keeps its sign; what has come to zero rests or moves on in the next part, as its bounds
+decide.
+"""
 
 from __future__ import annotations
 
@@ -276,11 +283,6 @@ static APART int located(const double *c, double h, const double *m, const doubl
 
 
 # --- What depends on the model
-# Its functions stand alone and compute for any length of a step what does not follow from
-# parameters alone. A substep in which a velocity with dry friction changes its sign is cut where
-# it passes zero: friction jumps there, and with it the acceleration. Within each part every
-# velocity keeps its sign; what has come to zero rests or moves on in the next part, as its bounds
-# decide.
 
 _TRIES = 200_000
 APART = "__attribute__((noinline))"  # but fast: what is cold is compiled to be short

@@ -1,4 +1,8 @@
-"""Expression graph shared by all stages of a kernel: every value once, divisions as products."""
+"""Expression graph shared by all stages of a kernel: every value once, divisions as products.
+
+CasADi's instruction lists go in; common subexpressions meet across stages, constants fold, a/b
+becomes a times a reciprocal that others can share, and paired selections become one.
+"""
 
 from __future__ import annotations
 
@@ -301,8 +305,6 @@ RULES: dict[str, Callable[..., Node | None]] = {
 
 
 # --- The graph
-# CasADi's instruction lists go in; common subexpressions meet across stages, constants fold, a/b
-# becomes a times a reciprocal that others can share, and paired selections become one.
 
 
 @cache

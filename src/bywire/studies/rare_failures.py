@@ -1,7 +1,8 @@
 """The rare failures of a study: how probable each is, and its most probable failing case.
 
-A method is replayed from its seed each time, also for a report: what it asks for depends on the
-seed and on what cases gave, so that it asks for the same again, and finds it in the folder.
+A method that seeks failures is replayed from its seed each time, also for a report: what it asks
+for depends on the seed and on what cases gave, so that it asks for the same again, and finds it in
+the folder.
 """
 
 from __future__ import annotations

@@ -1,5 +1,8 @@
 r"""What gains are worth on the nonlinear bench: sines by amplitude, and the brake's step.
 
+Many sets of gains run side by side, in the lanes of one ensemble. A set is measured in stages,
+and left where what is known of it already says that it is not wanted.
+
 Controller and sensor are linear between their limits. What the closed loop G, measured with a sine
 of one amplitude, leaves for the rest P (actuator, friction, dither) follows from the loop's laws
 C_r (set point) and C_y (output, sensor included):
@@ -236,8 +239,6 @@ def _behind(closed: Complex, demand: Complex, feedback: Complex) -> Complex:
 
 
 # --- Figures of the bench
-# Many sets of gains run side by side, in the lanes of one ensemble. A set is measured in stages,
-# and left where what is known of it already says that it is not wanted.
 
 STEP_FIGURES = ("overshoot", "settling_time", "steady_state_error")
 

@@ -1,4 +1,13 @@
-"""Gains judged and tuned on the nonlinear bench, where friction and dither change the loop."""
+"""Gains judged and tuned on the nonlinear bench, where friction and dither change the loop.
+
+Differential evolution of a library, every generation one ensemble: what the linear model cannot
+know (friction under dither, converter, limits) is measured. The search takes up a candidate only
+where its worst slack is not below that of the member whose place it would take. A worst slack is
+a minimum, so whatever is measured first bounds it, the linear models' figures before all:
+candidates whose bound is too low are measured no further, which changes no step of the search.
+Those that may come near the best so far are measured in any case, for they make the edge that is
+shown.
+"""
 
 from __future__ import annotations
 
@@ -198,13 +207,6 @@ def linear_slacks(problem: Problem, gains: Mapping[str, float]) -> dict[str, flo
 
 
 # --- Tuning
-# Differential evolution of a library, every generation one ensemble: what the linear model cannot
-# know (friction under dither, converter, limits) is measured. The search takes up a candidate only
-# where its worst slack is not below that of the member whose place it would take. A worst slack is
-# a minimum, so whatever is measured first bounds it, the linear models' figures before all:
-# candidates whose bound is too low are measured no further, which changes no step of the search.
-# Those that may come near the best so far are measured in any case, for they make the edge that is
-# shown.
 
 Worth = Callable[[int, Sequence[BenchFigures]], bool]
 Measure = Callable[

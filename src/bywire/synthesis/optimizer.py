@@ -1,4 +1,11 @@
-"""Gains that keep the worst normalized slack as large as possible."""
+r"""Gains that keep the worst normalized slack as large as possible.
+
+.. math:: \max_{x, t} t \quad \text{with} \quad s_{jk}(x) \ge t
+
+for every requirement j and model k: the largest of smallest slacks, without the kinks that a
+plain minimum has. Sequential quadratic programming from several starts, then a simplex where it
+stopped at a kink of a figure itself.
+"""
 
 from __future__ import annotations
 
@@ -39,11 +46,6 @@ def suffixed(progress: Progress | None, text: str) -> Progress | None:
 
 
 # --- The optimizer
-# .. math:: \max_{x, t} t \quad \text{with} \quad s_{jk}(x) \ge t
-#
-# for every requirement j and model k: the largest of smallest slacks, without the kinks that a
-# plain minimum has. Sequential quadratic programming from several starts, then a simplex where it
-# stopped at a kink of a figure itself.
 
 UNSTABLE = -12.0
 """slack of an unstable loop, before its growth is counted"""

@@ -1,4 +1,9 @@
-"""Output error on a bench: measured inputs drive its model, unknowns are fitted to its outputs."""
+"""Output error on a bench: measured inputs drive its model, unknowns are fitted to its outputs.
+
+Where the bench closes a loop, the measured set point drives model and controller together:
+closed-loop output error. The run begins where the experiment does with the parameters of the
+moment, so that an equilibrium stays one while the parameters that make it are searched.
+"""
 
 from __future__ import annotations
 
@@ -156,9 +161,6 @@ def _finite(signal: xr.DataArray) -> Array:
 
 
 # --- The fit
-# Where the bench closes a loop, the measured set point drives model and controller together:
-# closed-loop output error. The run begins where the experiment does with the parameters of the
-# moment, so that an equilibrium stays one while the parameters that make it are searched.
 
 _ROUNDED, _EXACT = "quantized", "ideal"  # of the law of a sensor or a converter
 _ROUGH = 1e-4  # of the cost: enough to begin from

@@ -1,7 +1,7 @@
 r"""Which friction law a record supports: Coulomb, viscous, asymmetric, with pressure, Stribeck.
 
-All hold while sliding: :math:`F = s\,F_c(p)\,(1 + (k - 1) e^{-|v|/v_s}) + d v`, with the direction
-:math:`s = \mathrm{sgn}(v)`, less what a simpler law leaves out.
+All laws hold while sliding: :math:`F = s\,F_c(p)\,(1 + (k - 1) e^{-|v|/v_s}) + d v`, with the
+direction :math:`s = \mathrm{sgn}(v)`, less what a simpler law leaves out.
 """
 
 from __future__ import annotations

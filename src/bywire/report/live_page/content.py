@@ -1,4 +1,8 @@
-"""The page's text: kernel, scripts and styles inside, and a policy that admits no more."""
+"""The page's text: kernel, scripts and styles inside, and a policy that admits no more.
+
+Whatever a browser runs or styles stands in the page with its digest in the policy; what is data
+stands as JSON in which no tag can begin.
+"""
 
 from __future__ import annotations
 
@@ -170,8 +174,6 @@ def told(source: LoopSource) -> dict[str, Any]:
 
 
 # --- The page
-# Whatever a browser runs or styles stands in the page with its digest in the policy; what is data
-# stands as JSON in which no tag can begin.
 
 _SCRIPTS = ("values.js", "controls.js", "curves.js", "bode.js", "bench.js")
 _WORKER = ("unpack.js", "figures.js", "loops.js", "margins.js", "worker.js")
