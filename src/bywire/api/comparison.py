@@ -17,6 +17,7 @@ from bywire.api.compared_tables import (
     verdict_table,
 )
 from bywire.bench.result_folder import verdict_record
+from bywire.core.callers import is_command_line
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Block,
@@ -89,7 +90,8 @@ class Comparison(Answer):
             said.append(f"not drawn, for lack of a counterpart over time: {', '.join(left_out)}")
         said += [
             f"{each.label}: its parameter set is not known here, so its values stand without "
-            "units; --system PATH loads a brake of your own"
+            f"units; {'--system PATH' if is_command_line() else 'bywire.load_system'} loads a "
+            "brake of your own"
             for each in self.runs
             if not each.has_units
         ]

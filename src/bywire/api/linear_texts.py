@@ -15,6 +15,7 @@ from bywire.analysis.linear.linear_model import LinearModel, rates
 from bywire.analysis.locus import Locus
 from bywire.analysis.periodic import PeriodicModel
 from bywire.analysis.reduction import TOLERANCE, Reduced, ReductionError, reduce
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError, quoted
 from bywire.core.pairs import DIGITS, read_count
 from bywire.core.signals import signals_of
@@ -111,11 +112,11 @@ def reduced(model: LinearModel, text: str, band: float | None = None) -> Reduced
         order = read_count(text)
         if not order:
             raise ParameterError(
-                f"--reduce {quoted(text)}: an order is a whole number >= 1 of at most "
+                f"{option('reduce')} {quoted(text)}: an order is a whole number >= 1 of at most "
                 f"{DIGITS} digits; with a unit, it is a band, for instance '150 Hz'"
             )
         return reduce(model, order=order, band=band)
-    return reduce(model, band=number(text, "Hz", "--reduce"), tolerance=TOLERANCE)
+    return reduce(model, band=number(text, "Hz", option("reduce")), tolerance=TOLERANCE)
 
 
 def _is_number(text: str) -> bool:

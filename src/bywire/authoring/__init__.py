@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from bywire.bench.kpis import effort, hysteresis, occupation, step_response
     from bywire.bench.kpis.cases import FamilyJudge
     from bywire.bench.kpis.kpi import Figures, Kpi, Undefined, measure
+    from bywire.bench.kpis.loops import Samples
     from bywire.bench.kpis.registry import evaluate, units_of
     from bywire.bench.result import Result
     from bywire.bench.stated import StatedFigure, StatedLevel, StatedRange
@@ -156,6 +157,7 @@ _HOMES = {
     "bench.experiment": "Case Experiment Recordings as_run fixed",
     "bench.kpis.cases": "FamilyJudge",
     "bench.kpis.kpi": "Figures Kpi Undefined measure",
+    "bench.kpis.loops": "Samples",
     "bench.kpis.registry": "evaluate units_of",
     "bench.stimuli.registry": "Stimulus",
     "report.bench_figures": "FigureKind Shown:ShownFigure",
@@ -299,6 +301,7 @@ __all__ = [
     "RotaryDamping",
     "Run",
     "Runs",
+    "Samples",
     "Shown",
     "ShownFigure",
     "Signal",

@@ -17,6 +17,7 @@ from bywire.bench.relative_changes import is_relative, settled
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.bench.stimulus_sections import stimulus_sections
 from bywire.core.arguments import checked
+from bywire.core.callers import option
 from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
@@ -322,7 +323,10 @@ def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str
         elif name in SECTIONS:
             raise ParameterError(f"{name} is a section: write {name}.NAME=VALUE")
         elif section == _FAULTS:
-            raise ParameterError("faults are put in by --fault NAME=VALUE@ONSET, not by --set")
+            raise ParameterError(
+                f"faults are put in by {option('faults')} NAME=VALUE@ONSET, not by "
+                f"{option('overrides')}"
+            )
         elif name in BenchFile.model_fields:
             changed[name] = value
         else:

@@ -10,6 +10,7 @@ from typing import Any
 
 from bywire.bench.experiment import EXPERIMENTS, Experiment
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
+from bywire.core.callers import option
 from bywire.core.catalog import PARAMETER_SETS, main_set, sets_of_loaded
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import ASSEMBLIES
@@ -91,7 +92,7 @@ def _former(
     raise ParameterError(
         f"experiment {name!r} is for any brake, and that of the {system} is called "
         f"{former.name!r} now: write {former.name}, or say which signal {name} is about, for "
-        f"instance --set options.{example}=NAME"
+        f"instance {option('overrides', {f'options.{example}': 'NAME'})}"
     )
 
 
@@ -151,8 +152,8 @@ def usual_set(name: str) -> str:
         for now, assembly in former_names(name).items()
     )
     raise ParameterError(
-        f"experiment {name!r} is for any brake: say for which, with --set parameters=NAME "
-        f"({known}){former}"
+        f"experiment {name!r} is for any brake: say for which, with "
+        f"{option('overrides', {'parameters': 'NAME'})} ({known}){former}"
     )
 
 

@@ -12,6 +12,7 @@ from bywire.bench.running import Progress
 from bywire.campaigns.findings import CampaignFindings, finding
 from bywire.campaigns.judging import healthy_traces, judge_fault, judge_healthy
 from bywire.campaigns.plan import CampaignPlan
+from bywire.core.callers import option
 from bywire.core.errors import FileError
 from bywire.core.interrupts import thread_pool
 from bywire.core.scratch import replacing, sweep
@@ -57,7 +58,8 @@ class CampaignStore:
             ) from None
         except (ValueError, KeyError, TypeError):
             raise FileError(
-                f"{record} is damaged, or not of a campaign: name another folder with --out"
+                f"{record} is damaged, or not of a campaign: name another folder with "
+                f"{option('out')}"
             ) from None
 
     def _require(self, plan: CampaignPlan, known: dict[str, Any]) -> None:
@@ -65,7 +67,7 @@ class CampaignStore:
             differs = differing(known["campaign"], plan.identity)
             raise FileError(
                 f"{self.folder} holds another campaign{differs and f' ({differs})'}: name another "
-                "folder with --out, or remove it"
+                f"folder with {option('out')}, or remove it"
             )
 
     def holds(self, plan: CampaignPlan) -> bool:

@@ -29,6 +29,7 @@ from bywire.core.brake import (
     modules_below,
     modules_of,
 )
+from bywire.core.callers import is_command_line
 from bywire.core.errors import ModelError, UnknownNameError, unknown_name
 
 
@@ -169,7 +170,8 @@ class Kind(Generic[T]):
             if self.declared and not any(kind.of(brake.module) for kind in kinds)
         ]
         if self.declared and not files and "did you mean" not in str(error):
-            hints.append("that of a brake of your own takes --system PATH, or bywire.load_system")
+            loading = "--system PATH, or " * is_command_line() + "bywire.load_system"
+            hints.append(f"that of a brake of your own takes {loading}")
         return UnknownNameError("; ".join([str(error), *hints]).replace("?; ", "? "))
 
     def guess(self, name: str) -> T | None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from bywire.core.callers import is_command_line
+from bywire.core.callers import is_command_line, option
 from bywire.core.errors import FileError, InputError, ParameterError, UnitError, unknown_name
 from bywire.core.quantities import display_unit
 from bywire.core.units import parse
@@ -130,7 +130,7 @@ def renamed(data: xr.Dataset, named: NamedColumns) -> xr.Dataset:
         When instants are named, which signals in memory have already.
     """
     if named.time:
-        raise ParameterError("--time is for measurement files: leave it out")
+        raise ParameterError(f"{option('time')} is for measurement files: leave it out")
     for name, column in named.signals.items():
         if column not in data:
             raise unknown_name("signal", column, [str(each) for each in data.data_vars])
@@ -158,7 +158,7 @@ def _timed(meaning: MeasurementMapping, time: str) -> MeasurementMapping:
     if not time:
         return meaning
     try:
-        rate = parse(time, "Hz", "--time") if time[0].isdigit() and " " in time else 0.0
+        rate = parse(time, "Hz", option("time")) if time[0].isdigit() and " " in time else 0.0
     except InputError:
         rate = 0.0
     return replace(meaning, clock=Clock(rate=rate) if rate > 0.0 else Clock(column=time))

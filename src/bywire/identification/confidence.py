@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bywire.core.callers import option
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, shown
 from bywire.data.recursive_filter import filtered
@@ -321,7 +322,7 @@ def advice(estimate: Estimate, silent: bool) -> str:
     if left > _FAR:
         return (
             f"the model does not fit, it leaves {left:.2g} times the noise at its best: check sign "
-            "and unit of what was measured (--map), then what is taken as known"
+            f"and unit of what was measured ({option('mapping')}), then what is taken as known"
         )
     return "switch it on, or name another unknown" if silent else "excite the system more"
 

@@ -18,6 +18,7 @@ import pandas as pd
 import xarray as xr
 
 from bywire.core.arguments import checked
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError, UnitError, unknown_name
 from bywire.core.typing import Array
 from bywire.data.alignment import resample
@@ -245,7 +246,10 @@ def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[s
     there = [str(name) for name in data.data_vars]
     for name, unit in signals.items():
         if name not in there:
-            kind = f"signal (needed of {where}; --input, --output or --map can name its column)"
+            kind = (
+                f"signal (needed of {where}; {option('inputs')}, {option('outputs')} or "
+                f"{option('mapping')} can name its column)"
+            )
             raise unknown_name(kind, name, there)
         given = str(data[name].attrs.get("units", "1"))
         if unit not in ("", given) and not measures(unit_of_symbol(given), unit):

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.core.units import shown
@@ -162,7 +163,7 @@ def require_told(groups: Sequence[Group]) -> None:
     if not groups:
         raise ParameterError(
             "no stroke crosses the stretch x_low to x_high: move the piston to and fro through "
-            "it, or set --option x_low and x_high to where it moves"
+            f"it, or set {option('options')} x_low and x_high to where it moves"
         )
     if len({g.direction for g in groups}) < 2:
         raise ParameterError("F_0 and f need strokes both ways: friction alone changes sign")

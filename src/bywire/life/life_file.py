@@ -15,6 +15,7 @@ from pydantic import Field
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
+from bywire.core.callers import option
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.quantities import Unit
@@ -204,7 +205,7 @@ def _texts(changes: Mapping[str, Any]) -> dict[str, str]:
         if not isinstance(value, str):
             raise ParameterError(
                 f"[set] {key} = {quoted(value)}: write the value as a text, with its unit, as "
-                "--set takes it"
+                f"{option('overrides')} takes it"
             )
     return dict(changes)
 

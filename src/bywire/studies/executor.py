@@ -17,6 +17,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from bywire.core.arguments import whole_number
 from bywire.core.brake import load_brakes, loaded_files
+from bywire.core.callers import option
 from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.errors import ParameterError, RunError
 from bywire.core.heard_warnings import heard_warnings
@@ -237,7 +238,6 @@ def _lost(client: Any, error: BaseException) -> str:
 # machine's memory for stimuli and rows.
 _TOGETHER = 64
 _MOST_WORKERS = 1024
-_KILLED = "resume it, with fewer --workers"
 # Chunks from which on processes are worth their start; those that load all anew take a second.
 _WORTH_COPIES, _WORTH = 2, 8
 
@@ -300,7 +300,8 @@ class Pool:
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
         """Return what computes; see `Executor`."""
-        with processes_with_brakes(self.workers, _KILLED, _give, plan) as pool:
+        fewer = f"resume it, with fewer {option('workers')}"
+        with processes_with_brakes(self.workers, fewer, _give, plan) as pool:
             yield _InPool(pool, _AHEAD * self.workers)
 
 
@@ -354,7 +355,7 @@ def require_workers(workers: int | None, cluster: str, engine: str) -> None:
     if engine == CUDA and (workers is not None or cluster):
         raise ParameterError(
             "engine = 'cuda' computes all cases on one graphics processor: leave out "
-            f"{'--cluster' if cluster else '--workers'}"
+            f"{option('cluster' if cluster else 'workers')}"
         )
     if cluster and workers is not None:
         raise ParameterError("workers of a cluster are the cluster's own: leave one out")

@@ -15,6 +15,7 @@ from bywire.bench import bench_file
 from bywire.bench.bench import Bench
 from bywire.bench.bench_source import names_experiment
 from bywire.bench.requirements import Limit, read_limit
+from bywire.core.callers import option
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.quantities import Unit
 from bywire.core.section import Hint, Name, Names, Section, Table
@@ -373,7 +374,7 @@ def read_bench(
         if not isinstance(value, str):
             raise ParameterError(
                 f"[set] {key} = {quoted(value)}: write the value as a text, "
-                "with its unit, as --set takes it"
+                f"with its unit, as {option('overrides')} takes it"
             )
     there = source if names_experiment(source) else folder / source
     return bench_file.read(there, {**flat, **overrides})

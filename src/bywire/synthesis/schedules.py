@@ -12,6 +12,7 @@ import numpy as np
 from bywire.analysis.loop import Loop, LoopSchedule
 from bywire.analysis.loop_figures import LoopFigures
 from bywire.bench.requirements import Limit
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Progress
@@ -37,7 +38,9 @@ def scheduled(loop: Loop) -> LoopSchedule:
         When it has none.
     """
     if loop.schedule is None:
-        raise ParameterError(f"loop {loop.name!r} has no gain schedule: leave out --schedule")
+        raise ParameterError(
+            f"loop {loop.name!r} has no gain schedule: leave out {option('schedule', True)}"
+        )
     return loop.schedule
 
 
@@ -69,8 +72,8 @@ def points_by_region(
             given = ", ".join(shown(each, at.unit) for each in points or schedule.points)
             raise ParameterError(
                 f"no operating point lies in the region {name!r}: the borders are {borders}, the "
-                f"points {given}; give one {at.name} in each region with --at, or move the borders "
-                f"({', '.join(schedule.borders)})"
+                f"points {given}; give one {at.name} in each region with {option('at')}, or move "
+                f"the borders ({', '.join(schedule.borders)})"
             )
     return {name: tuple(sorted(inside)) for name, inside in by_region.items()}
 
@@ -212,7 +215,8 @@ def _ranges(
 ) -> dict[str, Sequence[float]]:
     if loop.at.name in over:
         raise ParameterError(
-            f"{loop.at.name} is what the schedule follows: give its operating points with --at"
+            f"{loop.at.name} is what the schedule follows: give its operating points with "
+            f"{option('at')}"
         )
     return {loop.at.name: points, **over} if len(points) > 1 or over else {}
 

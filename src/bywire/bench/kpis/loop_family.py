@@ -99,7 +99,9 @@ class LoopFamily:
         self._looked_at = 0  # rows of single runs
         self._optional: dict[str, bool] = {}  # signals, and whether they may be missing
         for each in self.measures.values():
-            taken = self._taken(each.__wrapped__)
+            self._take(each.__wrapped__)
+        for each in self.measures.values():
+            taken = self._parameters(each.__wrapped__)
             each.needs = tuple(name for name in taken if self._optional.get(name))
 
     @property
@@ -203,10 +205,20 @@ class LoopFamily:
         """
         return _HEADER.read_text(encoding="utf-8") + self._body
 
+    def translate(self) -> None:
+        """Translate the functions, to refuse those that have no translation.
+
+        Raises
+        ------
+        ModelError
+            When a function holds what has no translation.
+        """
+        assert self._body
+
     @cached_property
     def reasons(self) -> list[Reason]:
         """Why figures are not defined, by the numbers of C from 1 on."""
-        assert self._body
+        self.translate()
         return [Reason(*each) for each in self._unit.reasons]
 
     @cached_property
@@ -378,7 +390,15 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
         values = np.empty((len(self.measures), cases))
         reasons = np.empty(values.shape, dtype=np.int32)
         numbers = np.empty((*values.shape, 3))
-        arrays = (np.ascontiguousarray(t), places, packed, work, values, reasons, numbers)
+        arrays = (
+            np.ascontiguousarray(t, dtype=np.float64),
+            places,
+            packed,
+            work,
+            values,
+            reasons,
+            numbers,
+        )
         self._function(cases, n, *(each.ctypes.data for each in arrays))
         values += 0.0  # zeros are positive, whose sign C does not keep
         return FiguresInC(values, reasons, numbers)
@@ -397,28 +417,26 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
     def _parameters(self, function: Callable[..., Any]) -> list[str]:
         return list(inspect.signature(function).parameters)
 
-    def _taken(self, function: Callable[..., Any]) -> list[str]:
-        """Return what a function takes, and note which signals and functions that are."""
+    def _take(self, function: Callable[..., Any], *above: object) -> None:
+        """Note which signals and functions a function takes; ``above``: those that take it."""
         hints = typing.get_type_hints(function)
-        names = self._parameters(function)
         settings = typing.get_type_hints(self.setting_class)
-        for name in names:
+        for name in self._parameters(function):
             beside = vars(self._module).get(name)
             if name in ("t", "setting") or name in self.shared:
                 continue
             if settings.get(name) is str:
                 is_optional = NoneType in typing.get_args(hints.get(name))
                 self._optional[name] = self._optional.get(name, True) and is_optional
-            elif isinstance(beside, FunctionType):
-                self._taken(beside)
+            elif isinstance(beside, FunctionType) and beside not in (function, *above):
+                self._take(beside, function, *above)
                 self.shared[name] = beside
             else:
                 raise ModelError(
                     f"{self._module.__file__}: the key figure's function {function.__name__} takes "
                     f"{name!r}, which must be t, setting, a field of Setting that names a signal, "
-                    "or a function of the file"
+                    "or another function of the file"
                 )
-        return names
 
 
 @cache

@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
 from bywire.core.quantities import display_unit
@@ -379,6 +380,7 @@ def _said(records: Mapping[str, MeasuredRun], options: Options, coarse: bool) ->
     if coarse and options.between == "held" and period < 0.5 * interval:
         said.append(
             f"inputs are held for {1e3 * interval:.4g} ms from sample to sample, but act every "
-            f"{1e3 * period:.4g} ms: if they are smooth, take --option between=linear"
+            f"{1e3 * period:.4g} ms: if they are smooth, take "
+            f"{option('options', {'between': 'linear'})}"
         )
     return said

@@ -15,6 +15,7 @@ from pydantic import Field
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.core.arguments import checked
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.parameters import ParameterSet, leaf_fields
@@ -107,17 +108,17 @@ class Question:
 
     @property
     def given(self) -> tuple[str, ...]:
-        """What was given, as options of the command."""
+        """Names of what was given."""
         options = {
-            "--bench": self.bench is not None,
-            "--input": self.inputs,
-            "--output": self.outputs,
-            "--unknown": self.unknowns,
-            "--prior": self.priors,
-            "--estimate-start": self.states,
-            "--case": self.case,
-            "--holdout": self.holdout is not None,
-            "--loss": self.loss,
+            "bench": self.bench is not None,
+            "inputs": self.inputs,
+            "outputs": self.outputs,
+            "unknowns": self.unknowns,
+            "priors": self.priors,
+            "states": self.states,
+            "case": self.case,
+            "holdout": self.holdout is not None,
+            "loss": self.loss,
         }
         return tuple(name for name, value in options.items() if value)
 
@@ -243,12 +244,12 @@ def unknowns_of(case: Case, known: ParameterSet, question: Question) -> tuple[Un
     """
     if not question.ranges:
         raise ParameterError(
-            "nothing is unknown: give --unknown PARAMETER, once for each, for instance --unknown "
-            f"{next(iter(leaf_fields(type(case.par))))}"
+            f"nothing is unknown: give {option('unknowns')} PARAMETER, once for each, for instance "
+            f"{option('unknowns')} {next(iter(leaf_fields(type(case.par))))}"
         )
     for name in question.priors:
         if name not in question.ranges:
-            raise unknown_name("unknown in --prior", name, question.ranges)
+            raise unknown_name(f"unknown in {option('priors')}", name, question.ranges)
     leaves = leaf_fields(type(known))
     return tuple(
         _with_texts(
@@ -277,14 +278,14 @@ def _bare(name: str, case: Case, known: ParameterSet, outputs: Iterable[str]) ->
         return Unknown(name, 0.0, scale=signal.nominal, unit=signal.unit)
     if name.startswith("initial."):
         raise ParameterError(
-            f"unknown {name}: initial values are each record's own; write --estimate-start "
-            f"{name.removeprefix('initial.')}"
+            f"unknown {name}: initial values are each record's own; write "
+            f"{option('states')} {name.removeprefix('initial.')}"
         )
     given, leaves = known.flat().get(name), leaf_fields(type(known))
     if name not in leaves and given is not None:
         raise ParameterError(
             f"unknown {name}: it is a choice, here {quoted(given)}, and no number; try each with "
-            f"--set {name}=..."
+            f"{option('overrides', {name: '...'})}"
         )
     if isinstance(given, tuple):
         raise ParameterError(

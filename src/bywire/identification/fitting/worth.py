@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.core.callers import option
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
@@ -184,16 +185,16 @@ def checks_of(
             limit=_EXPLAINED,
             at_least=True,
             note="share of the outputs' variance, over their noise, that the model predicts",
-            next_step="check that --input is what drove the record, its unit and its sign; "
-            "'bywire replay' draws both",
+            next_step=f"check that {option('inputs')} is what drove the record, its unit and its "
+            "sign; 'bywire replay' draws both",
         ),
         Check(
             "parameters_without_meaning",
             float(len(vague)),
             limit=0.0,
             note=said or "none at its bound, none with a 95 % interval wider than +-100 %",
-            next_step="leave these --unknown out, give a --prior, or record a motion that they "
-            "change",
+            next_step=f"leave these {option('unknowns')} out, give a {option('priors')}, or record "
+            "a motion that they change",
         ),
         Check(
             "not_told",
@@ -211,10 +212,11 @@ def _missing(fit: Estimate) -> str:
     worst = max(left, key=lambda each: each.rms / (each.noise or 1.0))
     name = worst.label.rpartition(":")[2]
     return (
-        f"look at {worst.label}, of which most is left: if its curves are shifted, add --unknown "
-        f"offset.{name}; if they part at the beginning, --estimate-start; if another parameter "
-        "shapes what is left, make it an --unknown; if it only scatters, give its noise with "
-        f"--output '{name}=...'"
+        f"look at {worst.label}, of which most is left: if its curves are shifted, add "
+        f"{option('unknowns')} offset.{name}; if they part at the beginning, "
+        f"{option('states')}; if another parameter shapes what is left, make it an "
+        f"{option('unknowns')}; if it only scatters, give its noise with "
+        f"{option('outputs')} '{name}=...'"
     )
 
 
@@ -222,7 +224,8 @@ def _few(r: Array, far: NDArray[np.bool_], robust: bool) -> str:
     """Return what stands behind residuals without a robust loss: perhaps a few outliers."""
     if robust or not 0.0 < float(far.mean()) < _FEW or robust_scale(r) > FAR:
         return ""
-    return f"; {far.sum()} of {far.size} stand out: if they are outliers, take --loss huber"
+    advice = f"if they are outliers, take {option('loss', 'huber')}"
+    return f"; {far.sum()} of {far.size} stand out: {advice}"
 
 
 def _outliers(far: NDArray[np.bool_], options: Options) -> Check:
@@ -267,7 +270,8 @@ def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
     note = "starts that met the lowest minimum"
     if reached < _MET:
         note += (
-            ": there may be a lower one; take more --starts, narrower ranges (--unknown "
+            f": there may be a lower one; take more {option('starts')}, narrower ranges "
+            f"({option('unknowns')} "
             "NAME=LOW..HIGH), or fewer unknowns"
         )
     return (
@@ -277,7 +281,7 @@ def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
             limit=_MET,
             at_least=True,
             note=note,
-            next_step="take --starts 16, or a range for each --unknown",
+            next_step=f"take {option('starts')} 16, or a range for each {option('unknowns')}",
         ),
     )
 

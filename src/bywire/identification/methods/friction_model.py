@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 from pydantic import Field
 
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Nodes, Unit
@@ -162,7 +163,8 @@ def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> Non
         said = ", ".join(f"{count} {way}" for way, count in counts.items())
         raise ParameterError(
             f"too few samples slide {' and '.join(short)} ({said}; {_LEAST} each way are needed): "
-            "record motion to and fro (speed changes its sign), or lower --option slowest, which "
+            "record motion to and fro (speed changes its sign), or lower "
+            f"{option('options')} slowest, which "
             f"leaves out what is slower than {100 * slowest:g} % of a record's fastest speed"
         )
 

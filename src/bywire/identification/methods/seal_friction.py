@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from pydantic import Field
 
+from bywire.core.callers import option
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Force, Frequency, Nodes, Position, Unit
 from bywire.core.typing import Array
@@ -124,10 +125,6 @@ ForcePerPressure = Annotated[float, Unit("N/Pa", 1e-5), Field(ge=0, allow_inf_na
 
 _MISFIT = 0.1
 _OFF_BORE = 0.1  # of the area: sensors' gains are off by a few hundredths, wrong units by far more
-_UNCHECKED = (
-    "units of pressure and force are not checked: --option bore=25mm compares the area with a "
-    "known bore"
-)
 
 
 class Truth(ParameterSet):
@@ -226,7 +223,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
                 sigma / friction,
                 limit=_MISFIT,
                 note="what the line leaves of the mean forces, over the mean friction",
-                next_step=_NEXT,
+                next_step=_advice(),
             ),
             Check(
                 "stroke_scatter",
@@ -248,17 +245,26 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
             *(f"{label} {reason}" for label, reason in fit.vague().items()),
             *drifting(groups, fit["A"]),
             *misfits(groups, W, F),
-            *(() if options.bore else (_UNCHECKED,)),
+            *(() if options.bore else (_unchecked(),)),
         ),
     )
 
 
-_NEXT = (
-    "look at 'pressure_between_directions' and the curve of each record: if one record lies off, "
-    "identify without it; if all forces are shifted, take --option zero=free; if friction depends "
-    "on speed or bends over pressure, take 'bywire identify friction-model' on friction, speed and "
-    "pressure, which compares such laws"
-)
+def _unchecked() -> str:
+    return (
+        f"units of pressure and force are not checked: {option('options', {'bore': '25mm'})} "
+        "compares the area with a known bore"
+    )
+
+
+def _advice() -> str:
+    return (
+        "look at 'pressure_between_directions' and the curve of each record: if one record lies "
+        "off, identify without it; if all forces are shifted, take "
+        f"{option('options', {'zero': 'free'})}; if friction depends on speed or bends over "
+        "pressure, take 'bywire identify friction-model' on friction, speed and pressure, which "
+        "compares such laws"
+    )
 
 
 def _bore_check(area: float, bore: float) -> tuple[Check, ...]:
@@ -273,7 +279,8 @@ def _bore_check(area: float, bore: float) -> tuple[Check, ...]:
             limit=_OFF_BORE,
             note=f"{1e6 * area:.5g} mm^2 found, the bore has {1e6 * known:.5g} mm^2: "
             "beyond the limit a unit of pressure or force is wrong",
-            next_step="check both units in the file (--output 'p=COLUMN [bar]'), and the bore",
+            next_step=f"check both units in the file ({option('outputs')} 'p=COLUMN [bar]'), and "
+            "the bore",
         ),
     )
 

@@ -13,6 +13,7 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case, changes_of, driven_at
 from bywire.bench.recording import energy_doubts_of, energy_signals
 from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, abandoned, steps_of, unestimated
+from bywire.core.callers import option
 from bywire.core.errors import (
     ParameterError,
     StepError,
@@ -61,7 +62,8 @@ def compared_outputs(
             notes = (f"left out as flags, sums or constants: {', '.join(passed)}",)
     if not wanted:
         raise ParameterError(
-            "nothing measured is an output of the model: name signals as the model does (--map), "
+            "nothing measured is an output of the model: name signals as the model does "
+            f"({option('mapping')}), "
             f"for instance {', '.join(list(signals)[:6])}; measured are "
             f"{nearest_first(there, signals)}"
         )
@@ -238,7 +240,8 @@ def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> d
     driven = without_noise(stimuli)
     if not wanted:
         raise ParameterError(
-            f"nothing measured drives the model: give --input STIMULUS=SIGNAL with one of "
+            f"nothing measured drives the model: give {option('inputs', {'STIMULUS': 'SIGNAL'})} "
+            f"with one of "
             f"{', '.join(driven)} and one of {nearest_first(there, driven)}"
         )
     for stimulus, signal in wanted.items():
@@ -252,15 +255,15 @@ def _started(
     bench: Bench, data: xr.Dataset, compared: Sequence[str]
 ) -> tuple[Bench, dict[str, str], tuple[str, ...]]:
     """Return the bench with its start at what was measured, where the experiment has one."""
-    for option, signal in bench.definition.begins_at.items():
-        known = option in bench.chosen_options.flat() and option not in bench.options
+    for name, signal in bench.definition.begins_at.items():
+        known = name in bench.chosen_options.flat() and name not in bench.options
         if known and signal in compared:
             first = data[signal].values[np.isfinite(data[signal].values)][:1]
-            leaf = leaf_fields(bench.definition.options)[option]
+            leaf = leaf_fields(bench.definition.options)[name]
             start = max(float(first[0]), leaf.low) if first.size else leaf.low
-            started = replace(bench, options={**bench.options, option: start})
+            started = replace(bench, options={**bench.options, name: start})
             said = f"starts at the measured {signal}, {start:.5g} {leaf.unit.symbol}"
-            return started, {option: signal}, (said,)
+            return started, {name: signal}, (said,)
     return bench, {}, ()
 
 
