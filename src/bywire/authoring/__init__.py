@@ -16,10 +16,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bywire.analysis.linear.closed_loop import closed_loop
     from bywire.analysis.linear.linear_model import LinearModel
     from bywire.analysis.linear.linearize import linearize
     from bywire.analysis.linear.plant import Plant, PlantPoint
+    from bywire.analysis.linear.sampled_loops import closed_loop
     from bywire.analysis.loop import LOOPS, Loop, Point, Quantity
     from bywire.bench.bench import Bench
     from bywire.bench.experiment import Case, Experiment, Recordings, as_run, fixed
@@ -98,7 +98,7 @@ if TYPE_CHECKING:
     from bywire.identification.least_squares import Problem, estimate
     from bywire.identification.measured import measured, wrong_sign
     from bywire.identification.method import METHODS, Check, Curve, Effort, Identified, Method
-    from bywire.identification.moved_run import moved_run
+    from bywire.identification.output_error import moved_run
     from bywire.identification.replaying.tracking import track
     from bywire.identification.residuals import lack_of_fit
     from bywire.identification.unknown import Unknown, parameters_of
@@ -106,9 +106,9 @@ if TYPE_CHECKING:
     from bywire.report import style
     from bywire.report.bench_figures import FigureKind
     from bywire.report.bench_figures import Shown as ShownFigure
-    from bywire.report.line_role import Role as LineRole
     from bywire.report.live_page.sliders import Sliders
     from bywire.report.panels import Panel, Panels, Trace
+    from bywire.report.panels import Role as LineRole
     from bywire.reproduction.item import Fact, Item, compared, found
     from bywire.reproduction.reproduction import Exhibit, Reproduction, Source
     from bywire.reproduction.reproduction import Part as SourcePart
@@ -162,11 +162,10 @@ _HOMES = {
     "bench.stimuli.registry": "Stimulus",
     "report.bench_figures": "FigureKind Shown:ShownFigure",
     "report.live_page.sliders": "Sliders",
-    "report.panels": "Panel Panels Trace",
-    "report.line_role": "Role:LineRole",
+    "report.panels": "Panel Panels Role:LineRole Trace",
     # loops, plants, studies
     "analysis.loop": "LOOPS Loop Point Quantity",
-    "analysis.linear.closed_loop": "closed_loop",
+    "analysis.linear.sampled_loops": "closed_loop",
     "analysis.linear.linear_model": "LinearModel",
     "analysis.linear.linearize": "linearize",
     "analysis.linear.plant": "Plant PlantPoint",
@@ -178,7 +177,7 @@ _HOMES = {
     "identification.estimate": "Estimate",
     "identification.least_squares": "Problem estimate",
     "identification.measured": "measured wrong_sign",
-    "identification.moved_run": "moved_run",
+    "identification.output_error": "moved_run",
     "identification.replaying.tracking": "track",
     "identification.method": "METHODS Check Curve Effort Identified Method",
     "identification.residuals": "lack_of_fit",
