@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
@@ -116,7 +117,7 @@ def overestimated(
         key = f"{trial.label}:{name}" if trial.label else name
         doubtful[key] = (
             f"{key} {why}, {size} is not its noise alone: give it, "
-            f'--output "{name}=NOISE {display_unit(unit)}"'
+            f'{option("outputs")} "{name}=NOISE {display_unit(unit)}"'
         )
     return doubtful
 
