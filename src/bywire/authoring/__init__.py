@@ -113,6 +113,7 @@ if TYPE_CHECKING:
     from bywire.reproduction.reproduction import Part as SourcePart
     from bywire.reproduction.root_cause import RootCause
     from bywire.reproduction.runs import Runs, kpis
+    from bywire.reproduction.source_file import SourceFile
     from bywire.simulation.run import Run, simulate
     from bywire.synthesis.study import (
         Cut,
@@ -186,6 +187,7 @@ _HOMES = {
     "reproduction.reproduction": "Exhibit Part:SourcePart Reproduction Source",
     "reproduction.root_cause": "RootCause",
     "reproduction.runs": "Runs kpis",
+    "reproduction.source_file": "SourceFile",
 }
 """module -> what it gives, NAME:OTHER where it is called otherwise here"""
 
@@ -307,6 +309,7 @@ __all__ = [
     "Sliders",
     "Slow",
     "Source",
+    "SourceFile",
     "SourcePart",
     "Speed",
     "StatedFigure",
