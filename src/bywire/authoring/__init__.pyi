@@ -147,6 +147,7 @@ from bywire.reproduction.reproduction import Source as Source
 from bywire.reproduction.root_cause import RootCause as RootCause
 from bywire.reproduction.runs import Runs as Runs
 from bywire.reproduction.runs import kpis as kpis
+from bywire.reproduction.source_file import SourceFile as SourceFile
 from bywire.simulation.run import Run as Run
 from bywire.simulation.run import simulate as simulate
 from bywire.synthesis.study import Cut as Cut
