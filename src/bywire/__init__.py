@@ -10,13 +10,12 @@ Everything below is loaded on first use, so that ``import bywire`` costs nothing
 
 from __future__ import annotations
 
-from functools import cache
-from importlib import import_module
-from pathlib import Path
+from functools import cached_property
 from typing import Any
 
 from bywire.core.engines import Make as _Make
 from bywire.core.engines import declare_engine as _declare_engine
+from bywire.core.lazy_names import LazyNames as _LazyNames
 from bywire.core.version import __version__ as __version__
 
 
@@ -35,25 +34,24 @@ _declare_engine("sil", _ecu_in_the_loop("double"))
 _declare_engine("sil-single", _ecu_in_the_loop("single"))
 
 
-@cache
-def _homes() -> dict[str, str]:
-    """Return the module of each public name: those of the stub beside this file, and use cases."""
-    from bywire.usecases import use_cases
+class _Names(_LazyNames):
+    """The names of the stub, and every use case that it may lack yet."""
 
-    lines = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8").splitlines()
-    words = [line.split() for line in lines if line.startswith("from ")]
-    stated = {name: home for _, home, _, name, *_ in words if not name.startswith("_")}
-    return stated | {name: case.public.__module__ for name, case in use_cases().items()}
+    @cached_property
+    def homes(self) -> dict[str, tuple[str, str]]:
+        """Name -> module, and what it is called there."""
+        from bywire.usecases import use_cases
+
+        found = {name: (case.public.__module__, name) for name, case in use_cases().items()}
+        return found | super().homes
+
+
+_names = _Names(__file__)
 
 
 def __getattr__(name: str) -> Any:
-    if name == "__all__":
-        return sorted(_homes())
-    home = None if name.startswith("_") else _homes().get(name)
-    if home is None:
-        raise AttributeError(f"module 'bywire' has no attribute {name!r}")
-    return getattr(import_module(home), name)
+    return _names.load(name)
 
 
 def __dir__() -> list[str]:
-    return sorted([*_homes(), "__version__"])
+    return sorted([*_names.all(), "__version__"])

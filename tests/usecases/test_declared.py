@@ -37,7 +37,8 @@ SUMMARY = "Count the letters of a loop's name."
 def declared(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Have the use case among the others, and no longer."""
     monkeypatch.setattr(callers, "_flags", dict(callers._flags))
-    cached = (app.program, task.tasks, bywire._homes)
+    cached = (app.program, task.tasks)
+    monkeypatch.setattr(bywire, "_names", bywire._Names(bywire.__file__))
     use_cases()
     sys.modules.pop("usecases.letters", None)
     importlib.import_module("usecases.letters")

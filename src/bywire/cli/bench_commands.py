@@ -22,7 +22,7 @@ def list_command(
         typer.Argument(
             metavar="[TOPIC|NAME|WORD]",
             help="A kind of things; or a name: its options, signals, units; or what it is about.",
-            autocompletion=completion.ANYTHING,
+            autocompletion=completion.names_of(),
         ),
     ] = None,
     json: JsonFlag = False,

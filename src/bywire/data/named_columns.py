@@ -25,9 +25,6 @@ from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
 from bywire.data.measurement import dataset_of, opened
 from bywire.data.room import room
 
-_ARGUMENTS = {"input": "inputs", "output": "outputs"}
-"""options of commands whose arguments in Python take a mapping"""
-
 _BRACKETS = "each with the unit of its own column in the brackets, or 1 for a pure number"
 
 
@@ -194,11 +191,11 @@ def _options(signals: Mapping[str, str], clock: str, named: NamedColumns | None)
         unit = ((named.units or {}).get(name) if named else None) or ""
         text = f"{column} [{display_unit(unit) or 'UNIT'}]"
         driven = named.driving.get(name) if named else None
-        group = "signals" if named is None else "output" if driven is None else "input"
+        group = "signals" if named is None else "outputs" if driven is None else "inputs"
         groups.setdefault(group, {})[driven or name] = text
     if named is not None and named.units is not None and not {*signals} & {*named.units}:
         any_column = "COLUMN [UNIT]"  # nothing is called as the model calls it
-        groups = {"input": {"STIMULUS": any_column}, "output": {"SIGNAL": any_column}}
+        groups = {"inputs": {"STIMULUS": any_column}, "outputs": {"SIGNAL": any_column}}
     of_command = is_command_line()
     texts = []
     for group, pairs in groups.items():
@@ -206,9 +203,9 @@ def _options(signals: Mapping[str, str], clock: str, named: NamedColumns | None)
             each = [t if t.startswith(f"{n} [") else f"{n}={t}" for n, t in pairs.items()]
             texts.append(f'--signals "{", ".join(each)}"' if of_command else f"signals={each}")
         elif of_command:
-            texts += [f'--{group} {name}="{text}"' for name, text in pairs.items()]
+            texts += [f'{option(group)} {name}="{text}"' for name, text in pairs.items()]
         else:
-            texts.append(f"{_ARGUMENTS[group]}={pairs}")
+            texts.append(f"{group}={pairs}")
     if clock:
         texts.append(f'--time "{clock} [s]"' if of_command else f"time='{clock} [s]'")
     return (" " if of_command else ", ").join(texts)

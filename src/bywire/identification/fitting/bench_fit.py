@@ -151,7 +151,7 @@ def overestimated(
         key = f"{trial.label}:{name}" if trial.label else name
         doubtful[key] = (
             f"{key} {why}, {size} is not its noise alone: give it, "
-            f'--output "{name}=NOISE {display_unit(unit)}"'
+            f'{option("outputs")} "{name}=NOISE {display_unit(unit)}"'
         )
     return doubtful
 

@@ -150,6 +150,9 @@ def loops_of(made: Exported) -> list[LoopSource]:
     return [source for source in sources if source is not None]
 
 
+_MARGIN_UNITS = {"1": ("", 1.0), "s": ("ms", 1e3)}  # unit and factor, where not as they are
+
+
 def told(source: LoopSource) -> dict[str, Any]:
     """Return what the page must know of a loop."""
     loop = source.loop
