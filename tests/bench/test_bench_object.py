@@ -227,5 +227,5 @@ def test_nested_sections_become_dotted_names():
 def test_content_without_a_file(tmp_path):
     content = {"experiment": "hard-braking", "parameters": SET}
     assert from_mapping(content, tmp_path, "x") == bywire.Bench("hard-braking", SET, name="x")
-    with pytest.raises(InputError, match="unknown key 'x'"):
+    with pytest.raises(InputError, match="unknown key of a bench file 'x'"):
         from_mapping({**content, "x": 1}, tmp_path, "x")

@@ -153,7 +153,12 @@ def test_classes_coverage_and_reaction_follow_from_the_runs(campaign):
     assert findings.is_weighted
     object_ = campaign.as_object()
     assert json.loads(json.dumps(object_))["runs"] == 14
-    assert {table for table in campaign.tables()} >= {"Faults", "Residuals", "Criteria"}
+    tables = campaign.tables()
+    assert {*tables} >= {"Faults", "Residuals", "Criteria"}
+    frame = tables["Faults"]
+    assert frame.attrs["units"] == {"within": "s", "seen within": "s"}
+    np.testing.assert_equal(frame["within"].to_numpy(), [e.tolerance for e in findings.faults])
+    assert tables["Residuals"]["false alarms"].dtype.kind == "i"
     assert len(campaign.write(campaign.folder)) >= 3
 
 

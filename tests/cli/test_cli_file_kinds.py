@@ -37,7 +37,7 @@ def test_a_file_of_another_kind_is_named(bywire, bench, tmp_path, monkeypatch, g
 @pytest.mark.parametrize(
     ("command", "text", "texts"),
     [
-        (("run",), BRAKING + 'bench = "hard-braking"\n', ["unknown key 'bench'"]),
+        (("run",), BRAKING + 'bench = "hard-braking"\n', ["bench file 'bench'"]),
         (("study", "run"), f'bench = "hard-braking"\n{BRAKING}', ["study file 'experiment'"]),
         (("study", "run"), 'bench = "hard-braking"\n[values]\n', ["study file 'values'"]),
         (("faults",), 'bench = "hard-braking"\n[values]\n', ["[[criteria]] are missing"]),

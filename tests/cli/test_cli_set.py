@@ -25,7 +25,7 @@ import bywire as package
         ("motor.R_m=9bar", ["bar cannot be ohm"]),
         ("motor.R_m=-1ohm", ["motor.R_m = -1.0 ohm", "> 0 ohm"]),
         ("motor.R_m=nan", ["is not a quantity"]),
-        ("simulation.stepp=1us", ["unknown key in [simulation] 'stepp'", "'step'"]),
+        ("simulation.stepp=1us", ["unknown key of [simulation] 'stepp'", "'step'"]),
         ("simulation.step=1e-30s", [">= 1e-09 s"]),
         ("simulation.seed=x", ["simulation.seed = 'x'", "whole number"]),
         ("simulation.seed=" + "9" * 5000, ["simulation.seed = ", "whole number"]),

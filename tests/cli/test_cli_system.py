@@ -100,7 +100,7 @@ def test_a_bench_file_names_it_and_never_loads_it(bywire: Bywire, tmp_path: Path
     refused(bywire("run", path), "unknown parameter set 'spring-axis-one'")
     assert bywire("run", path, *SYSTEM).status == 0
     path.write_text(f'system = "{SPRING_AXIS}"\n{path.read_text()}')
-    refused(bywire("run", path), "unknown key 'system'")
+    refused(bywire("run", path), "unknown key of a bench file 'system'")
 
 
 def test_output_error_finds_its_parameters(bywire: Bywire, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from bywire.analysis.linear.sampled_system import sampled_models
 from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.analysis.response.saturation import Saturation
 from bywire.core.arguments import checked
-from bywire.core.errors import unknown_name
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
@@ -76,6 +76,15 @@ class Quantity:
     name: str
     unit: str
     default: float
+
+    def refused(self, value: float, why: object) -> ParameterError:
+        """Return the error of a value that is no operating point."""
+        return ParameterError(f"{self.name} = {value:g} {self.unit} is no operating point: {why}")
+
+    def require_positive(self, value: float, remark: str = "") -> None:
+        """Refuse a value that is not positive; ``remark``: what follows in the error."""
+        if not value > 0.0:
+            raise self.refused(value, f"it must be > 0 {self.unit}{remark}")
 
 
 @checked

@@ -14,7 +14,7 @@ from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Section, TableBlock
-from bywire.report.tables import Table, text_table
+from bywire.report.tables import Cell, Table, text_table
 
 if TYPE_CHECKING:
     from bywire.data.channel_quality import AlignedChannel, AlignmentReport, Stretch
@@ -69,8 +69,15 @@ class Conversion(Answer):
 
     def _signal_table(self) -> Table:
         rows = [
-            (name, row["unit"], str(row["samples"]), row["time"], row["column"])
+            (
+                name,
+                row["unit"],
+                Cell(str(samples), value=samples, unit="1"),
+                row["time"],
+                row["column"],
+            )
             for name, row in self._signals().items()
+            for samples in (row["samples"],)
         ]
         return text_table(("signal", "unit", "samples", "instants", "column"), rows)
 
@@ -183,15 +190,17 @@ def _channel_table(report: AlignmentReport) -> Table:
     return text_table(heading, [_row(channel) for channel in report.channels])
 
 
-def _row(channel: AlignedChannel) -> tuple[str, ...]:
+def _row(channel: AlignedChannel) -> tuple[str | Cell, ...]:
     quality = channel.quality
+    jitter = f"{1e3 * quality.jitter:.3g} ms" if quality.jitter * quality.rate > _ROUNDING else "-"
+    delay = f"{1e3 * channel.delay:.4g} ms" if channel.delay else "-"
     return (
         channel.name,
-        f"{quality.rate:.6g} Hz",
-        f"{1e3 * quality.jitter:.3g} ms" if quality.jitter * quality.rate > _ROUNDING else "-",
-        f"{1e3 * channel.delay:.4g} ms" if channel.delay else "-",
+        Cell(f"{quality.rate:.6g} Hz", value=quality.rate, unit="Hz"),
+        Cell(jitter, value=quality.jitter, unit="s"),
+        Cell(delay, value=channel.delay, unit="s"),
         *(_in_short(stretches) for stretches in (quality.gaps, quality.missing, quality.clipped)),
-        str(channel.excluded),
+        Cell(str(channel.excluded), value=channel.excluded, unit="1"),
     )
 
 

@@ -9,6 +9,7 @@ from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.api.loop_case import LoopCase
 from bywire.api.verification_parts import (
     Part,
+    figure_cell,
     figure_text,
     verification_object,
     verification_parts,
@@ -93,8 +94,8 @@ def as_parts(
     figures = [
         [
             name,
-            figure_text(name, design.nominal[name]),
-            figure_text(name, design.worst[name][0]),
+            figure_cell(name, design.nominal[name]),
+            figure_cell(name, design.worst[name][0]),
             design.worst[name][1],
             wanted.get(name, "").removeprefix(name).strip(),
         ]

@@ -34,8 +34,7 @@ from bywire.report.document import (
 )
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.subject import Subject
-from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
-from bywire.report.wording import amount
+from bywire.report.tables import KpiRow, Table, amount_cell, kpi_table, parameter_table, text_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -183,11 +182,11 @@ class LifeResult(Answer):
                 (
                     name,
                     each.label,
-                    amount(path[0], each.unit),
-                    amount(path[-1], each.unit),
-                    amount(float(path.min()), each.unit),
-                    amount(float(path.max()), each.unit),
-                    amount(rate, difference_unit(each.unit)),
+                    amount_cell(path[0], each.unit),
+                    amount_cell(path[-1], each.unit),
+                    amount_cell(float(path.min()), each.unit),
+                    amount_cell(float(path.max()), each.unit),
+                    amount_cell(rate, difference_unit(each.unit)),
                 )
             )
         return text_table(

@@ -25,7 +25,7 @@ from bywire.report.document import (
     Section,
     TableBlock,
 )
-from bywire.report.tables import Cell, Column, Table
+from bywire.report.tables import Cell, Column, Table, amount_cell
 from bywire.report.wording import amount, clean
 
 if TYPE_CHECKING:
@@ -192,14 +192,14 @@ def margins_table(
     heading = [*(figure.heading for figure in MARGINS.values()), "stable"]
     rows = [
         (
-            *(_cell(getattr(margins, k), figure.unit, 3) for k, figure in MARGINS.items()),
+            *(amount_cell(getattr(margins, k), figure.unit, 3) for k, figure in MARGINS.items()),
             _state_cell(margins),
         )
         for margins in margins_at
     ]
     if name:
         heading = [clean(name), *heading]
-        rows = [(_cell(v, unit), *row) for v, row in zip(values, rows, strict=True)]
+        rows = [(amount_cell(v, unit), *row) for v, row in zip(values, rows, strict=True)]
     return Table(tuple(map(Column, heading)), tuple(rows))
 
 
@@ -207,10 +207,6 @@ def _state_cell(margins: LoopMargins) -> Cell:
     if margins.is_sound:
         return Cell("yes", value=True)
     return Cell("NO" if margins.has_loop else "no loop", "bad", value=False)
-
-
-def _cell(value: float, unit: str, digits: int = 4) -> Cell:
-    return Cell(amount(value, unit, digits), value=value)
 
 
 def worst_texts(

@@ -28,8 +28,8 @@ from bywire.report.document import (
     spaced,
 )
 from bywire.report.subject import Subject
-from bywire.report.tables import Cell, Column, Table
-from bywire.report.wording import amount, clean, duration, measured_amount
+from bywire.report.tables import Cell, Column, Table, measured_cell
+from bywire.report.wording import amount, clean, duration
 
 _SHOWN = ("nrmse", "vaf", "max_error", "bias", "lag")
 
@@ -238,8 +238,8 @@ def fit_table(fits: Sequence[SegmentFit]) -> Table:
 
 def _figure(kpi: Kpi) -> Cell:
     if kpi.unit == "s" and math.isfinite(kpi.value) and not kpi.bound > 0.0:
-        return Cell(duration(kpi.value), value=kpi.value)
-    return Cell(measured_amount(kpi.value, kpi.unit, kpi.bound, 3), value=kpi.value)
+        return Cell(duration(kpi.value), value=kpi.value, unit=kpi.unit)
+    return measured_cell(kpi.value, kpi.unit, kpi.bound, 3)
 
 
 def _tracked(track: Track) -> dict[str, Any]:

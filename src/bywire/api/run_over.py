@@ -37,7 +37,7 @@ from bywire.report.document import (
     spaced,
 )
 from bywire.report.subject import Subject
-from bywire.report.tables import Cell, Column, Table
+from bywire.report.tables import Cell, Column, Table, amount_cell
 from bywire.report.wording import amount, clean, measured_amount
 
 if TYPE_CHECKING:
@@ -187,7 +187,7 @@ class BenchRange(Answer):
         heads = [Column(f"{k.name} {limits.get(k.name, '')}".strip(), numeric=True) for k in kpis]
         rows = [
             (
-                Cell(amount(value, self.unit), value=value),
+                amount_cell(value, self.unit),
                 *(_cell(kpi.name, result) for kpi in kpis),
             )
             for value, result in zip(self.values, self.results, strict=True)
@@ -332,5 +332,5 @@ def _cell(name: str, result: Result) -> Cell:
     for verdict in result.verdicts:
         if verdict.kpi == name and not verdict.met:
             judged = "missed" if verdict.is_decided else "undecided"
-            return Cell(f"{text} {judged}", "bad", kpi.value)
-    return Cell(text, value=kpi.value)
+            return Cell(f"{text} {judged}", "bad", kpi.value, kpi.unit)
+    return Cell(text, value=kpi.value, unit=kpi.unit)

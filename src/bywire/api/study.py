@@ -29,7 +29,7 @@ from bywire.report.document import (
 )
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.subject import Subject
-from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
+from bywire.report.tables import Cell, KpiRow, Table, kpi_table, parameter_table, text_table
 from bywire.report.wording import in_display_unit, unit_text
 from bywire.synthesis.study import STUDIES, Cut, Findings, Map, Study
 
@@ -197,7 +197,8 @@ def _changed(
 
 def cut_table(cut: Cut) -> Table:
     """Return a cut of a study's designs as a table in display units."""
-    heading, columns = [], []
+    heading: list[str] = []
+    columns: list[list[object]] = []
     for name in cut.columns:
         values = cut.data[name].values
         if values.dtype.kind in "UO":  # words
@@ -206,7 +207,7 @@ def cut_table(cut: Cut) -> Table:
             continue
         shown, unit = in_display_unit(values, str(cut.data[name].attrs["units"]))
         heading.append(f"{name} [{unit_text(unit) or '-'}]")
-        columns.append([f"{float(value):.4g}" for value in shown])
+        columns.append([Cell(f"{value:.4g}", value=value, unit=unit) for value in shown.tolist()])
     return text_table(heading, zip(*columns, strict=True))
 
 

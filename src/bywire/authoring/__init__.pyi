@@ -24,6 +24,7 @@ from bywire.bench.kpis.kpi import Figures as Figures
 from bywire.bench.kpis.kpi import Kpi as Kpi
 from bywire.bench.kpis.kpi import Undefined as Undefined
 from bywire.bench.kpis.kpi import measure as measure
+from bywire.bench.kpis.loops import Samples as Samples
 from bywire.bench.kpis.registry import evaluate as evaluate
 from bywire.bench.kpis.registry import units_of as units_of
 from bywire.bench.result import Result as Result

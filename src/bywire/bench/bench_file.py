@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from bywire.bench.bench import Bench
 from bywire.bench.bench_source import content_of_experiment, meant_by
@@ -19,16 +19,51 @@ from bywire.bench.stimulus_sections import stimulus_sections
 from bywire.core.arguments import checked
 from bywire.core.callers import option
 from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
-from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
+from bywire.core.errors import InputError, ParameterError, unknown_name
+from bywire.core.section import Hint, Section, Table, table_of
 from bywire.core.values import parsed, require_unit, require_units
 from bywire.data.file_kinds import BENCH, require_kind
 from bywire.data.toml_file import read_toml
 
-SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
-"""what a bench file has beside single keys"""
-_KEYS = ("experiment", "parameters", "assembly", "name")
+_LIST = "(see 'bywire list')"
+_Quoted = Annotated[str, Hint("write it in quotation marks")]
+
+
+class SimulationSection(Section):
+    """The section ``[simulation]``; a `Bench` checks its values."""
+
+    step: Any = Bench.step
+    record: Any = None
+    seed: Any = Bench.seed
+    engine: Any = Bench.engine
+
+    @classmethod
+    def written_out(cls, content: Any) -> Any:
+        """Return the section with a seed that ``--set`` gives as a text as a number."""
+        seed = content.get("seed") if isinstance(content, Mapping) else None
+        if isinstance(seed, str) and seed.isdecimal() and len(seed) < 20:
+            return {**content, "seed": int(seed)}
+        return content
+
+
+class BenchFile(Section):
+    """A bench file."""
+
+    experiment: Annotated[str, Hint(f'write experiment = "..." in quotation marks {_LIST}')]
+    parameters: Annotated[str, Hint(f'write parameters = "..." in quotation marks {_LIST}')]
+    assembly: _Quoted = ""
+    name: _Quoted = ""
+    options: Table
+    stimulus: Table
+    set: Table
+    simulation: SimulationSection = SimulationSection()
+    requirements: Table
+    faults: Any = ()
+
+
 _FAULTS = "faults"
-_SIMULATION = ("step", "record", "seed", "engine")
+SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
+"""what a bench file has beside single keys and faults"""
 _TOO_LARGE = "; measured traces go into a file of their own (options.trace)"
 
 
@@ -82,7 +117,6 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
     }
     try:
         require_kind(content, BENCH, file)
-        _require_shape(content)
         plain = {name: value for name, value in changes.items() if name not in relative}
         bench = from_mapping(_changed(content, plain), file.parent, _printable(file.stem))
         return bench.with_overrides(relative) if relative else bench
@@ -92,30 +126,26 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
 
 def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
     """Return the bench of a bench file's content; relative paths start at ``folder``."""
-    _require_shape(content)
     sets = sets_of_loaded()
-    if len(sets) == 1:
-        content = {"parameters": sets[0], **content}
-    for key in ("experiment", "parameters"):
-        if key not in content:
-            raise ParameterError(f"{key} is missing: write {key} = \"...\" (see 'bywire list')")
-    _require_units(content)
-    options = _located(flattened(content.get("options", {})), folder)
+    only = {"parameters": sets[0]} if len(sets) == 1 else {}
+    file = BenchFile.read({"name": name, **only, **content}, "a bench file")
+    options, overrides = flattened(file.options), flattened(file.set)
+    _require_units(file, options, overrides)
     stimulus = {
         key: _located(value, folder) if isinstance(value, Mapping) else value
-        for key, value in _located(content.get("stimulus", {}), folder).items()
+        for key, value in _located(file.stimulus, folder).items()
     }
     return Bench(
-        experiment=content["experiment"],
-        parameters=content["parameters"],
-        overrides=flattened(content.get("set", {})),
-        options=options,
+        experiment=file.experiment,
+        parameters=file.parameters,
+        overrides=overrides,
+        options=_located(options, folder),
         stimulus=stimulus,
-        requirements=content.get("requirements", {}),
-        name=content.get("name", name),
-        assembly=content.get("assembly", ""),
-        faults=[with_units_wanted(each) for each in checked_sections(content.get(_FAULTS, ()))],
-        **_simulation(content.get("simulation", {})),
+        requirements=file.requirements,
+        name=file.name,
+        assembly=file.assembly,
+        faults=[with_units_wanted(each) for each in checked_sections(file.faults)],
+        **file.simulation.given,
     )
 
 
@@ -155,33 +185,15 @@ def _printable(name: str) -> str:
     return name.encode("utf-8", "replace").decode("utf-8")
 
 
-def _require_shape(content: Mapping[str, Any]) -> None:
-    """Refuse unknown keys, and texts and sections that are something else."""
-    for key in content:
-        if key not in (*_KEYS, *SECTIONS, _FAULTS):
-            raise unknown_name("key", key, (*_KEYS, *SECTIONS, _FAULTS))
-    for section in SECTIONS:
-        if not isinstance(content.get(section, {}), Mapping):
-            raise ParameterError(f"[{section}] must be a section with key = value lines")
-    for key in _KEYS:
-        if not isinstance(content.get(key, ""), str):
-            raise ParameterError(f"{key} = {quoted(content[key])}: write it in quotation marks")
-
-
-def _require_units(content: Mapping[str, Any]) -> None:
+def _require_units(file: BenchFile, options: Table, overrides: Table) -> None:
     """Refuse plain numbers where a unit is wanted: 37 is not 37 bar, and hardly 37 Pa."""
-    options = flattened(content.get("options", {}))
-    definition = experiment_of(
-        content["experiment"], content["parameters"], content.get("assembly", ""), options
-    )
+    definition = experiment_of(file.experiment, file.parameters, file.assembly, options)
     require_units(definition.options, options)
-    overrides = flattened(content.get("set", {}))
-    base = PARAMETER_SETS.find(content["parameters"]).parameters()
+    base = PARAMETER_SETS.find(file.parameters).parameters()
     require_units(type(base), settled(base, overrides))
-    simulation = content.get("simulation", {})
     for key in ("step", "record"):
-        require_unit(simulation.get(key), "s", f"simulation.{key}")
-    sections = stimulus_sections(content.get("stimulus", {}))
+        require_unit(file.simulation.given.get(key), "s", f"simulation.{key}")
+    sections = stimulus_sections(file.stimulus)
     if definition.driven_unit is None and definition.beside is None:
         return
     values = parsed(definition.options, options, f"option of {definition.name}")
@@ -196,19 +208,8 @@ def _require_units(content: Mapping[str, Any]) -> None:
             require_units(STIMULI.find(kind).parameter_class, section, units[name])
 
 
-def _simulation(section: Mapping[str, Any]) -> dict[str, Any]:
-    for key in section:
-        if key not in _SIMULATION:
-            raise unknown_name("key in [simulation]", key, _SIMULATION)
-    settings = dict(section)
-    seed = settings.get("seed")
-    if isinstance(seed, str) and seed.isdecimal() and len(seed) < 20:
-        settings["seed"] = int(seed)  # as --set gives it
-    return settings
-
-
 def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str, Any]:
-    changed = {k: dict(v) if isinstance(v, Mapping) else v for k, v in content.items()}
+    changed = {k: table_of(v, f"[{k}]") if k in SECTIONS else v for k, v in content.items()}
     for name, value in changes.items():
         section, _, key = name.partition(".")
         near = get_close_matches(section, SECTIONS, n=1, cutoff=0.8)
@@ -230,7 +231,7 @@ def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str
                 f"faults are put in by {option('faults')} NAME=VALUE@ONSET, not by "
                 f"{option('overrides')}"
             )
-        elif name in _KEYS:
+        elif name in BenchFile.model_fields:
             changed[name] = value
         else:
             overrides = flattened(changed.get("set", {}))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from bywire.bench.bench import Bench
-from bywire.bench.kpis.in_c import source_of
 from bywire.bench.kpis.registry import FAMILIES, Family
 from bywire.bench.option_names import split_options
 from bywire.bench.stimuli.registry import STIMULI
@@ -26,7 +24,6 @@ _ROOMS = (
     "bywire.plant",
     "bywire.vehicle",
 )
-_C_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.S)
 
 
 def computation(
@@ -95,9 +92,6 @@ def _family(text: str) -> Iterator[Any]:
     """Yield what a family of key figures computes, where a text is the name of one."""
     family = FAMILIES.guess(text) if text.isidentifier() and text.islower() else None
     if isinstance(family, Family):
-        yield family.select
         yield family.setting_class
         yield from family.measures.values()
-        if family.in_c is not None:
-            yield family.in_c
-            yield _C_COMMENT.sub("", source_of(family.path))
+        yield family.select if family.loops is None else family.loops.shared

@@ -65,7 +65,7 @@ class Section(BaseModel):
         """
         fields = cls.model_fields
         place, within = (f"{where} ", f"{where[1:-1]}.") if where.startswith("[") else ("", "")
-        content = _table(cls.written_out(content), where)
+        content = table_of(cls.written_out(content), where)
         for key in content:
             if key not in fields:
                 raise unknown_of_few(f"key of {where}", key, fields)
@@ -101,7 +101,7 @@ def _value(info: FieldInfo, value: Any, name: str, key: str) -> Any:
         return kind.read(value, f"[{key}]")
     if kind is Mapping:
         each = get_args(info.annotation)[-1]
-        table = _table(value, f"[{key}]")
+        table = table_of(value, f"[{key}]")
         if _is_section(each):
             return {name: each.read(entry, f"[{key}.{name}]") for name, entry in table.items()}
         return table
@@ -112,7 +112,8 @@ def _value(info: FieldInfo, value: Any, name: str, key: str) -> Any:
     return tuple(value) if kind is tuple and isinstance(value, list) else value
 
 
-def _table(value: Any, where: str) -> dict[str, Any]:
+def table_of(value: Any, where: str) -> dict[str, Any]:
+    """Return the keys and values of a section, or refuse what is none."""
     if not isinstance(value, Mapping):
         raise ParameterError(f"{where} must be a section with key = value lines")
     return dict(value)

@@ -6,6 +6,8 @@ heat: how hot a disc is depends on the pauses more than on the speeds.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated
 
 import numpy as np
@@ -13,10 +15,20 @@ from pydantic import Field
 
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
+from bywire.core.provenance import Cited, chosen
 from bywire.core.quantities import Unit
 from bywire.core.typing import Array
 from bywire.plant import pad_wear
 
+ORGANIC_LINING: Mapping[str, Cited] = MappingProxyType(
+    {
+        "kappa_0": chosen(3.6e-14, "180 cm^3 of pad over about 5 GJ: a car's front axle"),
+        "T_hot": chosen(503.0, "230 degC, as usual of organic linings"),
+        "T_act": chosen(2760.0, "four times the wear at 400 degC"),
+        "E_pad": chosen(5e8, "the order of organic linings under load"),
+    }
+)
+"""what pads of a road vehicle have in common, whatever their size"""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _HOTTEST = 1500.0  # K: cast iron melts
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from bywire.core.arguments import require_kinds
 from bywire.report.document import Document, FigureBlock, TableBlock
 from bywire.report.result_folder import ResultFolder, result_folder
+from bywire.report.tables import Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,17 +62,17 @@ class Answer(ABC):
         return shown
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """Return the tables of the page as pandas frames, by caption or section."""
-        import pandas as pd
+        """Return the tables of the page as pandas frames, by caption or section.
 
+        Numbers are in the units that ``frame.attrs["units"]`` has by column; a column whose rows
+        differ in them is followed by one that says them.
+        """
         frames: dict[str, pd.DataFrame] = {}
         for section in self.document().page:
             for block in section.blocks:
                 if isinstance(block, TableBlock):
                     name = block.caption.rstrip(".") or section.title
-                    headings = [column.heading for column in block.table.columns]
-                    rows = [[cell.content for cell in row] for row in block.table.rows]
-                    frames.setdefault(name, pd.DataFrame(rows, columns=headings))
+                    frames.setdefault(name, frame_of(block.table))
         return frames
 
     def write(self, folder: str | Path) -> list[Path]:
@@ -96,6 +97,29 @@ class Answer(ABC):
         from bywire.report.page import fragment_html
 
         return fragment_html(self.document(), [f"Warning: {text}." for text in self.warnings])
+
+
+def frame_of(table: Table) -> pd.DataFrame:
+    """Return a table as a pandas frame; see `Answer.tables`."""
+    import pandas as pd
+
+    headings: list[str] = []
+    columns: list[list[object]] = []
+    units: dict[str, str] = {}
+    for k, column in enumerate(table.columns):
+        cells = [row[k] for row in table.rows]
+        headings.append(column.heading)
+        columns.append([cell.content for cell in cells])
+        known = {cell.unit for cell in cells if cell.unit}
+        if len(known) == 1:
+            units[column.heading] = known.pop()
+        elif known:
+            headings.append(f"{column.heading} unit")
+            columns.append([cell.unit for cell in cells])
+    frame = pd.DataFrame(dict(enumerate(columns)))
+    frame.columns = pd.Index(headings)
+    frame.attrs["units"] = units
+    return frame
 
 
 def write_document(document: Document, folder: Path) -> list[Path]:

@@ -12,7 +12,7 @@ from bywire.bench.relative_changes import refuse_share_of_temperature, share_of
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.units import difference_unit, parse, shown
-from bywire.core.values import number, plain_text
+from bywire.core.values import written
 from bywire.studies.admissible import admitted, require_single_values, whole
 from bywire.studies.distribution import NEVER, Distribution
 from bywire.studies.laws import Law, LogNormal, Normal, Triangular, Uniform, truncated_normal
@@ -146,9 +146,7 @@ class _Entry:
     def _number(self, key: str, value: Any, symbol: str = "") -> float:
         unit = self.leaf.unit
         where = f"{self.where}.{key}"
-        if isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0:
-            value = plain_text(value)  # a file's plain number: 37 is not 37 bar, and hardly 37 Pa
-        return float(number(value, symbol or unit.symbol, where, unit.nominal))
+        return float(written(value, symbol or unit.symbol, where, unit.nominal))
 
     def refused(self, why: str) -> ParameterError:
         """Return the error of a section that contradicts itself."""

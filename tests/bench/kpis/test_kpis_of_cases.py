@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from bywire.bench.kpis import (
-    cases,
     effort,
     extremes,
     hysteresis,
+    loop_family,
     occupation,
     release,
     static_gain,
@@ -22,7 +21,10 @@ from bywire.bench.kpis import (
     vehicle_stop,
 )
 from bywire.bench.kpis.cases import FamilyJudge, evaluate_cases
+from bywire.bench.kpis.loop_family import NO_NUMBER
+from bywire.bench.kpis.loops import moving_average
 from bywire.bench.kpis.registry import FAMILIES, evaluate
+from bywire.bench.kpis.smoothing import smoothed
 from bywire.bench.rows import Rows
 from bywire.simulation.compiler import find_compiler
 
@@ -83,28 +85,101 @@ def test_each_case_is_as_if_it_were_alone_for_every_family(rows):
 @needs_compiler
 @pytest.mark.parametrize(
     "family",
-    ["step_response", "static_gain", "effort", "occupation", "extremes", "vehicle_stop"],
+    [
+        "step_response",
+        "static_gain",
+        "effort",
+        "occupation",
+        "extremes",
+        "release",
+        "vehicle_stop",
+    ],
 )
-def test_c_gives_the_bits_of_python_on_any_samples(family, monkeypatch):
-    random, compiled = np.random.default_rng(5), 0
+def test_c_gives_the_bits_and_texts_of_python_on_any_samples(family):
+    random, loops = np.random.default_rng(5), FAMILIES.find(family).loops
+    assert loops is not None
+    assert loops.is_compiled
     every: set[str] = set()
     for _ in range(60):
         few, setting = _drawn(random, family)
-        settings = [setting] * 5
-        by_c = evaluate_cases(family, few, settings)
-        with monkeypatch.context() as without:
-            without.setattr(cases, "figures_in_c", lambda *_: None)
-            by_python = evaluate_cases(family, few, settings)
-        compiled += isinstance(by_c[next(iter(by_c))].told, partial)
-        for name, figure in by_python.items():
-            np.testing.assert_array_equal(by_c[name].values, figure.values, name)
-            notes = [figure.told(k) for k in range(len(settings))]
-            assert [by_c[name].told(k) for k in range(len(settings))] == notes
-            every |= {note.split()[0] for note in notes if note}
-    # the others have samples that define nothing (without a set point also an empty window), or a
-    # single case that has no row of its stop
-    assert compiled > {"vehicle_stop": 15, "static_gain": 20}.get(family, 30)
-    assert len(every) >= {"step_response": 6, "vehicle_stop": 4, "extremes": 1}.get(family, 2)
+        by_c = evaluate_cases(family, few, [setting] * 5)
+        for k in range(5):
+            each, level = loops.signals_of(few.case(k), setting)
+            lists = {name: None if y is None else y.tolist() for name, y in each.items()}
+            for name, value in loops.in_python(few["time"].values.tolist(), lists, setting).items():
+                by_python = loops.kpi(loops.measures[name], value, setting, level)
+                assert by_c[name].case(k) == by_python
+                assert math.copysign(1.0, by_c[name].values[k]) == math.copysign(
+                    1.0, by_python.value
+                )
+                every |= {by_python.note}
+    assert NO_NUMBER not in every  # divisions are guarded
+    least = {"step_response": 6, "vehicle_stop": 4, "extremes": 1}.get(family, 2)
+    assert len({note.split()[0] for note in every if note}) >= least
+
+
+def test_a_step_is_judged_as_numpy_does():
+    """A reference of its own, by arrays: crossings, the last entry, extremes."""
+    random, defined = np.random.default_rng(9), 0
+    for place in range(300):
+        few, setting = _drawn(random, "step_response")
+        setting = replace(setting, start=0.0, end=1.0, smoothing=0.0, window=None)
+        t, y = few["time"].values, few["y"].values[place % 5]
+        found = evaluate("step_response", few.case(place % 5), setting)
+        after = t > setting.t_step
+        s = np.append(setting.t_step, t[after])
+        z = np.append(np.interp(setting.t_step, t, y), y[after])
+        beyond = np.abs(z - 1.0) > 0.02
+        expected = {
+            "overshoot": 100.0 * max(0.0, z.max() - 1.0),
+            "settling_time": _entry(s, z, int(np.flatnonzero(beyond)[-1])) if beyond.any() else 0.0,
+            "dead_time": _crossing(s, z, 0.05),
+            "rise_time": _crossing(s, z, 0.9) - _crossing(s, z, 0.1),
+        }
+        for name, value in expected.items():
+            if not found[name].note:
+                defined += 1
+                assert found[name].value == pytest.approx(value, rel=1e-12, abs=1e-15), name
+    assert defined > 100
+
+
+def _crossing(t: np.ndarray, z: np.ndarray, level: float) -> float:
+    k = int(np.argmax(z >= level))
+    if k == 0:
+        return math.nan
+    return float(np.interp(level, z[k - 1 : k + 1], t[k - 1 : k + 1])) - float(t[0])
+
+
+def _entry(t: np.ndarray, z: np.ndarray, k: int) -> float:
+    if k == t.size - 1:
+        return math.nan
+    edge = 1.0 + math.copysign(0.02, z[k] - 1.0)
+    return float(t[k] + (edge - z[k]) / (z[k + 1] - z[k]) * (t[k + 1] - t[k]) - t[0])
+
+
+@pytest.mark.parametrize("period", [0.004, 0.03, 5.0])
+def test_the_moving_average_of_loops_is_that_of_arrays(rows, period):
+    t, y = rows["time"].values, rows["y"].values[3]
+    np.testing.assert_array_equal(
+        moving_average(t.tolist(), y.tolist(), period), smoothed(t, y, period)
+    )
+
+
+@pytest.mark.parametrize("is_long", [False, True])
+def test_a_long_run_is_judged_alike(rows, is_long, monkeypatch):
+    monkeypatch.setattr(loop_family, "_FEW", 0 if is_long else math.inf)
+    found = evaluate("step_response", rows.case(2), STEP)
+    together = evaluate_cases("step_response", rows, [STEP] * CASES)
+    assert {name: each.case(2) for name, each in together.items()} == found
+
+
+def test_without_a_compiler_each_case_is_judged_by_python(rows, monkeypatch):
+    few = Rows(rows["time"].values, {"y": rows["y"].values[:3]}, {"y": {"units": "m"}})
+    by_c = evaluate_cases("step_response", few, [STEP] * 3)
+    monkeypatch.setattr(loop_family.LoopFamily, "is_compiled", False)
+    by_python = evaluate_cases("step_response", few, [STEP] * 3)
+    for name, each in by_python.items():
+        assert [each.case(k) for k in range(3)] == [by_c[name].case(k) for k in range(3)]
 
 
 def _drawn(random: np.random.Generator, family: str) -> tuple[Rows, object]:
@@ -124,10 +199,12 @@ def _drawn(random: np.random.Generator, family: str) -> tuple[Rows, object]:
         names = {
             "effort": ("y", "mode", "nothing"),
             "extremes": ("y",),
+            "release": ("y",),
             "occupation": ("mode", random.choice(["mode", "none"]), "y", "none"),
         }
         names["effort"] = tuple(name if random.random() < 0.7 else "nothing" for name in "yyy")
-        return rows, FAMILIES.find(family).setting_class(*map(str, names[family]))
+        further = [float(random.choice([0.0, 0.5, 1.0]))] if family == "release" else []
+        return rows, FAMILIES.find(family).setting_class(*map(str, names[family]), *further)
     levels = random.choice([None, 0.0, 1.0], 2, p=[0.2, 0.4, 0.4])
     window = sorted(random.uniform(t[0], t[-1], 2)) if random.random() < 0.3 else None
     at = float(random.choice([*t[:-1], random.uniform(t[0], t[-1])]))

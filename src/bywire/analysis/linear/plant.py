@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from bywire.analysis.linear.corners import taking
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import Friction
 from bywire.analysis.loop import Quantity
+from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
 
@@ -31,6 +33,16 @@ class PlantPoint:
     value: float
     friction: Friction = "removed"
     speed: float = 0.0
+
+    @contextmanager
+    def named(self, unless: Quantity) -> Iterator[None]:
+        """Name the value in errors of what follows from it; ``unless``: whose errors name it."""
+        try:
+            yield
+        except ParameterError as error:
+            if self.quantity is unless:
+                raise
+            raise self.quantity.refused(self.value, error) from None
 
 
 @dataclass(frozen=True)

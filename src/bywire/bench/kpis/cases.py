@@ -9,12 +9,10 @@ from typing import Any, cast
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from bywire.bench.kpis.in_c import figures_in_c
 from bywire.bench.kpis.kpi import Kpi, KpiOfCases, Measure
-from bywire.bench.kpis.registry import FAMILIES, Family, evaluate
-from bywire.bench.kpis.samples import signal
+from bywire.bench.kpis.loop_family import LoopFamily
+from bywire.bench.kpis.registry import FAMILIES, evaluate
 from bywire.bench.rows import Rows
 from bywire.core.parameters import ParameterSet
 
@@ -103,8 +101,8 @@ def signals_of_setting(setting: Any) -> set[str]:
 def evaluate_cases(name: str, rows: Rows, settings: Sequence[Any]) -> dict[str, KpiOfCases]:
     """Return all figures of a family by name, of many cases at once.
 
-    Where the settings differ in no more than what the family declares as ``BY_CASE``, they are
-    computed together; else, and of a family that declares nothing, each for itself.
+    By the C of a family that loops over samples; of others, and without a compiler, each for
+    itself.
 
     Parameters
     ----------
@@ -121,10 +119,10 @@ def evaluate_cases(name: str, rows: Rows, settings: Sequence[Any]) -> dict[str, 
         When the family, or a signal that a setting asks for by name, is unknown.
     """
     chosen = FAMILIES.find(name)
-    by_case: tuple[str, ...] | None = getattr(chosen.setting_class, "BY_CASE", None)
-    together = None if by_case is None else _together(chosen, rows, settings, by_case)
-    if together is not None:
-        return together
+    if chosen.loops is not None:
+        together = _in_c(chosen.loops, rows, settings)
+        if together is not None:
+            return together
     each = [
         evaluate(name, cast(xr.Dataset, rows.case(k)), setting).values()
         for k, setting in enumerate(settings)
@@ -142,77 +140,33 @@ def of_cases(each: Sequence[Iterable[Kpi]]) -> Iterator[KpiOfCases]:
         )
 
 
-def _together(
-    chosen: Family, rows: Rows, settings: Sequence[Any], by_case: tuple[str, ...]
-) -> dict[str, KpiOfCases] | None:
-    """Return the figures of cases at once; None where one of them is unlike the others."""
+def _in_c(family: LoopFamily, rows: Rows, settings: Sequence[Any]) -> dict[str, KpiOfCases] | None:
+    """Return the figures of cases that look at the same signals, by C; None without a compiler."""
     first = settings[0]
-    joined = {name: [getattr(setting, name) for setting in settings] for name in by_case}
-    levels = {n: np.array(values) for n, values in joined.items() if values[0] is not None}
-    is_alike = all(
-        (value is None) == (name not in levels) for name in by_case for value in joined[name]
-    )
-    blank = dict.fromkeys(by_case)
-    if not is_alike or any(
-        other is not first and other != first and replace(other, **blank) != replace(first, **blank)
-        for other in settings
+    distinct = {id(setting): setting for setting in settings}.values()
+    if not family.is_compiled or any(
+        getattr(each, name) != getattr(first, name) for each in distinct for name in family.signals
     ):
         return None
-    compiled = _in_c(chosen, rows, settings, replace(first, **levels))
-    if compiled is not None:
-        return compiled
-    if chosen.in_c is not None and chosen.in_c.is_alone_in_python:
-        return None
-    data = chosen.select(cast(xr.Dataset, rows), replace(first, **levels))
-    if data.defect:
-        return None
-    figures = [figure.of_cases(data) for figure in chosen.measures.values()]
-    return {
-        each.name: replace(each, values=np.broadcast_to(each.values, len(settings)))
-        for each in figures
-    }
+    signals, level = family.signals_of(cast(xr.Dataset, rows), first)
+    made = family.in_c(rows["time"].values, list(signals.values()), settings)
 
+    left_open = [place for place, each in enumerate(family.reasons, 1) if each.is_open]
 
-def _in_c(
-    chosen: Family, rows: Rows, settings: Sequence[Any], joined: Any
-) -> dict[str, KpiOfCases] | None:
-    """Return the figures of cases at once by a family's C; None where that cannot tell them.
-
-    ``joined``: their setting, with the levels of each case.
-    """
-    how, figures = chosen.in_c, list(chosen.measures.values())
-    if how is None:
-        return None
-    names = [getattr(joined, name) for name in how.signals]
-    each = [signal(cast(xr.Dataset, rows), n) if n in rows else None for n in names]
-    if each[0] is None and not all(figure.needs for figure in figures):
-        return None
-    given = figures_in_c(
-        chosen.name,
-        chosen.path,
-        how,
-        joined,
-        rows["time"].values,
-        [None if one is None else one[0] for one in each],
-        len(figures),
-    )
-    if given is None:
-        return None
-    units = how.units("1" if each[0] is None else each[0][1], joined)
-
-    def told(figure: Measure[Any], why: NDArray[np.int32], k: Any) -> str:
-        if not why[k]:
-            return how.note(joined)
-        return figure(chosen.select(cast(xr.Dataset, rows.case(k)), settings[k])).note
+    def note(place: int, figure: Measure, k: Any) -> str:
+        reason = int(made.reasons[place, k])
+        numbers = made.numbers[place, k].tolist()
+        given = family.undefined(reason, numbers) if reason else 0.0
+        return family.kpi(figure, given, settings[k], level).note
 
     return {
-        figure.name: KpiOfCases(
-            figure.name,
-            values,
-            units.get(figure.unit, figure.unit),
+        name: KpiOfCases(
+            name,
+            made.values[place],
+            family.kpi(figure, 0.0, first, level).unit,
             figure.definition,
-            partial(told, figure, why),
-            np.isin(why, how.open).tolist().__getitem__,
+            partial(note, place, figure),
+            np.isin(made.reasons[place], left_open).tolist().__getitem__,
         )
-        for figure, values, why in zip(figures, *given, strict=True)
+        for place, (name, figure) in enumerate(family.measures.items())
     }

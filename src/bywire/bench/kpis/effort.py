@@ -2,141 +2,86 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from typing import ClassVar
 
-import numpy as np
-import xarray as xr
-
-from bywire.bench.kpis.in_c import InC
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.samples import defect, integral, signal
-from bywire.core.typing import Array
+from bywire.bench.kpis.loops import Samples, integral
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Names of the signals in the recording."""
+    """Names of the signals in the recording.
 
-    BY_CASE: ClassVar[tuple[str, ...]] = ()
+    Parameters
+    ----------
+    current
+        Motor current [A].
+    power
+        Electrical power drawn [W].
+    energy
+        Energy drawn since the start [J]; where it is not recorded, the power is integrated between
+        the samples, which misses what happens between them.
+    """
 
     current: str = "i"
     power: str = "P_el"
     energy: str = "E_source"
 
 
-IN_C = InC(
-    signals=("current", "power", "energy"),
-    reasons=(
-        "no current is recorded",
-        "no electrical power is recorded",
-        "neither energy nor electrical power is recorded",
-    ),
-)
-
-
-@dataclass(frozen=True, eq=False)
-class Effort:
-    """Samples of current, electrical power and energy.
-
-    Parameters
-    ----------
-    t
-        Times [s], increasing, shape ``(n,)``.
-    current
-        Motor current [A], shape ``(..., n)``, or None where it is not recorded.
-    power
-        Electrical power drawn [W], shape ``(..., n)``, or None.
-    energy
-        Energy drawn since the start [J], shape ``(..., n)``, or None: then the power is integrated
-        between the samples, which misses what happens between them.
-    """
-
-    t: Array
-    current: Array | None = None
-    power: Array | None = None
-    energy: Array | None = None
-
-    @property
-    def units(self) -> Mapping[str, str]:
-        """No placeholder is used."""
-        return {}
-
-    @cached_property
-    def defect(self) -> str:
-        """Why no figure is defined."""
-        given = (s for s in (self.current, self.power, self.energy) if s is not None)
-        return defect(self.t, *given)
-
-    @property
-    def note(self) -> str:
-        """Nothing is treated."""
-        return ""
-
-
-def select(recording: xr.Dataset, setting: Setting) -> Effort:
-    """Return what the figures need; a signal that is not recorded leaves its figures undefined."""
-    t, _ = signal(recording, "time")
-    names = (setting.current, setting.power, setting.energy)
-    signals = (signal(recording, name)[0] if name in recording else None for name in names)
-    return Effort(t, *signals)
-
-
-@measure("A", needs=("current",))
-def peak_current(data: Effort) -> Array | Undefined:
+@measure("A")
+def peak_current(current: Samples | None) -> float | Undefined:
     """Largest magnitude of the motor current.
 
     Over the recorded samples; dither and ripple count.
     """
-    if data.current is None:
+    if current is None:
         return Undefined("no current is recorded")
-    return np.asarray(np.max(np.abs(data.current), axis=-1))
+    return max(max(current), -min(current))
 
 
-@measure("A", needs=("current",))
-def mean_current(data: Effort) -> Array | Undefined:
+@measure("A")
+def mean_current(t: Samples, current: Samples | None) -> float | Undefined:
     """Mean over time of the magnitude of the motor current.
 
     Trapezoidal rule over the samples. Dither that changes the current's sign counts in full.
     """
-    if data.current is None:
+    if current is None:
         return Undefined("no current is recorded")
-    return np.asarray(integral(data.t, np.abs(data.current)) / (data.t[-1] - data.t[0]))
+    magnitude = [abs(i) for i in current]
+    return integral(t, magnitude) / (t[-1] - t[0])
 
 
-@measure("W", needs=("power",))
-def peak_power(data: Effort) -> Array | Undefined:
+@measure("W")
+def peak_power(power: Samples | None) -> float | Undefined:
     """Largest electrical power drawn from battery or source.
 
     Signed: power fed back is negative. Over the recorded samples; dither and ripple count.
     """
-    if data.power is None:
+    if power is None:
         return Undefined("no electrical power is recorded")
-    return np.asarray(np.max(data.power, axis=-1))
+    return max(power)
 
 
-@measure("W", needs=("energy", "power"))
-def mean_power(data: Effort) -> Array | Undefined:
+@measure("W")
+def mean_power(t: Samples, energy: Samples | None, power: Samples | None) -> float | Undefined:
     """Energy drawn over the duration of the recording."""
-    drawn = _drawn(data)
-    return drawn if isinstance(drawn, Undefined) else drawn / (data.t[-1] - data.t[0])
+    joule = _drawn(t, energy, power)
+    return joule if isinstance(joule, Undefined) else joule / (t[-1] - t[0])
 
 
-@measure("J", needs=("energy", "power"))
-def energy(data: Effort) -> Array | Undefined:
+@measure("J")
+def energy(t: Samples, energy: Samples | None, power: Samples | None) -> float | Undefined:
     """Energy drawn from battery or source during the recording.
 
     The recorded energy at the end less that at the beginning; where no energy is recorded, the
     integral of the recorded power by the trapezoidal rule.
     """
-    return _drawn(data)
+    return _drawn(t, energy, power)
 
 
-def _drawn(data: Effort) -> Array | Undefined:
-    if data.energy is not None:
-        return np.asarray(data.energy[..., -1] - data.energy[..., 0])
-    if data.power is not None:
-        return integral(data.t, data.power)
+def _drawn(t: Samples, energy: Samples | None, power: Samples | None) -> float | Undefined:
+    if energy is not None:
+        return energy[-1] - energy[0]
+    if power is not None:
+        return integral(t, power)
     return Undefined("neither energy nor electrical power is recorded")

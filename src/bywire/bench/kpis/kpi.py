@@ -1,14 +1,14 @@
 """What a key figure is: a value with unit, definition and, where it is not defined, the reason.
 
-A family (one file) has a data class with what its figures need and one function per figure,
-declared with `measure`. A figure that is not defined for a recording is NaN with a reason in
-its note, never an exception and never a number that stands for something else. Where the recording
-leaves open what the figure is (nothing moved, or it still moves at the end), the figure is *open*:
-a requirement on it is undecided, neither met nor missed.
+A family (one file) has a data class ``Setting`` with what its figures need to know, and one
+function per figure, declared with `measure`. A figure that is not defined for a recording is NaN
+with a reason in its note, never an exception and never a number that stands for something else.
+Where the recording leaves open what the figure is (nothing moved, or it still moves at the end),
+the figure is *open*: a requirement on it is undecided, neither met nor missed.
 
-The functions of a family whose ``Setting`` declares ``BY_CASE`` take the signals of many cases as
-those of one: shape ``(..., n)``, time last. They give `Values`, NaN for the cases that do not
-define the figure. One run is the case without leading axes.
+A function takes samples (`bywire.bench.kpis.loop_family`), and then is the figure in C as well, for
+the many cases of a study and for pages. Or the family has a function ``select(recording,
+setting)``, whose `Data` the functions take: for figures that need NumPy or SciPy.
 """
 
 from __future__ import annotations
@@ -17,9 +17,7 @@ import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, SupportsFloat, TypeVar
-
-import numpy as np
+from typing import Any, Protocol, SupportsFloat
 
 from bywire.core.errors import unknown_name
 from bywire.core.typing import Array
@@ -141,60 +139,6 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class Why:
-    """Where a figure is not defined, and why.
-
-    Parameters
-    ----------
-    where
-        Cases without the figure, shape ``(...)``.
-    say
-        ``say(case)``: the reason for one of these.
-    is_open
-        Whether the recording leaves open what the figure is.
-    """
-
-    where: Any
-    say: Callable[[Any], str]
-    is_open: bool = False
-
-
-class Values:
-    """A figure of one case, or of many.
-
-    Parameters
-    ----------
-    values
-        Shape ``(...)``.
-    reasons
-        What makes a case undefined; of several the first is told.
-    """
-
-    def __init__(self, values: Any, *reasons: Why) -> None:
-        self.reasons = reasons
-        self.values = np.asarray(values, dtype=np.float64)
-        for why in reasons:
-            self.values = np.where(why.where, math.nan, self.values)
-
-    def reason(self, case: Any = ()) -> str:
-        """Return why the figure of a case is not defined; empty where it is."""
-        why = self._first(case)
-        return "" if why is None else why.say(case)
-
-    def is_open(self, case: Any = ()) -> bool:
-        """Return whether the recording of a case leaves open what the figure is."""
-        why = self._first(case)
-        return why is not None and why.is_open
-
-    def _first(self, case: Any) -> Why | None:
-        for why in self.reasons:
-            where = np.asarray(why.where)
-            if where[case] if where.ndim else where:
-                return why
-        return None
-
-
-@dataclass(frozen=True)
 class KpiOfCases:
     """A key figure of many cases; fields as of `Kpi`.
 
@@ -243,29 +187,28 @@ class Data(Protocol):
         ...
 
 
-D = TypeVar("D", bound=Data)
+Value = float | Undefined | Array
+"""what the function of a key figure gives"""
 
 
-class Measure(Generic[D]):
-    """A declared key figure; call it with its family's data to get a `Kpi`.
+class Measure:
+    """A declared key figure.
 
     Parameters
     ----------
     unit
         SI unit, ``"%"``, or a placeholder that the data resolve, for instance ``"level"``.
     function
-        Returns the value, or why there is none; of many cases their values, or `Values`. Its name
-        and its docstring's first line are the figure's name and definition.
+        Returns the value, or why there is none. Its name and its docstring's first line are the
+        figure's name and definition.
     needs
         Fields of the family's setting that name signals, one of which at least it needs; none
-        where the family cannot do without any of them.
+        where the family cannot do without any of them. Of a loop over samples its signature says
+        them: ``Samples | None``.
     """
 
     def __init__(
-        self,
-        unit: str,
-        function: Callable[[D], float | Undefined | Values | Array],
-        needs: tuple[str, ...] = (),
+        self, unit: str, function: Callable[..., Value], needs: tuple[str, ...] = ()
     ) -> None:
         self.name = function.__name__
         self.unit = unit
@@ -274,38 +217,37 @@ class Measure(Generic[D]):
         self.__doc__ = function.__doc__
         self.__wrapped__ = function
 
-    def __call__(self, data: D) -> Kpi:
-        """Return the figure; NaN with a reason where the data do not define it."""
-        return self.of_cases(data).case(())
-
-    def of_cases(self, data: D) -> KpiOfCases:
-        """Return the figure of all cases that the data hold."""
-        unit, note = data.units.get(self.unit, self.unit), data.note
-        value: Any = (
+    def __call__(self, data: Data) -> Kpi:
+        """Return the figure of what a family selects; NaN with a reason where it has none."""
+        value = (
             Undefined(data.defect, getattr(data, "is_open", False))
             if data.defect
             else self.__wrapped__(data)
         )
+        return self.kpi(value, data.units, data.note)
+
+    def kpi(self, value: Any, units: Mapping[str, str], note: str) -> Kpi:
+        """Return the figure of a value, or of why there is none.
+
+        Parameters
+        ----------
+        value
+            What the function gave.
+        units
+            SI unit of every placeholder.
+        note
+            How the data were treated.
+        """
+        unit, is_open = units.get(self.unit, self.unit), False
         if isinstance(value, Undefined):
-            reason = value.reason
-            value = Values(math.nan, Why(True, lambda _: reason, value.is_open))
-        figure = value if isinstance(value, Values) else Values(value)
-        return KpiOfCases(
-            self.name,
-            figure.values,
-            unit,
-            self.definition,
-            lambda k: figure.reason(k) or note,
-            figure.is_open,
-        )
+            value, note, is_open = math.nan, value.reason, value.is_open
+        return Kpi(self.name, float(value), unit, self.definition, note, is_open=is_open)
 
 
-def measure(
-    unit: str, needs: tuple[str, ...] = ()
-) -> Callable[[Callable[[D], float | Undefined | Values | Array]], Measure[D]]:
+def measure(unit: str, needs: tuple[str, ...] = ()) -> Callable[[Callable[..., Value]], Measure]:
     """Declare a function as a key figure with a unit, and what it needs; see `Measure`."""
 
-    def declare(function: Callable[[D], float | Undefined | Values | Array]) -> Measure[D]:
+    def declare(function: Callable[..., Value]) -> Measure:
         return Measure(unit, function, needs)
 
     return declare

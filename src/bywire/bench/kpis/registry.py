@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any
 
 import xarray as xr
 
-from bywire.bench.kpis.in_c import InC
 from bywire.bench.kpis.kpi import Kpi, Measure
+from bywire.bench.kpis.loop_family import LoopFamily
+from bywire.bench.kpis.samples import signal
+from bywire.core.errors import ModelError
 from bywire.core.registry import Kind
 
 
@@ -27,23 +28,22 @@ class Family:
         One line for listings.
     setting_class
         What the family needs to know beside the recording.
-    select
-        ``select(recording, setting)``: the family's data.
     measures
         Its figures by name, in the order of the file; each has ``name``, ``unit`` and
         ``definition``.
-    in_c, path
-        How its C is called, and where that is, with the figures in the same order; None where it
-        has none.
+    select
+        ``select(recording, setting)``: the data that its functions take; None where they loop over
+        samples.
+    loops
+        How those are run; None where there is ``select``.
     """
 
     name: str
     summary: str
     setting_class: type
-    select: Callable[[xr.Dataset, Any], Any]
-    measures: Mapping[str, Measure[Any]]
-    in_c: InC | None = None
-    path: Path = Path()
+    measures: Mapping[str, Measure]
+    select: Callable[[xr.Dataset, Any], Any] | None = None
+    loops: LoopFamily | None = None
 
 
 def _declared(module: ModuleType) -> Iterator[Family]:
@@ -52,18 +52,25 @@ def _declared(module: ModuleType) -> Iterator[Family]:
     if figures:
         summary = (module.__doc__ or "").strip().splitlines()[0]
         name = module.__name__.rpartition(".")[2]
-        path = Path(module.__file__ or "").with_suffix(".c")
-        in_c = getattr(module, "IN_C", None)
-        yield Family(name, summary, module.Setting, module.select, figures, in_c, path)
+        select = getattr(module, "select", None)
+        if not hasattr(module, "Setting"):
+            raise ModelError(
+                f"{module.__file__}: key figures need a data class Setting beside them, with the "
+                "names of their signals"
+            )
+        loops = None if select else LoopFamily(module)
+        if loops is not None and not module.__name__.startswith("bywire."):
+            loops.translate()  # so that its author sees a mistake at once, and not in a study
+        yield Family(name, summary, module.Setting, figures, select, loops)
 
 
 FAMILIES = Kind("family of key figures", ("kpis",), _declared, "bywire.bench.kpis")
 """every family of key figures"""
 
 
-def definitions() -> Mapping[str, Measure[Any]]:
+def definitions() -> Mapping[str, Measure]:
     """Return every key figure by name, for listings; names are unique over the families."""
-    known: dict[str, Measure[Any]] = {}
+    known: dict[str, Measure] = {}
     for each in FAMILIES.all().values():
         twice = known.keys() & each.measures.keys()
         if twice:
@@ -126,5 +133,30 @@ def evaluate(name: str, recording: xr.Dataset, setting: Any) -> dict[str, Kpi]:
         When a signal has more dimensions than time.
     """
     chosen = FAMILIES.find(name)
+    if chosen.loops is not None:
+        return _by_loops(chosen.loops, recording, setting)
+    assert chosen.select is not None
     data = chosen.select(recording, setting)
     return {figure.name: figure(data) for figure in chosen.measures.values()}
+
+
+def _by_loops(family: LoopFamily, recording: xr.Dataset, setting: Any) -> dict[str, Kpi]:
+    """Return the figures of one run; of a long one by C, where there is a compiler."""
+    t, _ = signal(recording, "time")
+    signals, level = family.signals_of(recording, setting)
+    if family.is_worth_c(t.size):
+        one = [None if y is None else y[None, :] for y in signals.values()]
+        made = family.in_c(t, one, [setting])
+        values: list[Any] = [
+            family.undefined(why, numbers) if why else value
+            for value, why, numbers in zip(
+                made.values[:, 0].tolist(), made.reasons[:, 0], made.numbers[:, 0], strict=True
+            )
+        ]
+    else:
+        lists = {name: None if y is None else y.tolist() for name, y in signals.items()}
+        values = list(family.in_python(t.tolist(), lists, setting).values())
+    return {
+        name: family.kpi(figure, value, setting, level)
+        for (name, figure), value in zip(family.measures.items(), values, strict=True)
+    }

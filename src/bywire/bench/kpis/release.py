@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from bisect import bisect_left
 from dataclasses import dataclass
-from functools import cached_property
-from typing import ClassVar
+from typing import NamedTuple
 
-import numpy as np
-import xarray as xr
+from bywire.bench.kpis.kpi import Undefined, measure
+from bywire.bench.kpis.loops import Samples
 
-from bywire.bench.kpis.kpi import Values, Why, measure
-from bywire.bench.kpis.samples import defect, sample, signal
-from bywire.core.typing import Array
+_ROUNDING = 1e-9  # s: of time zero
 
 
 @dataclass(frozen=True)
@@ -27,77 +24,46 @@ class Setting:
         Level below which it counts as released, in its SI unit.
     """
 
-    BY_CASE: ClassVar[tuple[str, ...]] = ("empty",)
-
     signal: str
     empty: float
 
 
-@dataclass(frozen=True, eq=False)
-class Release:
-    """A signal from the release on: times [s], values, its SI unit, and the level of `Setting`.
+class Release(NamedTuple):
+    """A signal from time zero on."""
 
-    Times and values of shapes ``(n,)`` and ``(..., n)``, the level ``(...)``.
-    """
-
-    t: Array
-    y: Array
-    empty: float | Array
-    unit: str = "1"
-
-    @property
-    def units(self) -> Mapping[str, str]:
-        """Unit of the signal."""
-        return {"level": self.unit}
-
-    @cached_property
-    def defect(self) -> str:
-        """Why no figure is defined."""
-        return defect(self.t, self.y)
-
-    @property
-    def note(self) -> str:
-        """Nothing is treated."""
-        return ""
+    t: Samples
+    y: Samples
 
 
-def select(recording: xr.Dataset, setting: Setting) -> Release:
-    """Return the signal from time zero on.
-
-    Raises
-    ------
-    UnknownNameError
-        When the recording does not hold it.
-    """
-    t, _ = signal(recording, "time")
-    y, unit = signal(recording, setting.signal)
-    first = int(np.searchsorted(t, -1e-9))
-    return Release(t[first:], y[..., first:], setting.empty, unit)
+def released(t: Samples, signal: Samples) -> Release | Undefined:
+    """Signal from time zero on."""
+    first = bisect_left(t, -_ROUNDING)
+    rows = len(t) - first
+    if rows < 2:
+        return Undefined(f"{rows} samples are too few: two at least are needed")
+    return Release(t[first:], signal[first:])
 
 
 @measure("s")
-def time_to_empty(data: Release) -> Values:
+def time_to_empty(released: Release, setting: Setting) -> float | Undefined:
     """Time from the release until the output stays below the level that counts as empty.
 
     Interpolated between the last sample above it and the next one.
     """
-    t, y, last = data.t, data.y, data.t.size - 1
-    above = y > np.asarray(data.empty)[..., None]
-    k = last - np.argmax(above[..., ::-1], axis=-1)
-    full = above[..., -1]
-    k = np.where(full, 0, np.minimum(k, last - 1))
-    here, there = sample(y, k), sample(y, k + 1)
-    with np.errstate(all="ignore"):  # where it never was above
-        share = (here - data.empty) / (here - there)
-        left = t[k] + share * (t[k + 1] - t[k])
-    return Values(
-        left,
-        Why(full, lambda _: "it does not empty in the recorded time"),
-        Why(~above.any(axis=-1), lambda _: "it was empty already at the release", is_open=True),
-    )
+    t = released.t
+    y = released.y
+    k = len(t) - 1
+    while k >= 0 and not y[k] > setting.empty:
+        k -= 1
+    if k == len(t) - 1:
+        return Undefined("it does not empty in the recorded time")
+    if k < 0:
+        return Undefined("it was empty already at the release", is_open=True)
+    share = (y[k] - setting.empty) / (y[k] - y[k + 1])
+    return t[k] + share * (t[k + 1] - t[k])
 
 
 @measure("level")
-def residual_level(data: Release) -> Array:
+def residual_level(released: Release) -> float:
     """Output at the end of the recording."""
-    return np.asarray(data.y[..., -1])
+    return released.y[-1]

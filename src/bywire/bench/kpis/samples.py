@@ -1,13 +1,11 @@
-"""Samples of signals, time last: how they come out of a recording, and what they add up to."""
+"""Samples of signals: how they come out of a recording, and whether they are sound."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from bywire.bench.kpis.loops import defect_of_signal, defect_of_times
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
 
@@ -48,37 +46,12 @@ def defect(t: Array, *signals: Array) -> str:
     t
         Times [s], shape ``(n,)``.
     signals
-        Signals over these times, shape ``(..., n)`` each.
+        Signals over these times, shape ``(n,)`` each.
     """
-    if t.size < 2:
-        return f"{t.size} samples are too few: two at least are needed"
-    if not np.all(np.isfinite(t)) or np.any(np.diff(t) <= 0):
-        return "the times do not increase"
+    times = t.tolist()
+    wrong = defect_of_times(times)
     for values in signals:
-        if values.shape[-1:] != t.shape:
+        if values.shape != t.shape:
             return f"{values.size} values do not fit {t.size} times"
-        sound = np.isfinite(values)
-        if not sound.all():
-            return f"not a number at {t[np.argwhere(~sound)[:, -1].min()]:g} s"
-    return ""
-
-
-def integral(t: Array, y: Array) -> Array:
-    """Return the integral over time by the trapezoidal rule, exact for straight pieces.
-
-    ``t``, ``y``: shapes ``(n,)`` and ``(..., n)``; the integral has ``(...)``.
-    """
-    return total(0.5 * (y[..., 1:] + y[..., :-1]) * np.diff(t))
-
-
-def total(y: Array) -> Array:
-    """Return the sum of the samples in the order of time, so that every machine rounds alike.
-
-    ``y``: shape ``(..., n)``, n >= 1; the sum has ``(...)``.
-    """
-    return np.asarray(np.cumsum(y, axis=-1)[..., -1])
-
-
-def sample(y: Array, k: NDArray[np.integer[Any]]) -> Array:
-    """Return the sample of each case at its index; shapes ``(..., n)`` and ``(...)``."""
-    return np.asarray(np.take_along_axis(y, k[..., None], axis=-1)[..., 0])
+        wrong = wrong or defect_of_signal(times, values.tolist())
+    return "" if wrong is None else wrong.reason

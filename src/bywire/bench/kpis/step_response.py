@@ -13,20 +13,14 @@ point, none of the figures is.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, ClassVar
+from bisect import bisect_left, bisect_right
+from dataclasses import dataclass
+from math import isfinite
+from typing import NamedTuple
 
-import numpy as np
-import xarray as xr
-
-from bywire.bench.kpis.in_c import UNSOUND, InC
-from bywire.bench.kpis.kpi import Undefined, Values, Why, measure
-from bywire.bench.kpis.samples import defect, integral, sample, signal, total
-from bywire.bench.kpis.smoothing import smoothed, treatment
-from bywire.core.typing import Array
+from bywire.bench.kpis.kpi import Undefined, measure
+from bywire.bench.kpis.loops import Samples, integral, moving_average, total, value_at
+from bywire.bench.kpis.smoothing import treatment
 
 _DEAD, _BAND = 0.05, 0.02  # of the step height: end of the dead time; half settling band
 _MOVING = 0.02  # of the step height, between both halves of the window of the steady state
@@ -37,8 +31,6 @@ _SETTLED = 0.1  # of the time after the step: must lie inside the band, else not
 @dataclass(frozen=True)
 class Setting:
     """What the step was, and how to look at its response.
-
-    The levels may differ between cases that are judged together: shape ``(...)`` then.
 
     Parameters
     ----------
@@ -57,8 +49,6 @@ class Setting:
         Name of the set point in the recording, for figures; empty where none is recorded.
     """
 
-    BY_CASE: ClassVar[tuple[str, ...]] = ("start", "end")
-
     signal: str
     t_step: float
     start: float | None = None
@@ -67,209 +57,107 @@ class Setting:
     smoothing: float = 0.0
     set_point: str = ""
 
-
-def _packed(setting: Setting, cases: int) -> Array:
-    """Return the setting as the C takes it: what the step was, then levels of each case."""
-    levels = np.full((cases, 2), math.nan)
-    for column, level in enumerate((setting.start, setting.end)):
-        levels[:, column] = math.nan if level is None else level
-    given = [float(each is not None) for each in (setting.start, setting.end, setting.window)]
-    step = (setting.t_step, setting.smoothing, *given, *(setting.window or (0.0, 0.0)))
-    return np.concatenate((step, levels.ravel()))
+    @property
+    def note(self) -> str:
+        """How the samples are treated."""
+        return treatment(self.smoothing)
 
 
-IN_C = InC(
-    signals=("signal",),
-    reasons=(
-        "the step height is zero",
-        "the response changes by less than its ripple: no step is seen",
-        "never gets as far",
-        "there already at the step",
-        "never settles",
-        "enters the band only shortly before the recording ends",
-        "no set point is given",
-        "the steady state's window holds < 2 samples",
-        "the response does not move",
-        "the response still moves at the end",
-        "ends short of the set point and never exceeds it",
-    ),
-    open=(1, 2, 6, 9, 10, 11),
-    failures=(
-        UNSOUND,
-        "the step is outside the recording",
-        "the steady state's window holds < 2 samples",
-    ),
-    packed=_packed,
-    note=lambda setting: treatment(setting.smoothing),
-    room=8,
-)
-
-
-@dataclass(frozen=True, eq=False)
-class StepResponse:
+class Response(NamedTuple):
     """A response from the step on.
 
-    Parameters
-    ----------
-    t, y
-        Times [s], increasing from the instant of the step, shape ``(n,)``, and response,
-        ``(..., n)``.
-    start, end, unit
-        Levels of 0 % and 100 %, shape ``(...)``, and the response's SI unit.
-    window
-        Beginning and end [s] of the steady state; None for the last 20 %.
-    is_tracking
-        Whether ``end`` is a set point; else there is no steady-state error.
-    note, problem
-        How the samples were treated; why nothing is defined, as found in them.
+    ``t`` and ``z``: times from the instant of the step, and the response with 0 at ``start`` and 1
+    at ``end``; ``most``: how far it ever goes from its first level. In the window of the steady
+    state, ``low`` to ``high``: its mean, the band that it fills, and by how much it still moves.
     """
 
-    t: Array
-    y: Array
-    start: Any
-    end: Any
-    unit: str = "1"
-    window: tuple[float, float] | None = None
-    is_tracking: bool = True
-    note: str = ""
-    problem: str = ""
-
-    @property
-    def units(self) -> Mapping[str, str]:
-        """Unit of the response."""
-        return {"level": self.unit}
-
-    @cached_property
-    def defect(self) -> str:
-        """Why no figure is defined."""
-        return self.problem or defect(self.t, self.y)
-
-    @cached_property
-    def flat(self) -> Why:
-        """Where the step height is zero."""
-        start, end = np.asarray(self.start), np.asarray(self.end)
-        height = np.abs(end - start)
-        least = 1e-12 * np.maximum(np.abs(start), np.abs(end))
-        return Why(
-            ~np.isfinite(height) | (height <= least),
-            lambda c: f"the step height is zero ({_at(start, c):g} to {_at(end, c):g})",
-            is_open=True,
-        )
-
-    @cached_property
-    def still(self) -> Why:
-        """Where the response never leaves its first level by more than 5 % of the step height."""
-        height = np.abs(np.asarray(self.end) - np.asarray(self.start))
-        way, unit = np.asarray(np.max(np.abs(self.y - self.y[..., :1]), axis=-1)), self.unit
-        return Why(
-            way <= _DEAD * height,
-            lambda c: (
-                f"the response does not move: {_at(way, c):.3g} of a step of "
-                f"{_at(height, c):.3g} {unit} at most"
-            ),
-            is_open=True,
-        )
-
-    @cached_property
-    def blind(self) -> tuple[Why, ...]:
-        """Where there is no step to be seen, and why."""
-        if self.is_tracking:
-            return (self.flat, self.still)
-        height = np.abs(np.asarray(self.end) - np.asarray(self.start))
-        inside = self.y if isinstance(self.steady, Undefined) else self.steady[1]
-        text = "the response changes by less than its ripple: no step is seen"
-        calm = Why(height <= np.ptp(inside, axis=-1), lambda _: text, is_open=True)
-        return (self.flat, self.still, calm, self.unsteady)
-
-    @cached_property
-    def unsteady(self) -> Why:
-        """Where the response still moves in the window of the steady state.
-
-        The means of both halves of the window, of as many intervals each, differ by more than 2 %
-        of the step height, or the extremes of the later half go beyond those of the earlier one by
-        more than that. Ripple of several periods does neither.
-        """
-        height = np.abs(np.asarray(self.end) - np.asarray(self.start))
-        none = Why(np.zeros(height.shape, dtype=bool), lambda _: "")
-        if isinstance(self.steady, Undefined):
-            return none
-        t, y = self.steady
-        k = (t.size - 1) // 2
-        if k < 1:
-            return none
-        halves = [(t[: k + 1], y[..., : k + 1]), (t[t.size - 1 - k :], y[..., t.size - 1 - k :])]
-        (first, low, high), (then, lower, higher) = (
-            (integral(s, z) / (s[-1] - s[0]), np.min(z, axis=-1), np.max(z, axis=-1))
-            for s, z in halves
-        )
-        drift = np.maximum(np.abs(then - first), np.maximum(low - lower, higher - high))
-        return Why(
-            (drift > _MOVING * height) & ~self.flat.where,
-            lambda c: (
-                "the response still moves at the end: by "
-                f"{100 * _at(drift, c) / _at(height, c):.3g} % of the step height in the window of "
-                "the steady state; record longer"
-            ),
-            is_open=True,
-        )
-
-    @cached_property
-    def course(self) -> Array:
-        """The response with 0 at ``start`` and 1 at ``end``; nothing else where `blind`."""
-        start = np.asarray(self.start)[..., None]
-        height = np.asarray(self.end)[..., None] - start
-        with np.errstate(all="ignore"):
-            return np.asarray((self.y - start) / height)
-
-    @cached_property
-    def steady(self) -> tuple[Array, Array] | Undefined:
-        """Times and values in the window of the steady state."""
-        t, last = self.t, float(self.t[-1])
-        a, b = self.window or (last - _LAST * (last - float(t[0])), last)
-        inside = slice(np.searchsorted(t, a), np.searchsorted(t, b, side="right"))
-        if t[inside].size < 2:
-            return Undefined(f"the steady state's window, {a:g} to {b:g} s, holds < 2 samples")
-        return t[inside], self.y[..., inside]
+    t: Samples
+    z: Samples
+    start: float
+    end: float
+    is_tracking: bool
+    most: float
+    low: float
+    high: float
+    has_window: bool
+    mean: float
+    band: float
+    drift: float
 
 
-def select(recording: xr.Dataset, setting: Setting) -> StepResponse:
-    """Return the response from the step on.
-
-    Raises
-    ------
-    UnknownNameError
-        When the recording does not hold the signal.
-    """
-    t, _ = signal(recording, "time")
-    raw, unit = signal(recording, setting.signal)
-    whole = StepResponse(t, raw, math.nan, math.nan, unit, setting.window)
-    problem = whole.defect
-    if not problem and not t[0] <= setting.t_step < t[-1]:
-        problem = f"the step at {setting.t_step:g} s is outside {t[0]:g} to {t[-1]:g} s"
-    if problem:
-        return replace(whole, problem=problem)
-    y = smoothed(t, raw, setting.smoothing)
-    first = int(np.searchsorted(t, setting.t_step, side="right"))
-    begins = _between(t, y, setting.t_step)[..., None]
-    after = replace(
-        whole,
-        t=np.append(setting.t_step, t[first:]),
-        y=np.concatenate((begins, y[..., first:]), axis=-1),
-        is_tracking=setting.end is not None,
-        note=treatment(setting.smoothing),
-    )
-    start: Any = setting.start
-    end: Any = _mean(after) if setting.end is None else setting.end
+def response(t: Samples, signal: Samples, setting: Setting) -> Response | Undefined:
+    """Response from the step on."""
+    y = moving_average(t, signal, setting.smoothing) if setting.smoothing > 0.0 else signal
+    start = setting.start
     if start is None:
-        before = y[..., : np.searchsorted(t, setting.t_step - 0.5 * setting.smoothing)]
-        start = total(before) / before.shape[-1] if before.size else after.y[..., 0]
-    if isinstance(end, Undefined):
-        return replace(after, problem=end.reason)
-    return replace(after, start=start, end=end)
+        start = level_before(t, y, setting.t_step, setting.smoothing)
+    return response_from(t, y, setting.t_step, start, setting.end, setting.window)
+
+
+def level_before(t: Samples, y: Samples, t_step: float, smoothing: float) -> float:
+    """Mean of a response, an average over a period, before a step; else where it is then."""
+    before = bisect_left(t, t_step - 0.5 * smoothing)
+    return total(y[:before]) / before if before > 0 else value_at(t, y, t_step)
+
+
+def response_from(
+    t: Samples,
+    y: Samples,
+    t_step: float,
+    start: float,
+    set_point: float | None,
+    window: tuple[float, float] | None,
+) -> Response | Undefined:
+    """Response from the step on, between two levels; the second one is its own without set point.
+
+    Its window of the steady state is the last 20 % where none is given.
+    """
+    last = t[-1]
+    if not t[0] <= t_step < last:
+        return Undefined(f"the step at {t_step:g} s is outside {t[0]:g} to {last:g} s")
+    here = bisect_right(t, t_step) - 1
+    times = list(t[here:])
+    levels = list(y[here:])
+    times[0] = t_step  # the step's instant takes the place of the sample before it
+    levels[0] = value_at(t, y, t_step)
+    low = last - _LAST * (last - t_step) if window is None else window[0]
+    high = last if window is None else window[1]
+    begin = bisect_left(times, low)
+    end = bisect_right(times, high)
+    has_window = end - begin >= 2
+    mean = 0.0
+    band = 0.0
+    drift = 0.0
+    if has_window:
+        inside = times[begin:end]
+        steady = levels[begin:end]
+        mean = integral(inside, steady) / (inside[-1] - inside[0])
+        band = max(steady) - min(steady)
+        drift = _drift(inside, steady)
+    elif set_point is None:
+        return _without_window(low, high)
+    final = mean if set_point is None else set_point
+    height = final - start if _has_height(start, final) else 1.0
+    z = [(level - start) / height for level in levels]
+    most = max(max(levels) - levels[0], levels[0] - min(levels))
+    return Response(
+        times,
+        z,
+        start,
+        final,
+        set_point is not None,
+        most,
+        low,
+        high,
+        has_window,
+        mean,
+        band,
+        drift,
+    )
 
 
 @measure("s")
-def dead_time(response: StepResponse) -> Values:
+def dead_time(response: Response) -> float | Undefined:
     """Time from the step until the response first reaches 5 % of the step height.
 
     A first-order lag without dead time shows 0.051 of its time constant here.
@@ -278,68 +166,72 @@ def dead_time(response: StepResponse) -> Values:
 
 
 @measure("s")
-def rise_time(response: StepResponse) -> Values:
+def rise_time(response: Response) -> float | Undefined:
     """Time between the first crossings of 10 % and of 90 % of the step height."""
-    low, high = _first(response, 0.1), _first(response, 0.9)
-    return Values(high.values - low.values, *low.reasons, *high.reasons)
+    low = _first(response, 0.1)
+    high = _first(response, 0.9)
+    if isinstance(low, Undefined):
+        return low
+    if isinstance(high, Undefined):
+        return high
+    return high - low
 
 
 @measure("s")
-def settling_time(response: StepResponse) -> Values:
+def settling_time(response: Response) -> float | Undefined:
     """Time from the step to the last entry into the band of 2 % of the step height around its end.
 
     The entry is interpolated. Not defined when it falls into the last tenth of the time after
     the step, where a longer recording could show another one. Ripple of more than 4 % peak to
     peak never settles, nor does a steady-state error of more than 2 %.
     """
-    t, z = response.t, response.course
-    last = t.size - 1
-    outside = np.abs(z - 1.0) > _BAND
-    k = np.minimum(last - np.argmax(outside[..., ::-1], axis=-1), last - 1)
-    here, there = sample(z, k), sample(z, k + 1)
-    with np.errstate(all="ignore"):  # where nothing lies outside
-        edge = 1.0 + np.copysign(_BAND, here - 1.0)
-        entry = t[k] + (edge - here) / (there - here) * (t[k + 1] - t[k])
-    strayed = outside.any(axis=-1)
-    late = strayed & (entry > t[-1] - _SETTLED * (t[-1] - t[0]))
-    return Values(
-        np.where(strayed, entry - t[0], 0.0),
-        *response.blind,
-        Why(
-            outside[..., -1],
-            lambda c: f"never settles: {100 * z[c][-1]:.4g} % of the step height at the end",
-        ),
-        Why(
-            late,
-            lambda c: (
-                f"enters the band only {t[-1] - entry[c]:.3g} s before the recording ends: "
-                "record longer"
-            ),
+    unseen = why_unseen(response)
+    if unseen is not None:
+        return unseen
+    t = response.t
+    z = response.z
+    k = len(z) - 1
+    while k >= 0 and not abs(z[k] - 1.0) > _BAND:
+        k -= 1
+    if k == len(z) - 1:
+        return Undefined(f"never settles: {100.0 * z[-1]:.4g} % of the step height at the end")
+    if k < 0:
+        return 0.0
+    edge = 1.0 - _BAND if z[k] < 1.0 else 1.0 + _BAND
+    entry = t[k] + (edge - z[k]) / (z[k + 1] - z[k]) * (t[k + 1] - t[k])
+    if entry > t[-1] - _SETTLED * (t[-1] - t[0]):
+        return Undefined(
+            f"enters the band only {t[-1] - entry:.3g} s before the recording ends: record longer",
             is_open=True,
-        ),
-    )
+        )
+    return entry - t[0]
 
 
 @measure("%")
-def overshoot(response: StepResponse) -> Values:
+def overshoot(response: Response) -> float | Undefined:
     """Largest excess of the response over the step's end, in % of the step height.
 
     The largest sample counts. It is 0 where the end is never exceeded; a response that does not
     even settle there leaves open whether it would overshoot.
     """
-    z = response.course
-    excess = np.max(z, axis=-1) - 1.0
-    short = Why(
-        (np.abs(z[..., -1] - 1.0) > _BAND) & (excess <= 0.0),
-        lambda c: f"never exceeds the set point, and ends at {100 * z[c][-1]:.4g} % of the step",
-        is_open=True,
-    )
-    reasons = (*response.blind, response.unsteady, short)
-    return Values(100.0 * np.maximum(0.0, excess), *reasons)
+    unseen = why_unseen(response)
+    if unseen is not None:
+        return unseen
+    moving = _why_unsteady(response)
+    if moving is not None:
+        return moving
+    excess = max(response.z) - 1.0
+    last = response.z[-1]
+    if abs(last - 1.0) > _BAND and excess <= 0.0:
+        return Undefined(
+            f"never exceeds the set point, and ends at {100.0 * last:.4g} % of the step",
+            is_open=True,
+        )
+    return 100.0 * max(0.0, excess)
 
 
 @measure("level")
-def steady_state_error(response: StepResponse) -> Values | Undefined:
+def steady_state_error(response: Response) -> float | Undefined:
     """Magnitude of the set point minus the mean response in the window of the steady state.
 
     Trapezoidal mean over the window's samples, by default the last 20 % of the time after the
@@ -347,71 +239,126 @@ def steady_state_error(response: StepResponse) -> Values | Undefined:
     """
     if not response.is_tracking:
         return Undefined("no set point is given")
-    mean = _mean(response)
-    if isinstance(mean, Undefined):
-        return mean
-    return Values(np.abs(response.end - mean), response.unsteady)
+    if not response.has_window:
+        return _without_window(response.low, response.high)
+    moving = _why_unsteady(response)
+    if moving is not None:
+        return moving
+    return abs(response.end - response.mean)
 
 
 @measure("level")
-def ripple(response: StepResponse) -> Values | Undefined:
+def ripple(response: Response) -> float | Undefined:
     """Peak to peak of the response in the window of the steady state.
 
     Largest minus smallest sample. Smoothing removes the ripple of its own period from this figure
     too.
     """
-    steady = response.steady
-    if isinstance(steady, Undefined):
-        return steady
-    motionless = (response.still,) if response.is_tracking else (response.flat, response.still)
-    return Values(np.ptp(steady[1], axis=-1), *motionless, response.unsteady)
+    if not response.has_window:
+        return _without_window(response.low, response.high)
+    flat = _why_flat(response)
+    if flat is not None and not response.is_tracking:
+        return flat
+    still = _why_still(response)
+    if still is not None:
+        return still
+    moving = _why_unsteady(response)
+    if moving is not None:
+        return moving
+    return response.band
 
 
-def _first(response: StepResponse, level: float) -> Values:
-    """Return the time from the step to the first crossing of a level."""
-    t, z = response.t, response.course
-    reached = z >= level
-    k = np.argmax(reached, axis=-1)
-    before = np.maximum(k - 1, 0)
-    below, above = sample(z, before), sample(z, k)
-    with np.errstate(all="ignore"):  # where it is never reached
-        share = (level - below) / (above - below)
-        time = t[before] + share * (t[k] - t[before]) - t[0]
-    return Values(
-        time,
-        *response.blind,
-        Why(
-            ~reached.any(axis=-1),
-            lambda c: (
-                f"never reaches {100 * level:g} % of the step height: "
-                f"{100 * np.max(z[c]):.4g} % at most"
-            ),
-        ),
-        Why(
-            k == 0,
-            lambda c: f"already at {100 * z[c][0]:.4g} % of the step height at the step",
-        ),
+def why_unseen(response: Response) -> Undefined | None:
+    """Why there is no step to be seen; None where there is one."""
+    flat = _why_flat(response)
+    if flat is not None:
+        return flat
+    still = _why_still(response)
+    if still is not None or response.is_tracking:
+        return still
+    if abs(response.end - response.start) <= response.band:
+        return Undefined(
+            "the response changes by less than its ripple: no step is seen", is_open=True
+        )
+    return _why_unsteady(response)
+
+
+def _why_flat(response: Response) -> Undefined | None:
+    """That the step height is zero, or not known."""
+    if _has_height(response.start, response.end):
+        return None
+    return Undefined(
+        f"the step height is zero ({response.start:g} to {response.end:g})", is_open=True
     )
 
 
-def _mean(response: StepResponse) -> Array | Undefined:
-    """Return the mean over time in the window of the steady state."""
-    steady = response.steady
-    if isinstance(steady, Undefined):
-        return steady
-    t, y = steady
-    return np.asarray(integral(t, y) / (t[-1] - t[0]))
+def _why_still(response: Response) -> Undefined | None:
+    """That the response never leaves its first level by more than 5 % of the step height."""
+    height = abs(response.end - response.start)
+    if not response.most <= _DEAD * height:
+        return None
+    return Undefined(
+        f"the response does not move: {response.most:.3g} of a step of {height:.3g} {{level}} at "
+        "most",
+        is_open=True,
+    )
 
 
-def _between(t: Array, y: Array, at: float) -> Array:
-    """Return the response of each case at an instant within its times, as `numpy.interp` does."""
-    k = int(np.searchsorted(t, at, side="right")) - 1
-    here, there = y[..., k], y[..., k + 1]
-    if t[k] == at:
-        return np.asarray(here)
-    return np.asarray((there - here) / (t[k + 1] - t[k]) * (at - t[k]) + here)
+def _why_unsteady(response: Response) -> Undefined | None:
+    """That the response still moves in the window of the steady state.
+
+    The means of both halves of the window, of as many intervals each, differ by more than 2 % of
+    the step height, or the extremes of the later half go beyond those of the earlier one by more
+    than that. Ripple of several periods does neither.
+    """
+    height = abs(response.end - response.start)
+    if not _has_height(response.start, response.end) or not response.drift > _MOVING * height:
+        return None
+    return Undefined(
+        "the response still moves at the end: by "
+        f"{100.0 * response.drift / height:.3g} % of the step height in the window of the steady "
+        "state; record longer",
+        is_open=True,
+    )
 
 
-def _at(level: Array, case: Any) -> float:
-    """Return a level that is that of all cases, or one of each."""
-    return float(level[case] if level.ndim else level)
+def _without_window(low: float, high: float) -> Undefined:
+    return Undefined(f"the steady state's window, {low:g} to {high:g} s, holds < 2 samples")
+
+
+def _has_height(start: float, end: float) -> bool:
+    """Whether two levels are apart."""
+    height = end - start
+    return isfinite(height) and abs(height) > 1e-12 * max(abs(start), abs(end))
+
+
+def _drift(t: Samples, y: Samples) -> float:
+    """How far a response moves from one half of a window to the other: by means, or by extremes."""
+    k = (len(t) - 1) // 2
+    if k < 1:
+        return 0.0
+    early = y[: k + 1]
+    late = y[len(t) - 1 - k :]
+    first = integral(t[: k + 1], early) / (t[k] - t[0])
+    then = integral(t[len(t) - 1 - k :], late) / (t[-1] - t[len(t) - 1 - k])
+    return max(abs(then - first), max(min(early) - min(late), max(late) - max(early)))
+
+
+def _first(response: Response, level: float) -> float | Undefined:
+    """Time from the step to the first crossing of a level."""
+    unseen = why_unseen(response)
+    if unseen is not None:
+        return unseen
+    t = response.t
+    z = response.z
+    k = 0
+    while k < len(z) and not z[k] >= level:
+        k += 1
+    if k == len(z):
+        return Undefined(
+            f"never reaches {100.0 * level:g} % of the step height: {100.0 * max(z):.4g} % at most"
+        )
+    if k == 0:
+        return Undefined(f"already at {100.0 * z[0]:.4g} % of the step height at the step")
+    share = (level - z[k - 1]) / (z[k] - z[k - 1])
+    return t[k - 1] + share * (t[k] - t[k - 1]) - t[0]

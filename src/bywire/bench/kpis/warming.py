@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.kpi import Undefined, Values, Why, measure
-from bywire.bench.kpis.samples import defect, integral, signal, total
+from bywire.bench.kpis.kpi import Undefined, measure
+from bywire.bench.kpis.loops import integral, total
+from bywire.bench.kpis.samples import defect, signal
 from bywire.core.typing import Array
 
 
@@ -29,8 +29,6 @@ class Setting:
         The mode of the ECU.
     """
 
-    BY_CASE: ClassVar[tuple[str, ...]] = ()
-
     output: str
     winding: str = "T_winding"
     derated: str = "derated"
@@ -45,13 +43,13 @@ class Warming:
     t
         Times [s], increasing, shape ``(n,)``.
     output
-        What the motors bring about, in SI, shape ``(..., n)``.
+        What the motors bring about, in SI, shape ``(n,)``.
     unit
         Its unit.
     winding
-        Temperature of the hottest winding [K], shape ``(..., n)``, or None where no motor warms up.
+        Temperature of the hottest winding [K], shape ``(n,)``, or None where no motor warms up.
     derated
-        1 while motors are derated, else 0; shape ``(..., n)``, or None where it is not recorded.
+        1 while motors are derated, else 0; shape ``(n,)``, or None where it is not recorded.
     """
 
     t: Array
@@ -90,45 +88,45 @@ def select(recording: xr.Dataset, setting: Setting) -> Warming:
 
 
 @measure("K", needs=("winding",))
-def peak_winding(data: Warming) -> Array | Undefined:
+def peak_winding(data: Warming) -> float | Undefined:
     """Highest temperature of a motor's winding."""
     if data.winding is None:
         return Undefined("no temperature of a winding is recorded")
-    return np.asarray(np.max(data.winding, axis=-1))
+    return float(np.max(data.winding))
 
 
 @measure("K", needs=("winding",))
-def final_winding(data: Warming) -> Array | Undefined:
+def final_winding(data: Warming) -> float | Undefined:
     """Temperature of the hottest winding at the end."""
     if data.winding is None:
         return Undefined("no temperature of a winding is recorded")
-    return np.asarray(data.winding[..., -1])
+    return float(data.winding[-1])
 
 
 @measure("s", needs=("derated",))
-def time_derated(data: Warming) -> Array | Undefined:
+def time_derated(data: Warming) -> float | Undefined:
     """Time in which the motor's current is limited for its temperature.
 
     Trapezoidal integral of the mode's samples: a change counts as halfway between two samples.
     """
     if data.derated is None:
         return Undefined("the mode 'derated' is not recorded")
-    return integral(data.t, data.derated)
+    return integral(data.t.tolist(), data.derated.tolist())
 
 
 @measure("s", needs=("derated",))
-def derated_after(data: Warming) -> Array | Values | Undefined:
+def derated_after(data: Warming) -> float | Undefined:
     """Time of the first sample in which the motor is derated."""
     if data.derated is None:
         return Undefined("the mode 'derated' is not recorded")
     on = data.derated > 0.5
-    first = data.t[np.argmax(on, axis=-1)]
-    never = Why(~np.any(on, axis=-1), lambda _: "the motor is never derated", is_open=True)
-    return Values(first, never)
+    if not on.any():
+        return Undefined("the motor is never derated", is_open=True)
+    return float(data.t[np.argmax(on)])
 
 
 @measure("level")
-def final_output(data: Warming) -> Array | Undefined:
+def final_output(data: Warming) -> float:
     """Mean of the output in the last tenth of the time."""
     late = data.t >= data.t[-1] - 0.1 * (data.t[-1] - data.t[0])
-    return np.asarray(total(data.output[..., late]) / np.count_nonzero(late))
+    return total(data.output[late].tolist()) / np.count_nonzero(late)

@@ -11,7 +11,6 @@ from bywire.analysis.loop import Quantity
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current, memory_at, state_at
-from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 
 _PRESSURE = Quantity("pressure", "Pa", 20e5)
@@ -37,17 +36,9 @@ def linear(
     driven = cast(MotorcycleParameters, par.replace(changes))
     # The holding current is proportional to the pressure.
     p = at.value / holding_current(1.0, driven) if at.quantity is _CURRENT else at.value
-    if not p > 0.0:
-        raise ParameterError(
-            f"{at.quantity.name} = {at.value:g} {at.quantity.unit} is no operating point: it must "
-            f"be > 0 {at.quantity.unit}"
-        )
-    try:
+    at.quantity.require_positive(at.value)
+    with at.named(unless=_PRESSURE):
         state = state_at(p, driven)._replace(omega=at.speed)
-    except ParameterError as error:
-        if at.quantity is _PRESSURE:
-            raise
-        raise ParameterError(f"current = {at.value:g} A is no operating point: {error}") from None
     whole = linearize(
         MotorcycleBrake(),
         driven,

@@ -69,12 +69,9 @@ TWO_WHEELER_PADS = Life(
     experiment="straight-stop",
     wear=WearParameters,
     values={
-        "pads.kappa_0": chosen(3.6e-14, "180 cm^3 of pad over about 5 GJ: a car's front axle"),
-        "pads.T_hot": chosen(503.0, "230 degC, as usual of organic linings"),
-        "pads.T_act": chosen(2760.0, "four times the wear at 400 degC"),
+        **{f"pads.{name}": value for name, value in warm_stops.ORGANIC_LINING.items()},
         "pads.n_pads": chosen(4.0, "two discs"),
         "pads.A_pad": chosen(20e-4, "front pads of a sport motorcycle"),
-        "pads.E_pad": chosen(5e8, "the order of organic linings under load"),
         "disc.C_d": derived(1.36e3, "60 K by a stop from 100 km/h, 80 % of it in front"),
         "disc.tau_d": chosen(60.0, "from 80 to 57 degC in 30 s of driving"),
         "h_new": chosen(4.5e-3, "lining of a sport motorcycle's pad"),

@@ -129,12 +129,9 @@ WEDGE_PADS = Life(
     experiment="corner-stop",
     wear=WearParameters,
     values={
-        "pads.kappa_0": chosen(3.6e-14, "180 cm^3 of pad over about 5 GJ: a car's front axle"),
-        "pads.T_hot": chosen(503.0, "230 degC, as usual of organic linings"),
-        "pads.T_act": chosen(2760.0, "four times the wear at 400 degC"),
+        **{f"pads.{name}": value for name, value in warm_stops.ORGANIC_LINING.items()},
         "pads.n_pads": chosen(2.0, "a floating caliper"),
         "pads.A_pad": chosen(50e-4, "front pads of a mid-size car"),
-        "pads.E_pad": chosen(5e8, "the order of organic linings under load"),
         "disc.C_d": chosen(3.4e3, "7 kg of cast iron"),
         "disc.tau_d": chosen(300.0, "minutes, in the wind of driving"),
         "mechanism": chosen("teeth", "without one the travel ends after some 280 stops"),

@@ -15,15 +15,15 @@ from bywire.brakes.wedge.linear import (
     mechanical,
     rigid,
 )
+from bywire.brakes.wedge.loops.moment import COUNTED, MOMENT
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.start import force_for
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 
-_MOMENT = Quantity("moment", "N*m", 200.0)
 _FORCE = Quantity("normal force", "N", 2e3)
 _CURRENT = Quantity("current", "A", 0.05)
-_AT = (_MOMENT, _FORCE, _CURRENT)
+_AT = (MOMENT, _FORCE, _CURRENT)
 """braking moment, normal force, mean current of both motors without friction"""
 
 
@@ -43,22 +43,13 @@ def whole(par: ParameterSet, at: PlantPoint) -> LinearModel:
                 f"{brake.drive.i_max:g} A"
             )
         F_N = force_for_current(at.value, brake)
-    elif at.quantity is _MOMENT:
-        if not at.value > 0.0:
-            raise ParameterError(
-                f"moment = {at.value:g} N*m is no operating point: it must be > 0 N*m, counted "
-                "against the disc's rotation whatever its direction"
-            )
+    elif at.quantity is MOMENT:
+        at.quantity.require_positive(at.value, COUNTED)
         F_N = force_for(at.value, brake)
     else:
         F_N = at.value
-    if at.quantity is _FORCE:
+    with at.named(unless=_FORCE):
         return full(brake, F_N, at.friction, at.speed)
-    try:
-        return full(brake, F_N, at.friction, at.speed)
-    except ParameterError as error:
-        given = f"{at.quantity.name} = {at.value:g} {at.quantity.unit}"
-        raise ParameterError(f"{given} is no operating point: {error}") from None
 
 
 def mechanical_model(par: ParameterSet, at: PlantPoint) -> LinearModel:

@@ -14,6 +14,7 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.core.typing import Array
+from bywire.data.labeled import over
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import estimate
 from bywire.identification.measured import wrong_sign
@@ -176,14 +177,9 @@ def as_curve(trial: Trial, fit: Estimate) -> Curve:
         if u.trial in ("", trial.label)
     }
     computed = simulate(moved_run(trial.run, shared), (signal,))
-    attrs = {"units": "A", "long_name": "current"}
-    data = xr.Dataset(
-        {
-            "measured": ("time", trial.measured[signal], attrs),
-            "modeled": ("time", np.where(trial.rows(signal), computed[signal], np.nan), attrs),
-        },
-        {"time": ("time", computed.time, {"units": "s", "long_name": "time"})},
-    )
+    modeled = np.where(trial.rows(signal), computed[signal], np.nan)
+    columns = {"measured": trial.measured[signal], "modeled": modeled}
+    data = over(("time", computed.time, "s", "time"), columns, "A", "current")
     name = f"current-{trial.label}" if trial.label else "current"
     return Curve(name, "Current: measured, and modeled where it counts.", data, "time")
 

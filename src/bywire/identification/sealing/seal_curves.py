@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.core.typing import Array
+from bywire.data.labeled import over
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve
 from bywire.identification.output_error import even_interval
@@ -27,19 +28,16 @@ def friction_line(fit: Estimate, groups: Sequence[Group]) -> Curve:
     variance = np.einsum("ni,ij,nj->n", rows, fit.covariance[np.ix_(places, places)], rows)
     half = 0.5 * float(np.diff(fit.intervals()[0])[0]) / float(fit.deviations[0])
     reach = half * np.sqrt(variance)
-    attrs = {"units": "N", "long_name": "friction"}
+    columns = {
+        "value": value,
+        "low": value - reach,
+        "high": value + reach,
+        "measured": np.array([seen.get(float(v), np.nan) for v in p]),
+    }
     return Curve(
         "friction",
         "Friction over pressure with its 95 % band; points: each record, each direction.",
-        xr.Dataset(
-            {
-                "value": ("p", value, attrs),
-                "low": ("p", value - reach, attrs),
-                "high": ("p", value + reach, attrs),
-                "measured": ("p", np.array([seen.get(float(v), np.nan) for v in p]), attrs),
-            },
-            {"p": ("p", p, {"units": "Pa", "long_name": "pressure"})},
-        ),
+        over(("p", p, "Pa", "pressure"), columns, "N", "friction"),
         "p",
     )
 

@@ -23,7 +23,6 @@ import numpy as np
 from bywire.bench.bench import Bench
 from bywire.bench.bench_text import bench_text
 from bywire.bench.kpis.cases import FamilyJudge
-from bywire.bench.kpis.in_c import entry_of, source_of
 from bywire.bench.kpis.registry import FAMILIES
 from bywire.bench.result import Result
 from bywire.bench.stated import StatedLevel, StatedRange, stated_figures, stated_for
@@ -118,7 +117,8 @@ def page_text(
     """
     name = made.bench.name or made.bench.experiment
     families = _settings(made) or ()
-    further = {entry_of(each): source_of(FAMILIES.find(each).path) for each in families}
+    judging = [each for name in families if (each := FAMILIES.find(name).loops) is not None]
+    further = {each.entry: each.c_text for each in judging}
     loops = loops_of(made)
     further |= {loop.entry: f"{SCALAR}\n{loop.text}" for loop in loops}
     module = module_files(made, _NAME, further)
@@ -197,25 +197,26 @@ def _settings(made: Exported) -> Mapping[str, Any] | None:
         # a page has no Python to compute these
         return None
     settings = definition.judge.settings(made.bench.chosen_options)
-    is_whole = all(FAMILIES.find(name).in_c is not None for name in settings)
+    is_whole = all(FAMILIES.find(name).loops is not None for name in settings)
     return settings if is_whole else None
 
 
-def _family(name: str, setting: Any) -> dict[str, Any]:
+def _family(name: str, setting: Any, recording: xr.Dataset) -> dict[str, Any]:
     """Return how the page calls the C of a family."""
-    family = FAMILIES.find(name)
-    how = family.in_c
-    assert how is not None
+    family = FAMILIES.find(name).loops
+    assert family is not None
+    _, level = family.signals_of(recording, setting)
     return {
         "name": name,
-        "entry": entry_of(name),
+        "entry": family.entry,
         "figures": list(family.measures),
-        "signals": [getattr(setting, field) for field in how.signals],
-        "setting": np.nan_to_num(how.packed(setting, 1)).tolist(),
-        "room": how.room,
-        "reasons": ["", *how.reasons],
-        "open": list(how.open),
-        "failures": ["", *how.failures],
+        "signals": [getattr(setting, field) for field in family.signals],
+        "setting": np.nan_to_num(family.packed(setting)).tolist(),
+        "room": family.room,
+        "reasons": [
+            {"text": text.replace("{{level}}", level), "open": is_open}
+            for text, is_open in family.reasons
+        ],
     }
 
 
@@ -224,6 +225,7 @@ def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str
     bench, settings = made.bench, _settings(made)
     if settings is None:
         return None
+    recording = result.recordings[made.case.label]
     limits = {
         name: {"compare": limit.compare, "bound": limit.bound}
         for name, limit in bench.limits.items()
@@ -247,7 +249,7 @@ def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str
         for kpi in result.kpis
     ]
     return {
-        "families": [_family(name, each) for name, each in settings.items()],
+        "families": [_family(name, each, recording) for name, each in settings.items()],
         "figures": figures,
         "followed": list(followed),
     }

@@ -15,6 +15,7 @@ from bywire.brakes.motorcycle.dither.trial import FIGURES, Trial, tried
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.control.dither import breakaway_current
 from bywire.core.typing import Array
+from bywire.data.labeled import labeled
 from bywire.synthesis.study import Cut, variable
 
 Par = MotorcycleParameters
@@ -115,18 +116,11 @@ def by_frequency(grid: Grid, each: list[Candidate]) -> Cut:
         ],
         "beyond": [candidate.verdict or "nothing" for candidate in each],
     }
-    columns = {
-        name: variable(
-            [getattr(candidate, name) for candidate in each],
-            ("frequency",),
-            units.get(name, "1"),
-            name,
-        )
-        for name in names
-    }
-    columns |= {name: variable(texts, ("frequency",), "1", name) for name, texts in words.items()}
-    coordinate = variable(list(grid.frequencies), ("frequency",), "Hz", "dither frequency")
-    table = xr.Dataset(columns, coords={"frequency": coordinate})
+    numbers = {name: [getattr(candidate, name) for candidate in each] for name in names}
+    table = labeled(
+        {"frequency": (list(grid.frequencies), "Hz", "dither frequency")},
+        {name: (column, units.get(name, "1"), name) for name, column in (numbers | words).items()},
+    )
     return Cut("least gain for all pressures together", table, ("frequency", *names, *words))
 
 
@@ -163,9 +157,9 @@ def by_pressure(par: Par, data: xr.Dataset) -> Cut:
         "ripple_sensor": "Pa",
         "ripple_caliper": "Pa",
     }
-    table = xr.Dataset(
-        {name: variable(v, ("pressure",), units.get(name, "1"), name) for name, v in rows.items()},
-        coords={"pressure": data["pressure"]},
+    table = labeled(
+        {"pressure": (data["pressure"].values, "Pa", "pressure")},
+        {name: (values, units.get(name, "1"), name) for name, values in rows.items()},
     )
     title = "least dither of each pressure on its own; torque at the shaft, predicted gain linear"
     return Cut(title, table, ("pressure", *rows))

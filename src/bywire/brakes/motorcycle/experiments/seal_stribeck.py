@@ -13,6 +13,7 @@ from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Nodes, Unit
+from bywire.data.labeled import labeled
 from bywire.plant import seal_friction
 
 FIGURES = Figures(
@@ -47,12 +48,7 @@ def static(par: MotorcycleParameters, options: Options) -> dict[str, xr.Dataset]
         "p_mc": (np.array(options.pressures), "Pa", "master-cylinder pressure"),
         "omega": (speeds, "rad/s", "motor speed"),
     }
-    coords = {
-        name: (name, axis, {"units": unit, "long_name": label})
-        for name, (axis, unit, label) in axes.items()
-    }
-    attrs = {"units": "N*m", "long_name": "friction torque"}
-    return {"curve": xr.Dataset({"T_fr": (("p_mc", "omega"), torque, attrs)}, coords)}
+    return {"curve": labeled(axes, {"T_fr": (torque, "N*m", "friction torque")})}
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

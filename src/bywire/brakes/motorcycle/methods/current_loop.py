@@ -1,4 +1,8 @@
-"""Gains of the sampled current PI from steps of the demand (2010, section 3.1, Fig. 3)."""
+"""Gains of the sampled current PI from steps of the demand (2010, section 3.1, Fig. 3).
+
+Sampling, supply, anti-alias filter and anti-wind-up are as in the parameter set. The converter's
+resolution is left out; its error counts as noise.
+"""
 
 from __future__ import annotations
 
@@ -14,21 +18,9 @@ from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current, memory_at, state_at
 from bywire.core.quantities import Current, Pressure, Torque, Unit
-from bywire.identification.electrics.loop_records import (
-    LoopOptions,
-    identified_loop,
-    levels,
-    noise_of_levels,
-    require_steps,
-    without_lead,
-)
-from bywire.identification.method import Effort, Identified, Method
-from bywire.identification.output_error import Trial, trial
-from bywire.identification.records import split
+from bywire.identification.electrics.current_loop import CurrentLoop
+from bywire.identification.electrics.loop_records import LoopOptions, levels
 from bywire.simulation.run import simulate
-
-_GAINS = ("ecu.current.k_p", "ecu.current.k_i")
-_WINDING = ("motor.R_m", "motor.L_m")
 
 
 class Options(LoopOptions):
@@ -46,57 +38,23 @@ class Options(LoopOptions):
     """synthetic: noise of the measured current, ahead of the converter"""
 
 
-def identify(
-    data: xr.Dataset, par: MotorcycleParameters, options: Options, effort: Effort
-) -> Identified:
-    """Return k_p and k_i of the current PI.
-
-    The loop is run over the measured demand, rotor locked, and fitted to the measured current:
-    sampling, supply, anti-alias filter and anti-wind-up as in the parameter set. The converter's
-    resolution is left out; its error counts as noise.
-
-    Parameters
-    ----------
-    data
-        ``i_set``: set point of the current PI [A]; ``i``: current as the ECU measures it [A]; both
-        logged at its ticks, the rotor locked or stuck under pressure. One or several records.
-
-    Raises
-    ------
-    ParameterError
-        When the demand does not step, or nothing can be estimated.
-
-    Notes
-    -----
-    From demand to current only k_p V/L_m, k_i V/L_m and R_m/L_m show: with all four unknown, the
-    one that the data tells least keeps its value, and is named.
-
-    References
-    ----------
-    Dardanelli, Alli, Savaresi (2010), section 3.1, Fig. 3.
-    """
-    trials = [_trial(record, par, options, label) for label, record in split(data).items()]
-    return identified_loop(trials, par, options.names(_GAINS, _WINDING))
-
-
-def _trial(data: xr.Dataset, par: MotorcycleParameters, options: Options, label: str) -> Trial:
-    require_steps(data, "i_set", "i", label)
-    loop_par = par.replace(
+def held(par: MotorcycleParameters, options: Options) -> MotorcycleParameters:
+    """Return the parameters with the rotor held by the seals."""
+    return par.replace(
         {"drive.mode": "current-direct", "adc.law": "ideal", "seal.T_pr": options.T_hold}
     )
-    i = data["i"].values
-    sigma = noise_of_levels(i, data["i_set"].values)
-    beside = trial(
-        MotorcycleBrake(),
-        loop_par,
-        data.assign(i_meas=("time", i)),
-        {"i_set": "i_set"},
-        {"i_meas": sigma},
-        state=state_at(0.0, loop_par),
-        memory=memory_at(0.0, loop_par),
-        label=label,
-    )
-    return without_lead(beside, data, options.lead)
+
+
+LOOP = CurrentLoop(
+    model=MotorcycleBrake(),
+    demand="i_set",
+    current="i",
+    computed="i_meas",
+    gains=("ecu.current.k_p", "ecu.current.k_i"),
+    winding=("motor.R_m", "motor.L_m"),
+    held=held,
+    rest=lambda par: (state_at(0.0, par), memory_at(0.0, par)),
+)
 
 
 def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Dataset:
@@ -118,21 +76,15 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
         record=T,
     )
     computed = simulate(as_run(case, 20e-6, seed=(seed,)), ("i_meas",))
-    return xr.Dataset(
-        {
-            "i_set": ("time", demand(computed.time), {"units": "A", "long_name": "current demand"}),
-            "i": ("time", computed["i_meas"], {"units": "A", "long_name": "measured current"}),
-        },
-        {"time": ("time", np.asarray(computed.time), {"units": "s", "long_name": "time"})},
-    )
+    time = np.asarray(computed.time)
+    return LOOP.record(time, demand(time), computed["i_meas"], "measured current")
 
 
-METHOD = Method(
+METHOD = LOOP.method(
     name="current-loop",
     assembly="motorcycle-brake",
     summary="gains of the current PI from steps, rotor locked (2010, section 3.1, Fig. 3)",
     experiment="current-step",
-    signals={"i_set": "A", "i": "A"},
     options=Options,
     defaults=Options(
         unknowns="gains",
@@ -145,9 +97,6 @@ METHOD = Method(
         duration=2.0,
         sigma_i=1e-2,
     ),
-    identify=identify,
     synthetic=synthetic,
-    unknowns=_GAINS,
-    several=True,
     simulated=("p_start", "i_low", "i_high", "dwell", "duration", "sigma_i"),
 )

@@ -14,6 +14,7 @@ from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Pressure, Unit, Voltage
+from bywire.data.labeled import labeled
 from bywire.identification.electrics.loop_records import (
     as_curve,
     believable,
@@ -128,17 +129,14 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
     computed = simulate(as_run(case, _STEP), ("i_meas", "omega"))
     n = computed.time.size
     omega = computed["omega"] + (0.0 if stuck else random.normal(0.0, options.sigma_omega, n))
-    return xr.Dataset(
+    i = computed["i_meas"] + random.normal(0.0, options.sigma_i, n)
+    return labeled(
+        {"time": (computed.time, "s", "time")},
         {
-            "v": ("time", v(computed.time), {"units": "V", "long_name": "motor voltage"}),
-            "omega": ("time", omega, {"units": "rad/s", "long_name": "motor speed"}),
-            "i": (
-                "time",
-                computed["i_meas"] + random.normal(0.0, options.sigma_i, n),
-                {"units": "A", "long_name": "measured current"},
-            ),
+            "v": (v(computed.time), "V", "motor voltage"),
+            "omega": (omega, "rad/s", "motor speed"),
+            "i": (i, "A", "measured current"),
         },
-        {"time": ("time", computed.time, {"units": "s", "long_name": "time"})},
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.kpis import step_response
+from bywire.bench.kpis.registry import evaluate
 from bywire.bench.result import Result
 from bywire.brakes.motorcycle.linear.brake import theoretical
 from bywire.brakes.motorcycle.linear.rational import Rational
@@ -110,8 +111,9 @@ def _nonlinear(runs: Runs, name: str, suffix: str, final: Fact, rise: Fact) -> l
 def _rise_time(model: Rational) -> float:
     """Return the rise time (10 to 90 %) of a step on a linear model [s]."""
     t = np.arange(0.0, 20.0, 1e-3)
-    response = step_response.StepResponse(t, model.step(t), 0.0, model.gain)
-    return step_response.rise_time(response).value
+    response = xr.Dataset({"p": ("time", model.step(t))}, {"time": t})
+    setting = step_response.Setting("p", 0.0, 0.0, model.gain)
+    return evaluate("step_response", response, setting)["rise_time"].value
 
 
 def _own(name: str, start: float, t: Array) -> list[tuple[str, Array, str]]:

@@ -10,7 +10,7 @@ import xarray as xr
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.sizing.demand import Course, Motion, breakaway_current, geared, motion
 from bywire.core.typing import Array
-from bywire.synthesis.study import variable, variables
+from bywire.data.labeled import labeled
 
 Par = MotorcycleParameters
 
@@ -83,7 +83,5 @@ def mapped(
             [sizes_of(brake, motion(brake, course(brake, float(f))), static) for f in frequencies]
         )
     values = {name: [[sizes[name] for sizes in row] for row in rows] for name in SIZES}
-    return xr.Dataset(variables(values, ("k_g", "frequency"), SIZES)).assign_coords(
-        k_g=variable(ratios, ("k_g",), "m/rad", "gear ratio"),
-        frequency=variable(frequencies, ("frequency",), "Hz", "bandwidth"),
-    )
+    axes = {"k_g": (ratios, "m/rad", "gear ratio"), "frequency": (frequencies, "Hz", "bandwidth")}
+    return labeled(axes, {name: (values[name], *SIZES[name]) for name in SIZES})

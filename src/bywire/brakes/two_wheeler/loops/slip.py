@@ -16,6 +16,8 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.plant import adhesion, brake_disc, pressure_loop, road_wheel, tyre
 
+SPEED = Quantity("speed", "m/s", 20.0)
+
 
 def point(par: ParameterSet, value: float) -> Point:
     """Return the wheel held at its set slip while the vehicle keeps a speed [m/s].
@@ -26,8 +28,7 @@ def point(par: ParameterSet, value: float) -> Point:
         When the speed is not positive, or the slip lies beyond the peak, where no slip that is
         not controlled stays.
     """
-    if not value > 0.0:
-        raise ParameterError(f"speed = {value:g} m/s is no operating point: it must be > 0 m/s")
+    SPEED.require_positive(value)
     at = cast(WheelOnDrumParameters, par.replace({"drum.v": value}))
     slip = slip_pi.set_point(value, at.slip)
     surface = adhesion.surface_of(at.drum.surface)
@@ -54,7 +55,7 @@ LOOP = Loop(
     name="slip",
     assembly="wheel-on-drum",
     summary="slip control of a wheel around its brake's pressure loop, 1 kHz",
-    at=Quantity("speed", "m/s", 20.0),
+    at=SPEED,
     inputs=("slip_set",),
     output="slip",
     cut="p_ref",

@@ -18,6 +18,10 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 from bywire.plant import roller_screw
 
+MOMENT = Quantity("moment", "N*m", 200.0)
+COUNTED = ", counted against the disc's rotation whatever its direction"
+"""what is said of a moment that is not positive"""
+
 
 def point(par: ParameterSet, value: float) -> Point:
     """Return the brake that holds a moment [N m].
@@ -47,11 +51,7 @@ def point(par: ParameterSet, value: float) -> Point:
 
 
 def _require_braking(value: float, par: WedgeParameters) -> None:
-    if not value > 0.0:
-        raise ParameterError(
-            f"moment = {value:g} N*m is no operating point: it must be > 0 N*m, counted against "
-            "the disc's rotation whatever its direction"
-        )
+    MOMENT.require_positive(value, COUNTED)
     if not ops.is_symbol(par.flywheel.Omega_0) and par.flywheel.Omega_0 == 0.0:
         raise ParameterError(
             "flywheel.Omega_0 = 0 rad/s: a standing disc has no braking moment to control; set it "
@@ -80,7 +80,7 @@ LOOP = Loop(
     name="moment",
     assembly="wedge-brake",
     summary="moment control, 1 kHz around 5 kHz",
-    at=Quantity("moment", "N*m", 200.0),
+    at=MOMENT,
     inputs=("M_set",),
     output="y_M",
     cut="rate",

@@ -20,18 +20,20 @@ from bywire.brakes.wedge.methods.drive_train.cogging_fit import (
     slope_as_known,
     standing_out,
 )
-from bywire.brakes.wedge.methods.simulated_record import Sensor, sensed, turned
+from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.core.typing import Array
+from bywire.data.labeled import over
 from bywire.identification.differentiation import differentiated, low_passed
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import estimate
 from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.output_error import even_interval
+from bywire.identification.sensed import Sensor, sensed
 from bywire.identification.steady_motion import windows
 from bywire.plant import axial_bearing, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
@@ -196,17 +198,15 @@ def _folded(cogging: CoggingFit) -> Curve:
             table[k, b] = in_bin.mean() if in_bin.size else np.nan
     amplitude, phase = cogging.estimate["motor_1.T_cog"], cogging.estimate["phase"]
     model = np.tile(amplitude * np.sin(middle + phase), (2, 1))
-    attrs = {"units": "N*m", "long_name": "torque against cogging"}
-    dims = ("direction", "x")
     return Curve(
         "cogging-period",
         f"Torque over one period of order {order} without friction: measured both ways, modeled.",
-        xr.Dataset(
-            {"measured": (dims, table, attrs), "modeled": (dims, model, attrs)},
-            {
-                "direction": ["forward", "backward"],
-                "x": ("x", middle, {"units": "rad", "long_name": f"{order} times the shaft angle"}),
-            },
+        over(
+            ("x", middle, "rad", f"{order} times the shaft angle"),
+            {"measured": table, "modeled": model},
+            "N*m",
+            "torque against cogging",
+            ("direction", ("forward", "backward")),
         ),
         "x",
     )

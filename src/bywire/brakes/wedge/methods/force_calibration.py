@@ -17,19 +17,20 @@ from bywire.brakes.wedge.methods.drive_train.force_current import (
     law,
     squeeze,
 )
-from bywire.brakes.wedge.methods.drive_train.own_places import at_own_places
 from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
     SIGNALS,
     SIMULATED,
     RigOptions,
     drive_sensors,
 )
-from bywire.brakes.wedge.methods.simulated_record import sensed, turned
+from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.typing import Array
+from bywire.data.labeled import at_own_places, over
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.residuals import lack_of_fit
+from bywire.identification.sensed import sensed
 from bywire.plant import roller_screw, servo_motor
 
 _GAP = np.full((2, 1), np.nan)
@@ -128,20 +129,15 @@ def _curve(cycle: Squeeze, values: Array) -> Curve:
     places.append(line)
     rows.append(np.array((np.full(3, np.nan), law(line, np.zeros(3), values)[0])))
     F, table = at_own_places(places, rows)
-    dims = ("direction", "window")
-    attrs = {"units": "A", "long_name": "current, cogging taken off"}
     return Curve(
         "current-over-force",
         "Current over force, closing and opening, with the calibration line between.",
-        xr.Dataset(
-            {
-                name: (dims, values_of, attrs)
-                for name, values_of in zip(("measured", "modeled"), table, strict=True)
-            },
-            {
-                "direction": ["closing", "opening", "mean line"],
-                "F": (dims, F, {"units": "N", "long_name": "force"}),
-            },
+        over(
+            ("F", F, "N", "force"),
+            {"measured": table[0], "modeled": table[1]},
+            "A",
+            "current, cogging taken off",
+            ("direction", ("closing", "opening", "mean line")),
         ),
         "F",
     )

@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from bywire.brakes.wedge.experiments import load_sweep
-from bywire.brakes.wedge.methods.drive_train.own_places import at_own_places
 from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
     SIGNALS,
     SIMULATED,
@@ -19,15 +18,17 @@ from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
     drive_sensors,
 )
 from bywire.brakes.wedge.methods.drive_train.screw_strokes import Stroke, fits, strokes
-from bywire.brakes.wedge.methods.simulated_record import sensed, turned
+from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
 from bywire.core.errors import ParameterError
 from bywire.core.units import shown
+from bywire.data.labeled import at_own_places, over
 from bywire.identification.differentiation import differentiated
 from bywire.identification.equation import Equation
 from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Curve, Effort, Identified, Method
+from bywire.identification.sensed import sensed
 from bywire.identification.steady_motion import (
     Motions,
     motions,
@@ -187,17 +188,16 @@ def _curve(strokes_read: list[Stroke]) -> Curve:
         [np.array([s.F for s in way]) for way in ways],
         [np.array([(s.torque, s.torque + s.error) for s in way]).T for way in ways],
     )
-    dims = ("direction", "stroke")
-    attrs = {"units": "N*m", "long_name": "motor torque along the motion"}
     return Curve(
         "torque-over-force",
         "Motor torque in steady motion over the force between the screws, by stroke.",
-        xr.Dataset(
-            {"measured": (dims, table[0], attrs), "modeled": (dims, table[1], attrs)},
-            {
-                "direction": ["driving", "driven back"],
-                "F": (dims, F, {"units": "N", "long_name": "force"}),
-            },
+        over(
+            ("F", F, "N", "force"),
+            {"measured": table[0], "modeled": table[1]},
+            "N*m",
+            "motor torque along the motion",
+            ("direction", ("driving", "driven back")),
+            along="stroke",
         ),
         "F",
     )

@@ -23,14 +23,16 @@ from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
     drive_sensors,
 )
 from bywire.brakes.wedge.methods.drive_train.two_stages import TwoStages
-from bywire.brakes.wedge.methods.simulated_record import Sensor, sensed, turned
+from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import slope_of
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
+from bywire.data.labeled import over
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.records import joined, split
+from bywire.identification.sensed import Sensor, sensed
 from bywire.identification.steady_motion import steady_dynamics
 from bywire.plant import shaft_encoder
 
@@ -135,12 +137,11 @@ def _curve(stages: TwoStages, values: Array) -> Curve:
         "measured": stages.force_by_current(values)[order],
         "modeled": stages.heart_force(values, stages.heart)[0][order],
     }
-    attrs = {"units": "N", "long_name": "force between the screws"}
-    x = ("d", 1e3 * d[order], {"units": "mm", "long_name": "travel toward each other"})
+    x = ("d", 1e3 * d[order], "mm", "travel toward each other")
     return Curve(
         "force-over-travel",
         "Force by the current over travel in the brake heart, and the identified stiffnesses.",
-        xr.Dataset({name: ("d", row, attrs) for name, row in rows.items()}, {"d": x}),
+        over(x, rows, "N", "force between the screws"),
         "d",
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import xarray as xr
@@ -12,7 +12,8 @@ from bywire.brakes.wedge.sizing.answer import Answer, Demand
 from bywire.brakes.wedge.sizing.design import Efficiency, answer, redesigned
 from bywire.core.interrupts import thread_pool
 from bywire.core.typing import Array
-from bywire.synthesis.study import variable, variables
+from bywire.data.labeled import Labeled, labeled
+from bywire.synthesis.study import variable
 
 LATE = 1.02
 """share of the demanded time up to which a design answers equally fast"""
@@ -68,21 +69,21 @@ def mapped(
         for k, judged in enumerate(every):
             answers.append(judged)
             progress((k + 1) / len(designs))
-    shape = (len(slopes), len(leads), len(demand.mu_B))
-    return _dataset(answers, demand, shape).assign_coords(
-        tan_alpha=variable(slopes, ("tan_alpha",), "1", "slope of the wedge"),
-        lead=variable(leads, ("lead",), "m", "lead of the screws"),
-        mu_B=variable(np.asarray(demand.mu_B), ("mu_B",), "1", "friction coefficient of the pads"),
-    )
+    axes = {
+        "tan_alpha": (slopes, "1", "slope of the wedge"),
+        "lead": (leads, "m", "lead of the screws"),
+        "mu_B": (np.asarray(demand.mu_B), "1", "friction coefficient of the pads"),
+    }
+    return _dataset(answers, demand, axes)
 
 
-def _dataset(answers: Sequence[Answer], demand: Demand, shape: tuple[int, int, int]) -> xr.Dataset:
-    plane, cube = ("tan_alpha", "lead"), ("tan_alpha", "lead", "mu_B")
+def _dataset(answers: Sequence[Answer], demand: Demand, axes: Mapping[str, Labeled]) -> xr.Dataset:
+    plane, shape = ("tan_alpha", "lead"), [len(each[0]) for each in axes.values()]
     cases = {
         name: np.array([getattr(each, name) for each in answers]).reshape(shape)
         for name in _PER_CASE
     }
-    data = xr.Dataset(variables(cases, cube, _PER_CASE))
+    data = labeled(axes, {name: (cases[name], *_PER_CASE[name]) for name in _PER_CASE})
     slowest = cases["t_90"].max(axis=2)  # NaN where one case never gets there
     lateness = np.where(np.isnan(slowest), _NEVER, slowest / demand.t_90)
     in_time = (lateness <= LATE) if demand.enforced else (lateness < _NEVER)

@@ -18,6 +18,7 @@ from bywire.brakes.wedge.stability import brake, controlled, moment_borders, mot
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
 from bywire.core.typing import Array, Progress
+from bywire.data.labeled import labeled
 from bywire.synthesis.study import (
     Cut,
     Findings,
@@ -26,7 +27,6 @@ from bywire.synthesis.study import (
     Study,
     require_ranges,
     variable,
-    variables,
 )
 
 Coefficient = Annotated[float, Unit("1", 0.4), Field(gt=0, le=5, allow_inf_nan=False)]
@@ -128,18 +128,16 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
 
 
 def _dataset(mu: Array, tan: Array, values: Array, borders: Array) -> xr.Dataset:
-    dims = ("tan_alpha", "mu_B")
     beyond = mu[None, :] - borders[:, None]
     planes = {**dict(zip(_PLANES, np.moveaxis(values, 2, 0), strict=True)), "beyond_open": beyond}
-    border = variable(borders, dims[:1], "1", "friction coefficient of the neutral point")
+    border = variable(borders, ("tan_alpha",), "1", "friction coefficient of the neutral point")
     axes = {
-        "tan_alpha": variable(tan, dims[:1], "1", "slope of the wedge, tan(alpha)"),
-        "mu_B": variable(mu, dims[1:], "1", "friction coefficient of the pads"),
+        "tan_alpha": (tan, "1", "slope of the wedge, tan(alpha)"),
+        "mu_B": (mu, "1", "friction coefficient of the pads"),
     }
-    beyond_label = {"beyond_open": ("1", "friction coefficient beyond the neutral point")}
-    return xr.Dataset(
-        {**variables(planes, dims, _PLANES | beyond_label), "border_open": border}, axes
-    )
+    labels = _PLANES | {"beyond_open": ("1", "friction coefficient beyond the neutral point")}
+    data = labeled(axes, {name: (plane, *labels[name]) for name, plane in planes.items()})
+    return data.assign(border_open=border)
 
 
 def _maps(data: xr.Dataset, given: Mark) -> dict[str, Map]:

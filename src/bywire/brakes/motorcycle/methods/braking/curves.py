@@ -15,6 +15,7 @@ from bywire.brakes.motorcycle.methods.braking.slow_pair import response
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import travel_at
 from bywire.core.typing import Array
+from bywire.data.labeled import over
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve
 
@@ -62,15 +63,9 @@ def _bode(region: Region, estimate: Estimate, par: MotorcycleParameters) -> list
     theory = theoretical(par, region.pressure, travel_at(region.pressure, par)).response(f)
     parts = {"measured": measured, "modeled": modeled, "theoretical": theory}
     caption = f"Pressure over current at {region.name} pressure: measured, identified, eq. (15)."
-    axis = {"frequency": ("frequency", f, {"units": "Hz", "long_name": "frequency"})}
+    axis = ("frequency", f, "Hz", "frequency")
     magnitude, phase = (
-        xr.Dataset(
-            {
-                name: ("frequency", part(G), {"units": unit, "long_name": label})
-                for name, G in parts.items()
-            },
-            axis,
-        )
+        over(axis, {name: part(G) for name, G in parts.items()}, unit, label)
         for part, unit, label in ((np.abs, "Pa/A", "gain"), (_degrees, "degree", "phase"))
     )
     return [
@@ -91,8 +86,4 @@ def _step(step: StepRecord, estimate: Estimate, par: MotorcycleParameters, p: fl
     height = float(np.mean(step.u[step.before :]))
     theory = rest + height * theoretical(par, p, travel_at(p, par)).step(t)
     columns = {"measured": step.pressure, "modeled": rest + y, "theoretical": theory}
-    attrs = {"units": "Pa", "long_name": "pressure"}
-    return xr.Dataset(
-        {name: ("time", values, attrs) for name, values in columns.items()},
-        {"time": ("time", t, {"units": "s", "long_name": "time after the step"})},
-    )
+    return over(("time", t, "s", "time after the step"), columns, "Pa", "pressure")

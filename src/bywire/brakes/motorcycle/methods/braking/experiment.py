@@ -20,6 +20,7 @@ from bywire.brakes.motorcycle.trim import holding_current, travel_at
 from bywire.control.dither import breakaway_current
 from bywire.core.interrupts import thread_pool
 from bywire.core.typing import Array
+from bywire.data.labeled import labeled
 from bywire.simulation.run import Run, simulate
 
 Demand = Callable[[Array], Array]
@@ -181,10 +182,5 @@ def eq22_of(par: MotorcycleParameters, p: float, f_zero: float, f_pole: float) -
 
 def _dataset(i: Array, p: Array) -> xr.Dataset:
     time = np.round(np.arange(i.size) * _INTERVAL, 9)
-    return xr.Dataset(
-        {
-            "i": ("time", i, {"units": "A", "long_name": "measured current"}),
-            "p_mc": ("time", p, {"units": "Pa", "long_name": "measured pressure"}),
-        },
-        {"time": ("time", time, {"units": "s", "long_name": "time"})},
-    )
+    signals = {"i": (i, "A", "measured current"), "p_mc": (p, "Pa", "measured pressure")}
+    return labeled({"time": (time, "s", "time")}, signals)

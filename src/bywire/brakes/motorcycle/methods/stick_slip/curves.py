@@ -12,6 +12,7 @@ from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import memory_at, state_at
 from bywire.core import ops
 from bywire.core.typing import Array
+from bywire.data.labeled import labeled
 from bywire.identification.estimate import Estimate
 from bywire.identification.output_error import trial
 from bywire.plant import seal_friction
@@ -52,19 +53,12 @@ def stribeck_band(
     variance = np.einsum("ipw,ij,jpw->pw", G, estimate.covariance[np.ix_(seal, seal)], G)
     half = 0.5 * np.diff(estimate.intervals(), axis=1).ravel() / estimate.deviations
     reach = float(half[0]) * np.sqrt(np.maximum(variance, 0.0))
-    axes = ("pressure", "omega")
-    attrs = {"units": "N*m", "long_name": "friction torque"}
-    return xr.Dataset(
-        {
-            "value": (axes, value, attrs),
-            "low": (axes, value - reach, attrs),
-            "high": (axes, value + reach, attrs),
-        },
-        {
-            "pressure": ("pressure", np.array(pressures), {"units": "Pa", "long_name": "pressure"}),
-            "omega": ("omega", omega, {"units": "rad/s", "long_name": "motor speed"}),
-        },
-    )
+    axes = {
+        "pressure": (np.array(pressures), "Pa", "pressure"),
+        "omega": (omega, "rad/s", "motor speed"),
+    }
+    band = {"value": value, "low": value - reach, "high": value + reach}
+    return labeled(axes, {name: (T, "N*m", "friction torque") for name, T in band.items()})
 
 
 def _torque(par: seal_friction.Parameters, omega: float, p: float) -> float:

@@ -1,0 +1,461 @@
+"""Key figures whose functions loop over samples: run by Python, or by the C that is made of them.
+
+Each function names what it takes:
+
+* ``t``: the times [s];
+* a field of the family's ``Setting`` that names a signal: its samples, or None where the annotation
+  is ``Samples | None`` and it is not recorded;
+* ``setting``: the ``Setting``, of which it reads numbers;
+* another function of the file: what that gives, of which all figures of a case share the same.
+  Where that is undefined, the figure is.
+
+It looks at sound samples alone: numbers, two at least, over times that increase. A value that is
+not finite, and a division by zero, leave the figure undefined.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import inspect
+import math
+import re
+import typing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import fields, replace
+from functools import cache, cached_property
+from pathlib import Path
+from types import FunctionType, ModuleType, NoneType
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.bench.kpis.kpi import Kpi, Measure, Undefined
+from bywire.bench.kpis.loops import Samples, defect_of_signal, defect_of_times
+from bywire.bench.kpis.samples import signal
+from bywire.bench.kpis.translator import (
+    BOOL,
+    FIGURE,
+    FLOAT,
+    INT,
+    PAIR,
+    Kind,
+    Unit,
+    c_name,
+    fields_of,
+)
+from bywire.core.errors import CompilerError, ModelError
+from bywire.core.typing import Array
+from bywire.simulation.compiler import find_compiler, load_library
+
+NO_NUMBER = "its computation gives no finite number"
+_FLAGS = ("-O3", "-march=native")  # loops over samples: vectors pay, and sums keep their order
+_FEW = 100_000  # rows, for which Python takes a third of the time of a compiler
+_NEGATIVE_ZERO = re.compile(r"-0(?![.\d])")
+_HEADER = Path(__file__).with_name("loops.h")
+_PACKED = (FLOAT, INT, BOOL, PAIR)
+
+
+class Reason(NamedTuple):
+    """Why a figure is not defined, as C gives it a number: a text for numbers in it."""
+
+    text: str
+    is_open: bool
+
+
+class FiguresInC(NamedTuple):
+    """Figures of many cases: values, NaN where a figure has none, and why.
+
+    ``values`` and ``reasons``: shape ``(figures, cases)``; ``numbers``: those in the reasons'
+    texts, ``(figures, cases, 3)``.
+    """
+
+    values: Array
+    reasons: NDArray[np.int32]
+    numbers: Array
+
+
+class LoopFamily:
+    """The functions of a family and what they take.
+
+    Parameters
+    ----------
+    module
+        Declares ``Setting`` and the figures.
+
+    Raises
+    ------
+    ModelError
+        When a function takes what nothing gives.
+    """
+
+    def __init__(self, module: ModuleType) -> None:
+        self.name = module.__name__.rpartition(".")[2]
+        self.setting_class: type = module.Setting
+        self.measures = {m.name: m for m in vars(module).values() if isinstance(m, Measure)}
+        self.shared: dict[str, FunctionType] = {}  # after those that they take
+        self._module = module
+        self._looked_at = 0  # rows of single runs
+        self._optional: dict[str, bool] = {}  # signals, and whether they may be missing
+        for each in self.measures.values():
+            self._take(each.__wrapped__)
+        for each in self.measures.values():
+            taken = self._parameters(each.__wrapped__)
+            each.needs = tuple(name for name in taken if self._optional.get(name))
+
+    @property
+    def entry(self) -> str:
+        """Name of the family's function in C."""
+        return f"bw_{self.name}"
+
+    @cached_property
+    def signals(self) -> dict[str, bool]:
+        """Fields of the setting that name signals, in its order; whether each may be missing."""
+        names = [each.name for each in fields(self.setting_class)]
+        return {name: self._optional[name] for name in names if name in self._optional}
+
+    def signals_of(
+        self, recording: xr.Dataset, setting: Any
+    ) -> tuple[dict[str, Array | None], str]:
+        """Return the signals by the setting's fields, None for a missing one, and the first's unit.
+
+        Raises
+        ------
+        UnknownNameError
+            When the recording does not hold a signal that the family cannot do without.
+        """
+        signals: dict[str, Array | None] = {}
+        level = "1"
+        for place, (name, is_optional) in enumerate(self.signals.items()):
+            signals[name] = None
+            wanted = getattr(setting, name)
+            if not is_optional or wanted in recording:
+                signals[name], unit = signal(recording, wanted)
+                level = level if place else unit
+        return signals, level
+
+    def kpi(self, figure: Measure, value: float | Undefined, setting: Any, level: str) -> Kpi:
+        """Return a figure with its unit and note; ``level``: the unit of the first signal."""
+        further = setting.units(level) if hasattr(setting, "units") else {}
+        if isinstance(value, Undefined):
+            text = _NEGATIVE_ZERO.sub("0", value.reason.replace("{level}", level))
+            value = replace(value, reason=text)
+        else:
+            value += 0.0  # zeros are positive, whose sign C does not keep
+        return figure.kpi(value, {"level": level, **further}, getattr(setting, "note", ""))
+
+    # in Python
+
+    def in_python(
+        self, t: Samples, signals: Mapping[str, Samples | None], setting: Any
+    ) -> dict[str, float | Undefined]:
+        """Return the figures of one run by name; its signals by fields of the setting."""
+        defects = (defect_of_signal(t, y) for y in signals.values() if y is not None)
+        wrong = defect_of_times(t) or next((each for each in defects if each is not None), None)
+        if wrong is not None:
+            return dict.fromkeys(self.measures, wrong)
+        given: dict[str, Any] = {"t": t, "setting": self._in_floats(setting), **signals}
+        for name, function in self.shared.items():
+            given[name] = self._given(function, given)
+        return {name: self._given(each.__wrapped__, given) for name, each in self.measures.items()}
+
+    def _given(self, function: Callable[..., Any], given: Mapping[str, Any]) -> Any:
+        """Return what a function gives."""
+        args = [given[name] for name in inspect.signature(function).parameters]
+        undefined = next((each for each in args if isinstance(each, Undefined)), None)
+        if undefined is not None:
+            return undefined
+        try:
+            value = function(*args)
+        except (ZeroDivisionError, OverflowError, ValueError):  # of a division, of a root
+            return Undefined(NO_NUMBER)
+        is_infinite = isinstance(value, float) and not math.isfinite(value)
+        return Undefined(NO_NUMBER) if is_infinite else value
+
+    def _in_floats(self, setting: Any) -> Any:
+        """Return a setting whose numbers are Python's: those of NumPy divide by zero."""
+        plain = {
+            name: tuple(map(float, value)) if kind.base is tuple else kind.base(value)
+            for name, kind in self._numbers.items()
+            if (value := getattr(setting, name)) is not None
+        }
+        return replace(setting, **plain) if plain else setting
+
+    # in C
+
+    @cached_property
+    def _unit(self) -> Unit:
+        unit = Unit()
+        unit.reason(NO_NUMBER, False)
+        unit.function(defect_of_times)
+        unit.function(defect_of_signal)
+        for each in self._called:
+            unit.function(each)
+        return unit
+
+    @cached_property
+    def c_text(self) -> str:
+        """The C of the family in one piece.
+
+        Raises
+        ------
+        ModelError
+            When a function holds what has no translation.
+        """
+        return _HEADER.read_text(encoding="utf-8") + self._body
+
+    def translate(self) -> None:
+        """Translate the functions, to refuse those that have no translation.
+
+        Raises
+        ------
+        ModelError
+            When a function holds what has no translation.
+        """
+        assert self._body
+
+    @cached_property
+    def reasons(self) -> list[Reason]:
+        """Why figures are not defined, by the numbers of C from 1 on."""
+        self.translate()
+        return [Reason(*each) for each in self._unit.reasons]
+
+    @cached_property
+    def room(self) -> int:
+        """Numbers for each sample that C needs to compute a case."""
+        return sum(self._unit.function(each).arrays for each in self._called)
+
+    @cached_property
+    def _numbers(self) -> dict[str, Kind]:
+        """The numbers of a setting by their fields."""
+        kinds = fields_of(self.setting_class)
+        return {name: kind for name, kind in kinds.items() if kind.inner in _PACKED}
+
+    def packed(self, setting: Any) -> list[float]:
+        """Return the numbers of a setting as C takes them."""
+        row: list[float] = []
+        for name, kind in self._numbers.items():
+            value = getattr(setting, name)
+            if kind.or_none:
+                row.append(float(value is not None))
+            if kind.inner == PAIR:
+                row.extend(map(float, (0.0, 0.0) if value is None else value))
+            else:
+                row.append(0.0 if value is None else float(value))
+        return row
+
+    @cached_property
+    def width(self) -> int:
+        """How many numbers C takes of a setting."""
+        return sum(1 + k.or_none + (k.inner == PAIR) for k in self._numbers.values())
+
+    @cached_property
+    def _body(self) -> str:
+        unit = self._unit
+        lines = "\n".join(f"    {line}" for line in self._lines())
+        return f"""{unit.text}
+void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal *signals,
+    const double *settings, double *work, double *values, int32_t *reasons, double *numbers) {{
+  const bw_figures to = {{values, reasons, numbers, cases}};
+  const bw_samples t = {{times, n}};
+  const bw_undefined late = {unit.function(defect_of_times).name}(t);
+  for (int64_t k = 0; k < cases; ++k) {{
+    double *rest = work, **room = &rest;
+    bw_undefined wrong = late;
+{lines}
+  }}
+}}
+"""
+
+    def _lines(self) -> Iterator[str]:
+        """Yield what C does for a case."""
+        unit, defect = self._unit, self._unit.function(defect_of_signal).name
+        yield "(void)settings, (void)signals, (void)room;"
+        for place, (name, is_optional) in enumerate(self.signals.items()):
+            case = f"bw_case(&signals[{place}], k, n)"
+            there = f"signals[{place}].first"
+            if is_optional:
+                kind = unit.ctype(Kind(list, or_none=True))
+                yield f"const {kind} s_{name} = {{{there} ? {case} : t, {there} != 0}};"
+            else:
+                yield f"const bw_samples s_{name} = {case};"
+            value = f"s_{name}.value" if is_optional else f"s_{name}"
+            yield f"if (!wrong.reason && {there}) wrong = {defect}(t, {value});"
+        yield "if (wrong.reason) {"
+        yield f"  for (int64_t j = 0; j < {len(self.measures)}; ++j)"
+        yield "    bw_give(&to, j, k, 0.0, wrong, 1);"
+        yield "  continue;"
+        yield "}"
+        if self._numbers and any("setting" in self._parameters(f) for f in self._called):
+            yield from self._setting_lines()
+        for name, function in self.shared.items():
+            made = unit.function(function)
+            yield f"{unit.ctype(made.returns)} s_{name} = {{0}};"
+            none, call = self._call(function)
+            yield f"const bw_undefined n_{name} = {none};"
+            yield f"if (!n_{name}.reason) s_{name} = {call};"
+        for place, measure in enumerate(self.measures.values()):
+            yield from self._give_lines(place, measure)
+
+    def _give_lines(self, place: int, measure: Measure) -> Iterator[str]:
+        function = measure.__wrapped__
+        none, call = self._call(function)
+        returns = self._unit.function(function).returns
+        yield "{"
+        yield f"  bw_undefined none = {none};"
+        if returns == FIGURE:
+            yield f"  {self._unit.ctype(returns)} given = {{0}};"
+            yield f"  if (!none.reason) given = {call}, none = given.none;"
+            yield f"  bw_give(&to, {place}, k, given.value, none, 1);"
+        else:
+            yield f"  bw_give(&to, {place}, k, none.reason ? 0.0 : (double){call}, none, 1);"
+        yield "}"
+
+    def _call(self, function: Callable[..., Any]) -> tuple[str, str]:
+        """Return why what a function takes is undefined, and the call of it."""
+        made = self._unit.function(function)
+        args, none = ["room"] if made.arrays else [], "(bw_undefined){0}"
+        for name in reversed(self._parameters(function)):
+            if name in self.shared:
+                given = self._unit.function(self.shared[name]).returns
+                own = f"s_{name}.none" if given.or_undefined else none
+                none = f"n_{name}.reason ? n_{name} : {own}.reason ? {own} : {none}"
+        for name, kind in made.parameters.items():
+            is_wrapped = name in self.shared and (
+                self._unit.function(self.shared[name]).returns.or_undefined
+            )
+            text = "t" if name == "t" else f"s_{name}"
+            if kind.or_none and self.signals.get(name) is False:  # others need it
+                text = f"({self._unit.ctype(kind)}){{{text}, 1}}"
+            args.append(f"{text}.value" if is_wrapped else text)
+        return none, f"{made.name}({', '.join(args)})"
+
+    def _setting_lines(self) -> Iterator[str]:
+        """Yield the setting of a case, from its row of numbers."""
+        place, made = 0, []
+        for name, kind in self._numbers.items():
+            there = f"row[{place}]"
+            place += kind.or_none
+            value = f"row[{place}]"
+            place += 1
+            if kind.inner == PAIR:
+                value = f"{{{{row[{place - 1}], row[{place}]}}}}"
+                place += 1
+            whole = f"{{{value}, {there} != 0.0}}" if kind.or_none else value
+            made.append(f".{c_name(name)} = {whole}")
+        yield f"const double *row = settings + {place} * k;"
+        setting = self._unit.ctype(Kind(self.setting_class))
+        yield f"const {setting} s_setting = {{{', '.join(made)}}};"
+
+    @cached_property
+    def _function(self) -> Any:
+        """The compiled function; None without a compiler."""
+        return _compiled(self.c_text, self.entry)
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether C computes the family here."""
+        return self._function is not None
+
+    def is_worth_c(self, rows: int) -> bool:
+        """Return whether C computes another run: after many rows it is worth being compiled."""
+        self._looked_at += rows
+        return self._looked_at > _FEW and self.is_compiled
+
+    def in_c(
+        self, t: Array, signals: Sequence[Array | None], settings: Sequence[Any]
+    ) -> FiguresInC:
+        """Return the figures of many cases.
+
+        Parameters
+        ----------
+        t
+            Times [s], shape ``(n,)``.
+        signals
+            Signals in the order of ``self.signals``, shape ``(cases, n)``; None for a missing one.
+        settings
+            The setting of each case.
+        """
+        cases, n = len(settings), t.size
+        kept = [None if each is None else _in_rows(each) for each in signals]
+        places = np.array(
+            [(0, 0) if y is None else (y.ctypes.data, y.strides[0] // 8) for y in kept] or [(0, 0)],
+            dtype=np.int64,
+        )
+        distinct = {id(each): each for each in settings}  # mostly one
+        rows = {number: self.packed(each) for number, each in distinct.items()}
+        packed = np.array([rows[id(each)] for each in settings], dtype=np.float64).reshape(-1)
+        work = np.empty(max(1, self.room * n))
+        values = np.empty((len(self.measures), cases))
+        reasons = np.empty(values.shape, dtype=np.int32)
+        numbers = np.empty((*values.shape, 3))
+        arrays = (
+            np.ascontiguousarray(t, dtype=np.float64),
+            places,
+            packed,
+            work,
+            values,
+            reasons,
+            numbers,
+        )
+        self._function(cases, n, *(each.ctypes.data for each in arrays))
+        values += 0.0  # zeros are positive, whose sign C does not keep
+        return FiguresInC(values, reasons, numbers)
+
+    def undefined(self, reason: int, numbers: Sequence[float]) -> Undefined:
+        """Return why a figure is not defined, from what C says of it."""
+        text, is_open = self.reasons[reason - 1]
+        return Undefined(text.format(*numbers), is_open)
+
+    # what functions take
+
+    @property
+    def _called(self) -> list[Callable[..., Any]]:
+        return [*self.shared.values(), *(each.__wrapped__ for each in self.measures.values())]
+
+    def _parameters(self, function: Callable[..., Any]) -> list[str]:
+        return list(inspect.signature(function).parameters)
+
+    def _take(self, function: Callable[..., Any], *above: object) -> None:
+        """Note which signals and functions a function takes; ``above``: those that take it."""
+        hints = typing.get_type_hints(function)
+        settings = typing.get_type_hints(self.setting_class)
+        for name in self._parameters(function):
+            beside = vars(self._module).get(name)
+            if name in ("t", "setting") or name in self.shared:
+                continue
+            if settings.get(name) is str:
+                is_optional = NoneType in typing.get_args(hints.get(name))
+                self._optional[name] = self._optional.get(name, True) and is_optional
+            elif isinstance(beside, FunctionType) and beside not in (function, *above):
+                self._take(beside, function, *above)
+                self.shared[name] = beside
+            else:
+                raise ModelError(
+                    f"{self._module.__file__}: the key figure's function {function.__name__} takes "
+                    f"{name!r}, which must be t, setting, a field of Setting that names a signal, "
+                    "or another function of the file"
+                )
+
+
+@cache
+def _compiled(text: str, entry: str) -> Any:
+    """Return a family's function, compiled; None without a compiler."""
+    compiler = find_compiler()
+    if compiler is None:
+        return None
+    try:
+        library, _ = load_library(text, _FLAGS, compiler, entry)
+    except CompilerError:
+        return None
+    function = getattr(library, entry)
+    function.argtypes = [ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 7]
+    function.restype = None
+    return function
+
+
+def _in_rows(y: Array) -> Array:
+    """Return signals of which each case's samples stand in one piece."""
+    is_so = y.dtype == np.float64 and y.strides[1] == 8 and y.strides[0] % 8 == 0
+    return y if is_so else np.ascontiguousarray(y, dtype=np.float64)
