@@ -131,7 +131,7 @@ def test_interrupt_while_the_results_are_written(bywire, bench, tmp_path, monkey
     def stopped(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bywire.report.files.save_figure", stopped)
+    monkeypatch.setattr("bywire.report.drawing.save_figure", stopped)
     text = 'experiment = "seal-stribeck"\nparameters = "dardanelli2010"\n'
     outcome = bywire("run", bench(text), "--out", tmp_path / "out")
     unfinished = f"the report in {tmp_path / 'out'} is not complete: the same command writes it"

@@ -10,8 +10,8 @@ from bywire.core.provenance import chosen, paper
 from bywire.core.quantities import Fraction, Length, Resistance
 from bywire.report.answer import frame_of
 from bywire.report.page import table_html
-from bywire.report.parameter_rows import parameter_rows
 from bywire.report.record import Quantity, record_data, record_table
+from bywire.report.subject import parameter_rows
 from bywire.report.tables import (
     KpiRow,
     ParameterRow,

@@ -100,7 +100,7 @@ class LoopAgreement(Answer):
         )
 
     def _draw(self) -> Figure:
-        from bywire.report.differences import differences
+        from bywire.report.response_figures import differences
 
         compared = self.differences
         sizes = {

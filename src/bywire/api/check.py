@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from bywire.contracts.finding import Finding
+from bywire.contracts.evidence import Finding
 from bywire.report.answer import Answer
 from bywire.report.document import Banner, Document, Flat, Listing, Section, TableBlock
 from bywire.report.tables import Cell, Column, Table

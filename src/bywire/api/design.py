@@ -17,13 +17,13 @@ from bywire.api.loop_case import loop_case, over_range, spread
 from bywire.bench.requirements import Limit
 from bywire.bench.running import Progress
 from bywire.synthesis.outcome import Across
-from bywire.synthesis.schedule_designer import (
+from bywire.synthesis.schedules import (
     design_schedule,
     frozen,
     points_by_region,
     scheduled,
+    verify_schedule,
 )
-from bywire.synthesis.schedule_verification import verify_schedule
 
 
 def designed_by_region(

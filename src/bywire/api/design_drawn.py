@@ -20,7 +20,7 @@ from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.statistics import Outcome, Share, judged, share
 from bywire.studies.study_file import read_study
 from bywire.synthesis.linear_case import LinearCase, existing_case, require_given
-from bywire.synthesis.probability import Judged, judged_over
+from bywire.synthesis.outcome import Judged, judged_over
 
 DRAWN = 64
 """models that gains are chosen for, by default"""

@@ -15,7 +15,7 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields
 from bywire.data.toml_file import read_toml
 from bywire.synthesis.requirement import read
-from bywire.synthesis.trial import Trial
+from bywire.synthesis.verification import Trial
 
 Spans = Mapping[str, tuple[float, float]]
 

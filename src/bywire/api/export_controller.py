@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from bywire.api.controller_check import ControllerCheck
 from bywire.bench.bench import Bench
 from bywire.report.answer import Answer
-from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Flat, Listing, Paragraph, Section
+from bywire.report.subject import bench_changes
 
 if TYPE_CHECKING:
     from bywire.export.controller.program import Program

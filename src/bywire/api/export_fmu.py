@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from bywire.core.units import shown
 from bywire.export.interface import Causality
 from bywire.report.answer import Answer
-from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Paragraph, Section, TableBlock
+from bywire.report.subject import bench_changes
 from bywire.report.tables import Table, text_table
 
 if TYPE_CHECKING:

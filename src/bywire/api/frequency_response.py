@@ -10,15 +10,14 @@ import xarray as xr
 
 from bywire.analysis.response import frequency_response as by_sines
 from bywire.analysis.response.broadband import Broadband, broadband_response
-from bywire.analysis.response.dataset import Sweep
-from bywire.analysis.response.frequency_response import require_stable
+from bywire.analysis.response.frequency_response import require_stable, with_step_errors
 from bywire.analysis.response.large_signal import (
     Variant,
     variants_over,
     widths,
     with_widths,
 )
-from bywire.analysis.response.step_share import with_step_errors
+from bywire.analysis.response.sweep import Sweep
 from bywire.api.frequency_response_answer import FrequencyResponse
 from bywire.api.loop_case import LoopCase
 from bywire.bench.running import Progress

@@ -13,10 +13,9 @@ from bywire.core.callers import is_command_line, option
 from bywire.core.errors import ParameterError
 from bywire.data.file_format import Progress
 from bywire.data.named_columns import NamedColumns
-from bywire.identification.measured import Measured, measured, name_of
+from bywire.identification.measured import Measured, measured, name_of, require_signals
 from bywire.identification.method import Effort, Identified
-from bywire.identification.records import require_signals
-from bywire.identification.simulated_experiments import displaced
+from bywire.identification.trust import displaced
 
 if TYPE_CHECKING:
     from bywire.core.parameters import ParameterSet

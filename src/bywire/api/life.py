@@ -15,11 +15,9 @@ from bywire.core.arguments import whole_number
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit
-from bywire.life.life_file import CONDITIONS, WEAR
-from bywire.life.plan import CONDITION, LifePlan
+from bywire.life.life_file import CONDITION, CONDITIONS, WEAR, LifePlan
 from bywire.life.projection import CONFIDENCE, Projection
 from bywire.report.answer import Answer
-from bywire.report.changes import defaults_of, value_changes
 from bywire.report.document import (
     Banner,
     Change,
@@ -32,8 +30,7 @@ from bywire.report.document import (
     recording_file,
     spaced,
 )
-from bywire.report.parameter_rows import parameter_rows
-from bywire.report.subject import Subject
+from bywire.report.subject import Subject, defaults_of, parameter_rows, value_changes
 from bywire.report.tables import KpiRow, Table, amount_cell, kpi_table, parameter_table, text_table
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.locus import Locus, locus
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.periodic.averaged_map import PeriodicModel, dithered_loop
+from bywire.analysis.periodic import PeriodicModel, dithered_loop
 from bywire.api import linear_texts as texts
 from bywire.api.linearize_answer import LinearizedLoop
 from bywire.api.linearize_plant import (

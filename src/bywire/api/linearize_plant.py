@@ -14,8 +14,7 @@ from bywire.analysis.linear.linearize import Friction
 from bywire.analysis.linear.plant import PLANTS, Plant, PlantPoint
 from bywire.analysis.locus import Locus, locus_of
 from bywire.analysis.loop import Quantity
-from bywire.analysis.reduction.error import ReductionError, reduction_error
-from bywire.analysis.reduction.reduce import Reduced
+from bywire.analysis.reduction import Reduced, ReductionError, reduction_error
 from bywire.api import linear_texts as texts
 from bywire.api.loop_case import range_of
 from bywire.api.parameter_choice import parameters_for
@@ -322,6 +321,6 @@ def _friction(friction: str, speed: str) -> tuple[Friction, float]:
 
 
 def _draw_locus(locus: Locus) -> Figure:
-    from bywire.report.root_locus import root_locus
+    from bywire.report.poles import root_locus
 
     return root_locus(locus, math.nan)

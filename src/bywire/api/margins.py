@@ -232,10 +232,7 @@ def worst_texts(
 
 
 def _drawn(kind: str, family: Family) -> Figure:
-    from bywire.report.loop_gain import loop_gain
-    from bywire.report.nichols import nichols
-    from bywire.report.nyquist import nyquist
-    from bywire.report.sensitivity import sensitivity
+    from bywire.report.loop_curves import loop_gain, nichols, nyquist, sensitivity
 
     draw = {"loop-gain": loop_gain, "nyquist": nyquist, "nichols": nichols}
     return draw.get(kind, sensitivity)(family)

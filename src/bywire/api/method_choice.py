@@ -25,9 +25,8 @@ from bywire.identification.fitting.question import (
     find_method,
 )
 from bywire.identification.measured import measured
-from bywire.report.changes import defaults_of, value_changes
 from bywire.report.document import Change
-from bywire.report.subject import Subject
+from bywire.report.subject import Subject, defaults_of, value_changes
 
 if TYPE_CHECKING:
     from bywire.core.parameters import ParameterSet

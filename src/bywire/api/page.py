@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bywire.report.answer import Answer
-from bywire.report.changes import bench_changes
 from bywire.report.document import Document, Listing, Section
+from bywire.report.subject import bench_changes
 
 if TYPE_CHECKING:
     from bywire.export.exported import Exported

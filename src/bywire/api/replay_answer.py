@@ -107,7 +107,7 @@ class Replay(Answer):
         )
 
     def _figures(self) -> list[FigureBlock]:
-        from bywire.report.replay_figure import replay_figure
+        from bywire.report.replay_figures import replay_figure
 
         return [
             FigureBlock(
@@ -126,7 +126,7 @@ class Replay(Answer):
         ]
 
     def _track_figures(self) -> list[FigureBlock]:
-        from bywire.report.track_figure import track_figure
+        from bywire.report.replay_figures import track_figure
 
         known = self.replayed.run.par.leaves()
         return [

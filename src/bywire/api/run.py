@@ -17,7 +17,6 @@ from bywire.bench.result import Result
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.stated import stated_figures
 from bywire.report.answer import Answer
-from bywire.report.changes import bench_changes
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -31,6 +30,7 @@ from bywire.report.document import (
     recording_file,
 )
 from bywire.report.stated_levels import stated_figure
+from bywire.report.subject import bench_changes
 from bywire.report.tables import KpiRow, kpi_table
 from bywire.report.wording import amount, measured_amount
 

@@ -236,7 +236,7 @@ class BenchRange(Answer):
 
     def _figures(self) -> list[Block]:
         from bywire.report.kpi_curves import kpi_curves
-        from bywire.report.overlaid_panels import can_overlay
+        from bywire.report.overlaid import can_overlay
 
         captions = {
             "curves": "The values on top of each other, in the color that the scale shows.",
@@ -257,8 +257,8 @@ class BenchRange(Answer):
         return blocks
 
     def _drawn(self, label: str, recordings: Sequence[xr.Dataset]) -> Figure:
-        from bywire.report.overlaid_panels import Scale, overlaid_panels
-        from bywire.report.step_marks import step_limits
+        from bywire.report.overlaid import Scale, overlaid_panels
+        from bywire.report.step_response import step_limits
 
         steps = [
             step_limits(r.bench.definition, r.bench.chosen_options, r.verdicts)

@@ -15,10 +15,9 @@ from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES
 from bywire.core.units import difference_unit
 from bywire.report.document import Block, Details, Paragraph, Section, TableBlock
-from bywire.report.parameter_rows import parameter_rows
-from bywire.report.schematic.blocks import schematic_blocks
+from bywire.report.schematic import schematic_blocks
 from bywire.report.stated_levels import stated_level
-from bywire.report.subject import Subject
+from bywire.report.subject import Subject, parameter_rows
 from bywire.report.tables import (
     Cell,
     KpiRow,

@@ -16,15 +16,14 @@ from bywire.core.callers import is_command_line
 from bywire.core.errors import FileError, InputError
 from bywire.core.field_notes import field_notes
 from bywire.core.typing import silent
+from bywire.studies.designs import SPANNED, WORST
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan
-from bywire.studies.points import SPANNED
 from bywire.studies.rare_failures import rare_failures
 from bywire.studies.running import complete
-from bywire.studies.sought_design import WORST
 from bywire.studies.store import Origin, StudyStore
 from bywire.studies.study_file import read_study
-from bywire.studies.worst_cases import worst_cases
+from bywire.studies.worst_case import worst_cases
 
 
 def completed(

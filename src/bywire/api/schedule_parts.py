@@ -20,7 +20,7 @@ from bywire.core.units import shown
 from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount
 from bywire.synthesis.outcome import Across, ScheduleDesign
-from bywire.synthesis.schedule_designer import scheduled
+from bywire.synthesis.schedules import scheduled
 from bywire.synthesis.verification import Verification
 
 _SEEN = (

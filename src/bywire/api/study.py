@@ -16,7 +16,6 @@ from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.values import parsed
 from bywire.report.answer import Answer
-from bywire.report.changes import defaults_of, value_changes
 from bywire.report.document import (
     Details,
     Document,
@@ -27,8 +26,7 @@ from bywire.report.document import (
     TableBlock,
     recording_file,
 )
-from bywire.report.parameter_rows import parameter_rows
-from bywire.report.subject import Subject
+from bywire.report.subject import Subject, defaults_of, parameter_rows, value_changes
 from bywire.report.tables import Cell, KpiRow, Table, kpi_table, parameter_table, text_table
 from bywire.report.wording import in_display_unit, unit_text
 from bywire.synthesis.study import STUDIES, Cut, Findings, Map, Study

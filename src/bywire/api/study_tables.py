@@ -12,12 +12,9 @@ from bywire.report.document import Listing, TableBlock
 from bywire.report.study.drawn_cases import BARS
 from bywire.report.tables import OUTCOMES, Cell, Column, Table, text_table, value_text
 from bywire.report.wording import amount, clean
-from bywire.studies.choice_influence import ChoiceInfluence
-from bywire.studies.effects import ONE, Effect
-from bywire.studies.findings import Findings
-from bywire.studies.judgment import Judgment
+from bywire.studies.designs import WORST
+from bywire.studies.findings import ONE, ChoiceInfluence, Effect, Findings, Judgment
 from bywire.studies.plan import StudyPlan
-from bywire.studies.sought_design import WORST
 from bywire.studies.statistics import Influence, Share
 
 _URGENCY = ("missed", "undecided", "met")  # outcomes, in the order in which they matter

@@ -12,7 +12,7 @@ from bywire.bench.requirements import Limit
 from bywire.report.tables import Cell, Table, amount_cell, text_table
 from bywire.report.wording import amount
 from bywire.synthesis.bench_figures import BenchFigures
-from bywire.synthesis.candidate import Candidate
+from bywire.synthesis.bench_tuning import Candidate
 from bywire.synthesis.verification import Verification
 
 Part = str | Table

@@ -1,10 +1,10 @@
 """Names for brakes of one's own with their homes: for type checkers, and for `__getattr__`."""
 
-from bywire.analysis.linear.closed_loop import closed_loop as closed_loop
 from bywire.analysis.linear.linear_model import LinearModel as LinearModel
 from bywire.analysis.linear.linearize import linearize as linearize
 from bywire.analysis.linear.plant import Plant as Plant
 from bywire.analysis.linear.plant import PlantPoint as PlantPoint
+from bywire.analysis.linear.sampled_loops import closed_loop as closed_loop
 from bywire.analysis.loop import LOOPS as LOOPS
 from bywire.analysis.loop import Loop as Loop
 from bywire.analysis.loop import Point as Point
@@ -120,7 +120,7 @@ from bywire.identification.method import Curve as Curve
 from bywire.identification.method import Effort as Effort
 from bywire.identification.method import Identified as Identified
 from bywire.identification.method import Method as Method
-from bywire.identification.moved_run import moved_run as moved_run
+from bywire.identification.output_error import moved_run as moved_run
 from bywire.identification.replaying.tracking import track as track
 from bywire.identification.residuals import lack_of_fit as lack_of_fit
 from bywire.identification.unknown import Unknown as Unknown
@@ -131,10 +131,10 @@ from bywire.life.declaration import Slow as Slow
 from bywire.report import style as style
 from bywire.report.bench_figures import FigureKind as FigureKind
 from bywire.report.bench_figures import Shown as _ShownFigure
-from bywire.report.line_role import Role as _LineRole
 from bywire.report.live_page.sliders import Sliders as Sliders
 from bywire.report.panels import Panel as Panel
 from bywire.report.panels import Panels as Panels
+from bywire.report.panels import Role as _LineRole
 from bywire.report.panels import Trace as Trace
 from bywire.reproduction.item import Fact as Fact
 from bywire.reproduction.item import Item as Item
@@ -147,6 +147,7 @@ from bywire.reproduction.reproduction import Source as Source
 from bywire.reproduction.root_cause import RootCause as RootCause
 from bywire.reproduction.runs import Runs as Runs
 from bywire.reproduction.runs import kpis as kpis
+from bywire.reproduction.source_file import SourceFile as SourceFile
 from bywire.simulation.run import Run as Run
 from bywire.simulation.run import simulate as simulate
 from bywire.synthesis.study import Cut as Cut

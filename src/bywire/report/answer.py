@@ -161,7 +161,7 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
         if document.record:
             document.facts  # noqa: B018 - made while copies draw
     if document.is_paged:
-        from bywire.report.files import save_figure
+        from bywire.report.drawing import save_figure
         from bywire.report.page import write_page
 
         for block in figures:
@@ -180,7 +180,7 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
 
 
 def _record(document: Document, place: ResultFolder, names: list[str]) -> None:
-    from bywire.report.files import write_bytes
+    from bywire.report.drawing import write_bytes
 
     shown = with_files(document, [place.folder / name for name in names])
     write_bytes(place.scratch / document.record, (json.dumps(shown, indent=2) + "\n").encode())

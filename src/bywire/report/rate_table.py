@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.rates import STILL, rates
+from bywire.analysis.linear.linear_model import STILL, LinearModel, rates
 from bywire.report.tables import Cell, Table, text_table
 
 _SAME = 1e-9  # of half the sampling frequency

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from bywire.bench.bench_text import PATHS
+from bywire.bench.bench_file import PATHS
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.pairs import changes, named, read_count
 from bywire.server.contents import Contents

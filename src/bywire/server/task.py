@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from bywire.bench.bench_text import PATHS
+from bywire.bench.bench_file import PATHS
 from bywire.core.errors import InputError, unknown_name
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer

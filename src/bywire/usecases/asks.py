@@ -85,7 +85,7 @@ StudyFolder = Annotated[str | Path, Ask("Folder of the study.", metavar="FOLDER"
 
 def require_study_folder(folder: Path, **others: Any) -> None:
     """Refuse a file in the place of a study's folder, before anything is made for it."""
-    from bywire.studies.study_folder import require_no_file
+    from bywire.studies.meant_study import require_no_file
 
     del others
     require_no_file(folder)

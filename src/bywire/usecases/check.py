@@ -8,7 +8,7 @@ from bywire.usecases.declare import Ask, Command, use_case
 
 if TYPE_CHECKING:
     from bywire.api.check import Check
-    from bywire.contracts.finding import Finding
+    from bywire.contracts.evidence import Finding
     from bywire.core.typing import Progress
 
 Checked = Annotated[
@@ -64,7 +64,7 @@ def check(
     True
     """
     from bywire.api.check import Check
-    from bywire.contracts.finding import one_by_cause
+    from bywire.contracts.evidence import one_by_cause
     from bywire.contracts.subjects import demands_on
     from bywire.core.brake import brakes, load_system, loaded_files
     from bywire.report.bench_figures import FIGURES

@@ -73,7 +73,7 @@ def page(
     from bywire.core.parameters import leaf_fields
     from bywire.export.exported import exported, start_source
     from bywire.export.interface import interface
-    from bywire.report.files import write_bytes
+    from bywire.report.drawing import write_bytes
     from bywire.report.live_page.content import page_text
     from bywire.report.time_traces import shown_panels
 

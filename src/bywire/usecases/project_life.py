@@ -10,7 +10,7 @@ from bywire.usecases.declare import NOTHING, Ask, Form, use_case
 if TYPE_CHECKING:
     from bywire.api.life import LifeResult
     from bywire.core.typing import Progress
-    from bywire.life.plan import LifePlan
+    from bywire.life.life_file import LifePlan
 
 LifeName = Annotated[
     str | Path,
@@ -77,8 +77,7 @@ def project_life(
     """
     from bywire.api.life import LifeResult
     from bywire.core.typing import silent
-    from bywire.life.one_by_one import one_by_one
-    from bywire.life.projection import projected
+    from bywire.life.projection import one_by_one, projected
 
     shown = progress or silent
     plan = _read(source, overrides, check)

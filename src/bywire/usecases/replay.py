@@ -149,8 +149,8 @@ def replay(
     from bywire.data.file_format import no_progress
     from bywire.identification.measured import measured, name_of
     from bywire.identification.replaying import bench_replay, tracking
+    from bywire.identification.replaying.bench_replay import case_of
     from bywire.identification.replaying.fit import judged
-    from bywire.identification.replaying.measured_run import case_of
     from bywire.identification.replaying.tolerances import read_tolerances
 
     shown = no_progress if progress is None else progress

@@ -64,8 +64,7 @@ def resume_study(
     from pathlib import Path
 
     from bywire.api.run_study import completed, kept_plan, with_engine
-    from bywire.studies.asked_cases import require_extensible, with_cases
-    from bywire.studies.store import StudyStore
+    from bywire.studies.store import StudyStore, require_extensible, with_cases
 
     store = StudyStore(Path(folder))
     plan, origin = kept_plan(store)

@@ -32,7 +32,7 @@ def _read(campaign: str | Path, overrides: Mapping[str, str]) -> "CampaignPlan":
 
 
 def _holds(folder: Path, plan: "CampaignPlan") -> bool:
-    from bywire.campaigns.store import CampaignStore
+    from bywire.campaigns.running import CampaignStore
 
     return CampaignStore(folder).holds(plan)
 
@@ -80,8 +80,7 @@ def run_faults(
         When interrupted; finished faults stay in the folder.
     """
     from bywire.api.run_faults import FaultCampaign
-    from bywire.campaigns.running import complete
-    from bywire.campaigns.store import CampaignStore
+    from bywire.campaigns.running import CampaignStore, complete
     from bywire.core.typing import silent
 
     plan = _read(campaign, overrides)

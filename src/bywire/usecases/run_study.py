@@ -22,7 +22,7 @@ FolderOfStudy = Annotated[
 
 def _read(study: Path, overrides: Mapping[str, str], cases: int | None) -> None:
     from bywire.core.arguments import whole_number
-    from bywire.studies.points import MOST
+    from bywire.studies.designs import MOST
     from bywire.studies.study_file import read_study
 
     if cases is not None:
@@ -110,9 +110,8 @@ def run_study(
         When interrupted; finished chunks stay.
     """
     from bywire.api.run_study import completed, with_engine
-    from bywire.studies.asked_cases import with_cases
     from bywire.studies.meant_study import require_study_file
-    from bywire.studies.store import Origin, StudyStore
+    from bywire.studies.store import Origin, StudyStore, with_cases
     from bywire.studies.study_file import read_study
 
     source = Path(study)

@@ -56,8 +56,7 @@ def study_surrogates(
     from bywire.bench.relative_changes import share_of
     from bywire.core.errors import ParameterError, unknown_name
     from bywire.core.values import number
-    from bywire.studies.polynomial_chaos import require_fittable, surrogate_of
-    from bywire.studies.surrogate import Surrogate
+    from bywire.studies.surrogate import Surrogate, require_fittable, surrogate_of
 
     report = kept_study(folder)
     require_fittable(report.plan)  # before values are read: those of a choice are no numbers

@@ -50,6 +50,7 @@ from bywire.core.typing import Array
 from bywire.simulation.compiler import find_compiler, load_library
 
 NO_NUMBER = "its computation gives no finite number"
+_NO_FIGURE = Undefined(NO_NUMBER)
 _FLAGS = ("-O3", "-march=native")  # loops over samples: vectors pay, and sums keep their order
 _FEW = 100_000  # rows, for which Python takes a third of the time of a compiler
 _NEGATIVE_ZERO = re.compile(r"-0(?![.\d])")
@@ -158,7 +159,11 @@ class LoopFamily:
         given: dict[str, Any] = {"t": t, "setting": self._in_floats(setting), **signals}
         for name, function in self.shared.items():
             given[name] = self._given(function, given)
-        return {name: self._given(each.__wrapped__, given) for name, each in self.measures.items()}
+        figures = {n: self._given(each.__wrapped__, given) for n, each in self.measures.items()}
+        return {
+            name: value if isinstance(value, Undefined) or math.isfinite(value) else _NO_FIGURE
+            for name, value in figures.items()
+        }
 
     def _given(self, function: Callable[..., Any], given: Mapping[str, Any]) -> Any:
         """Return what a function gives."""
@@ -167,11 +172,9 @@ class LoopFamily:
         if undefined is not None:
             return undefined
         try:
-            value = function(*args)
+            return function(*args)
         except (ZeroDivisionError, OverflowError, ValueError):  # of a division, of a root
-            return Undefined(NO_NUMBER)
-        is_infinite = isinstance(value, float) and not math.isfinite(value)
-        return Undefined(NO_NUMBER) if is_infinite else value
+            return _NO_FIGURE
 
     def _in_floats(self, setting: Any) -> Any:
         """Return a setting whose numbers are Python's: those of NumPy divide by zero."""
@@ -203,7 +206,22 @@ class LoopFamily:
         ModelError
             When a function holds what has no translation.
         """
-        return _HEADER.read_text(encoding="utf-8") + self._body
+        unit = self._unit
+        lines = "\n".join(f"    {line}" for line in self._lines())
+        return f"""{_HEADER.read_text(encoding="utf-8")}
+{unit.text}
+void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal *signals,
+    const double *settings, double *work, double *values, int32_t *reasons, double *numbers) {{
+  const bw_figures to = {{values, reasons, numbers, cases}};
+  const bw_samples t = {{times, n}};
+  const bw_undefined of_times = {unit.function(defect_of_times).name}(t);
+  for (int64_t k = 0; k < cases; ++k) {{
+    double *rest = work, **room = &rest;
+    bw_undefined wrong = of_times;
+{lines}
+  }}
+}}
+"""
 
     def translate(self) -> None:
         """Translate the functions, to refuse those that have no translation.
@@ -213,7 +231,7 @@ class LoopFamily:
         ModelError
             When a function holds what has no translation.
         """
-        assert self._body
+        assert self.c_text
 
     @cached_property
     def reasons(self) -> list[Reason]:
@@ -245,29 +263,6 @@ class LoopFamily:
                 row.append(0.0 if value is None else float(value))
         return row
 
-    @cached_property
-    def width(self) -> int:
-        """How many numbers C takes of a setting."""
-        return sum(1 + k.or_none + (k.inner == PAIR) for k in self._numbers.values())
-
-    @cached_property
-    def _body(self) -> str:
-        unit = self._unit
-        lines = "\n".join(f"    {line}" for line in self._lines())
-        return f"""{unit.text}
-void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal *signals,
-    const double *settings, double *work, double *values, int32_t *reasons, double *numbers) {{
-  const bw_figures to = {{values, reasons, numbers, cases}};
-  const bw_samples t = {{times, n}};
-  const bw_undefined late = {unit.function(defect_of_times).name}(t);
-  for (int64_t k = 0; k < cases; ++k) {{
-    double *rest = work, **room = &rest;
-    bw_undefined wrong = late;
-{lines}
-  }}
-}}
-"""
-
     def _lines(self) -> Iterator[str]:
         """Yield what C does for a case."""
         unit, defect = self._unit, self._unit.function(defect_of_signal).name
@@ -287,7 +282,7 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
         yield "    bw_give(&to, j, k, 0.0, wrong, 1);"
         yield "  continue;"
         yield "}"
-        if self._numbers and any("setting" in self._parameters(f) for f in self._called):
+        if any("setting" in self._parameters(each) for each in self._called):
             yield from self._setting_lines()
         for name, function in self.shared.items():
             made = unit.function(function)

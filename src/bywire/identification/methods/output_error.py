@@ -14,12 +14,16 @@ from bywire.bench.experiment import Case, as_run
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError, unknown_name, unknown_of_few
 from bywire.core.signals import Signal, signals_of, without_noise
-from bywire.identification.fitting.bench_fit import BenchFit
-from bywire.identification.fitting.output_noise import noise_given
-from bywire.identification.fitting.question import BenchMethod, Options, Question
-from bywire.identification.fitting.unknown_texts import is_parameter, unknowns_of
+from bywire.identification.fitting.bench_fit import BenchFit, noise_given
+from bywire.identification.fitting.question import (
+    BenchMethod,
+    Options,
+    Question,
+    is_parameter,
+    unknowns_of,
+)
 from bywire.identification.method import Method
-from bywire.identification.replaying.measured_run import case_of
+from bywire.identification.replaying.bench_replay import case_of
 from bywire.simulation.run import simulate
 
 _NAME = "output-error"

@@ -33,8 +33,8 @@ from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.core.units import shown
 from bywire.data.labeled import at_own_places, over
 from bywire.identification.estimate import Estimate
+from bywire.identification.measured import joined, split
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
-from bywire.identification.records import joined, split
 from bywire.identification.residuals import lack_of_fit
 from bywire.identification.sensed import Sensor, sensed
 from bywire.plant.axial_bearing import AngularSpeed

@@ -25,16 +25,16 @@ from bywire.core.errors import ParameterError
 from bywire.core.units import shown
 from bywire.data.labeled import at_own_places, over
 from bywire.identification.differentiation import differentiated
-from bywire.identification.equation import Equation
-from bywire.identification.measured import wrong_sign
-from bywire.identification.method import Curve, Effort, Identified, Method
-from bywire.identification.sensed import sensed
-from bywire.identification.steady_motion import (
+from bywire.identification.equation import (
+    Equation,
     Motions,
     motions,
     steady_dynamics,
     window_residuals,
 )
+from bywire.identification.measured import wrong_sign
+from bywire.identification.method import Curve, Effort, Identified, Method
+from bywire.identification.sensed import sensed
 from bywire.identification.unknown import parameters_of
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
