@@ -8,10 +8,10 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from bywire.brakes.wedge.methods.drive_train.own_places import at_own_places
+from bywire.data.labeled import at_own_places
+from bywire.identification.measured import after_one_another
 from bywire.identification.method import Curve
-from bywire.identification.records import after_one_another
-from bywire.report.method_curve import method_curve
+from bywire.report.estimate_figures import method_curve
 
 FORCE = {"units": "N", "long_name": "force"}
 

@@ -192,7 +192,7 @@ def _naming(file: Path) -> Iterator[None]:
         raise type(error)(f"{file}: {error}") from None
 
 
-class Facts(Mapping[str, Fact]):
+class Facts:
     """Statements by name, those of a table with its name in front: ``table1.beta``.
 
     Parameters
@@ -208,18 +208,10 @@ class Facts(Mapping[str, Fact]):
         """Return the statement of a name; an unknown one is refused with the nearest known."""
         return pick(self._facts, name, "statement")
 
-    def __iter__(self) -> Iterator[str]:
-        """Yield the names in the file's order."""
-        return iter(self._facts)
-
-    def __len__(self) -> int:
-        """Return how many there are."""
-        return len(self._facts)
-
     def table(self, name: str) -> dict[str, Fact]:
         """Return the statements of a table by their names in it."""
         prefix = f"{name}."
-        return {k.removeprefix(prefix): v for k, v in self.items() if k.startswith(prefix)}
+        return {k.removeprefix(prefix): v for k, v in self._facts.items() if k.startswith(prefix)}
 
 
 # The keys of a section are the parameters of the function that makes something of it.

@@ -20,8 +20,8 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Frequency, Pressure, Unit
 from bywire.identification.estimate import Estimate
+from bywire.identification.measured import joined, split
 from bywire.identification.method import Check, Effort, Identified, Method
-from bywire.identification.records import joined, split
 
 _MISFIT_STEP, _MISFIT_SINES = 0.05, 0.1
 

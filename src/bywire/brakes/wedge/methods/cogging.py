@@ -20,7 +20,7 @@ from bywire.brakes.wedge.methods.drive_train.cogging_fit import (
     slope_as_known,
     standing_out,
 )
-from bywire.brakes.wedge.methods.simulated_record import Sensor, sensed, turned
+from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
@@ -28,12 +28,13 @@ from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.core.typing import Array
 from bywire.data.labeled import over
 from bywire.identification.differentiation import differentiated, low_passed
+from bywire.identification.equation import windows
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import estimate
 from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.output_error import even_interval
-from bywire.identification.steady_motion import windows
+from bywire.identification.sensed import Sensor, sensed
 from bywire.plant import axial_bearing, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
 

@@ -17,20 +17,20 @@ from bywire.brakes.wedge.methods.drive_train.force_current import (
     law,
     squeeze,
 )
-from bywire.brakes.wedge.methods.drive_train.own_places import at_own_places
 from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
     SIGNALS,
     SIMULATED,
     RigOptions,
     drive_sensors,
 )
-from bywire.brakes.wedge.methods.simulated_record import sensed, turned
+from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.typing import Array
-from bywire.data.labeled import over
+from bywire.data.labeled import at_own_places, over
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.residuals import lack_of_fit
+from bywire.identification.sensed import sensed
 from bywire.plant import roller_screw, servo_motor
 
 _GAP = np.full((2, 1), np.nan)

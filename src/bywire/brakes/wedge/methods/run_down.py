@@ -15,7 +15,6 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.brakes.wedge.experiments import run_down
-from bywire.brakes.wedge.methods.drive_train.own_places import at_own_places
 from bywire.brakes.wedge.methods.drive_train.run_downs import (
     INERTIA,
     NAMES,
@@ -27,16 +26,17 @@ from bywire.brakes.wedge.methods.drive_train.run_downs import (
     read_run,
     scale_is_told,
 )
-from bywire.brakes.wedge.methods.simulated_record import Sensor, sensed, turned
+from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.core.units import shown
-from bywire.data.labeled import over
+from bywire.data.labeled import at_own_places, over
 from bywire.identification.estimate import Estimate
+from bywire.identification.measured import joined, split
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
-from bywire.identification.records import joined, split
 from bywire.identification.residuals import lack_of_fit
+from bywire.identification.sensed import Sensor, sensed
 from bywire.plant.axial_bearing import AngularSpeed
 
 _RATIOS = {"bearing.C_0": "rad/s**2", "bearing.T_nu": "rad/s**2", "motor_1.D_M": "1/s"}

@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from bywire.brakes.wedge.experiments import load_sweep
-from bywire.brakes.wedge.methods.drive_train.own_places import at_own_places
 from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
     SIGNALS,
     SIMULATED,
@@ -19,22 +18,23 @@ from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
     drive_sensors,
 )
 from bywire.brakes.wedge.methods.drive_train.screw_strokes import Stroke, fits, strokes
-from bywire.brakes.wedge.methods.simulated_record import sensed, turned
+from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
 from bywire.core.errors import ParameterError
 from bywire.core.units import shown
-from bywire.data.labeled import over
+from bywire.data.labeled import at_own_places, over
 from bywire.identification.differentiation import differentiated
-from bywire.identification.equation import Equation
-from bywire.identification.measured import wrong_sign
-from bywire.identification.method import Curve, Effort, Identified, Method
-from bywire.identification.steady_motion import (
+from bywire.identification.equation import (
+    Equation,
     Motions,
     motions,
     steady_dynamics,
     window_residuals,
 )
+from bywire.identification.measured import wrong_sign
+from bywire.identification.method import Curve, Effort, Identified, Method
+from bywire.identification.sensed import sensed
 from bywire.identification.unknown import parameters_of
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed

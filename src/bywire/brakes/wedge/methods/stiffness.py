@@ -23,16 +23,17 @@ from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
     drive_sensors,
 )
 from bywire.brakes.wedge.methods.drive_train.two_stages import TwoStages
-from bywire.brakes.wedge.methods.simulated_record import Sensor, sensed, turned
+from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import slope_of
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.data.labeled import over
+from bywire.identification.equation import steady_dynamics
 from bywire.identification.estimate import Estimate
+from bywire.identification.measured import joined, split
 from bywire.identification.method import Curve, Effort, Identified, Method
-from bywire.identification.records import joined, split
-from bywire.identification.steady_motion import steady_dynamics
+from bywire.identification.sensed import Sensor, sensed
 from bywire.plant import shaft_encoder
 
 _PASSES = 3  # a fit finds the contacts, one without their kinks the forces, one uses both

@@ -7,9 +7,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from bywire.brakes.wedge.methods.simulated_record import Sensor
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
+from bywire.identification.sensed import Sensor
 from bywire.plant.axial_bearing import AngularSpeed
 
 SIGNALS: Mapping[str, str] = {"i_1": "A", "i_2": "A", "q_1": "rad", "q_2": "rad", "y_F": "N"}

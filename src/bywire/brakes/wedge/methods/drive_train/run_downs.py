@@ -13,15 +13,15 @@ from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.identification.differentiation import differentiated
-from bywire.identification.equation import Equation
-from bywire.identification.estimate import Estimate
-from bywire.identification.least_squares import Problem
-from bywire.identification.steady_motion import (
+from bywire.identification.equation import (
+    Equation,
     Motions,
     motions,
     steady_dynamics,
     window_residuals,
 )
+from bywire.identification.estimate import Estimate
+from bywire.identification.least_squares import Problem
 from bywire.identification.unknown import Unknown, parameters_of
 from bywire.plant import servo_motor
 
@@ -41,7 +41,7 @@ class Reading:
         Low-pass before the angle is differentiated [Hz].
     slowest, margin, length
         Of the motion [rad/s], and times [s]; see
-        :func:`bywire.identification.steady_motion.windows`.
+        :func:`bywire.identification.equation.windows`.
     """
 
     cutoff: float

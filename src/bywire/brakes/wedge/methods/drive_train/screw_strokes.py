@@ -8,10 +8,10 @@ import numpy as np
 
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.typing import Array
+from bywire.identification.equation import Motions
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Check
 from bywire.identification.residuals import lack_of_fit
-from bywire.identification.steady_motion import Motions
 from bywire.plant import servo_motor
 
 
