@@ -76,6 +76,7 @@ NEWEST_TESTS = [
         "vehicle",
         "reproduction/test_item.py",
         "api/test_api_run_report.py",
+        "usecases/test_declared.py",
     )
 ]
 NEWEST = {"a few tests on the newest Python": [*PYTEST, *BY_FILE, "--assert=plain", *NEWEST_TESTS]}

@@ -7,10 +7,9 @@ from collections.abc import Iterator
 from functools import partial
 
 from bywire.bench.ensemble import changed
-from bywire.bench.key_figures import needed
 from bywire.bench.kpis.cases import FamilyJudge
 from bywire.bench.recording import rows_of_group
-from bywire.bench.side_by_side import rounds
+from bywire.bench.side_by_side import needed, rounds
 from bywire.simulation.run_group import RunGroup
 from bywire.studies.plan import CHUNK, StudyPlan
 

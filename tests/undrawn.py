@@ -9,16 +9,16 @@ from functools import cache
 import pytest
 from matplotlib.figure import Figure
 
-from bywire.report import drawing, files, inline_figure
+from bywire.report import drawing
 
-_drawn = files.figure_bytes
+_drawn = drawing.figure_bytes
 
 
 @contextmanager
 def undrawn() -> Iterator[None]:
     """Have figures made, and an empty one in their files."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (files, inline_figure):
+        for module in (drawing, drawing):
             patch.setattr(module, "figure_bytes", lambda figure, kind="png": _empty(kind))
         yield
 
@@ -30,10 +30,10 @@ def drawn_once(laid_out: bool = False) -> Iterator[None]:
     To lay out what is drawn takes twice as long.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(files, "PNG_DPI", 50)
+        patch.setattr(drawing, "PNG_DPI", 50)
         if not laid_out:
             patch.setattr(drawing, "settle", lambda figure: figure.set_layout_engine("none"))
-        patch.setattr(inline_figure, "figure_bytes", lambda figure, kind="png": _empty(kind))
+        patch.setattr(drawing, "figure_bytes", lambda figure, kind="png": _empty(kind))
         yield
 
 

@@ -25,10 +25,9 @@ from benchmarks.timing import (
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.catalog import parameters
 from bywire.simulation.compiler import SINGLE
-from bywire.simulation.ensemble import simulate_ensemble
+from bywire.simulation.ensemble import case_matrix, simulate_ensemble
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
-from bywire.simulation.variations import case_matrix
 
 CASES = 1024
 VARIED = ("motor.R_m", "motor.K_e", "seal.T_pr", "seal.f_cfr_p", "caliper.K_pd", "fluid.beta")

@@ -7,8 +7,7 @@ import time
 from benchmarks.result import Result, at_least
 from benchmarks.suite import Part
 from bywire.campaigns.campaign_file import read_campaign
-from bywire.campaigns.running import complete
-from bywire.campaigns.store import CampaignStore
+from bywire.campaigns.running import CampaignStore, complete
 from bywire.core.typing import silent
 
 _GOAL = 1000.0  # cases a minute

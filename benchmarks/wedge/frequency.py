@@ -13,11 +13,11 @@ from benchmarks.peers.python_control import by_differences, nonlinear_system
 from benchmarks.result import Result, at_least, at_most
 from benchmarks.suite import Part
 from benchmarks.timing import interleaved, ratio, timed
-from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.linearize import linearize
+from bywire.analysis.linear.sampled_loops import closed_loop
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.catalog import parameters
 

@@ -28,9 +28,8 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.catalog import parameters
 from bywire.core.typing import Array
 from bywire.simulation.compiler import SINGLE
-from bywire.simulation.ensemble import simulate_ensemble
+from bywire.simulation.ensemble import case_matrix, simulate_ensemble
 from bywire.simulation.run import Run, simulate
-from bywire.simulation.variations import case_matrix
 
 STEP = 20e-6
 FINE = 1e-6

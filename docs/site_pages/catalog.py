@@ -21,7 +21,7 @@ from bywire.core.model import ASSEMBLIES
 from bywire.identification.fitting.question import BENCH_METHODS
 from bywire.identification.method import METHODS
 from bywire.life.declaration import LIVES
-from bywire.report.schematic.blocks import schematic_blocks
+from bywire.report.schematic import schematic_blocks
 from bywire.synthesis.study import STUDIES
 from site_pages.markdown import block_lines, plain, section_lines, table_lines
 

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.rates import rates
+from bywire.analysis.linear.linear_model import LinearModel, rates
 from bywire.analysis.locus import locus, locus_of
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.loop_curves import loop_curve

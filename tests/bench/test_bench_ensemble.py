@@ -11,8 +11,8 @@ import pytest
 
 import bywire
 from bywire.bench import ensemble
-from bywire.bench.key_figures import key_figures_of
 from bywire.bench.running import run
+from bywire.bench.side_by_side import key_figures_of
 from bywire.core.errors import ParameterError, UnknownNameError
 
 OPTIONS = {"duration": "60 ms", "settle": "10 ms"}

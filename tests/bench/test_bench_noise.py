@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bywire.bench.noise import put_noise
+from bywire.bench.experiment import put_noise
 
 LONG = (2**70 + 3, 2**32, 0, 9)  # more words than a pool has
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.api.run import run
 from bywire.api.run_sections import energy_table
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import (
@@ -20,9 +19,10 @@ from bywire.bench.energy_ledger import (
     role_attributes,
 )
 from bywire.bench.ensemble import simulate_ensemble
-from bywire.bench.key_figures import key_figures_of
 from bywire.bench.running import run as run_bench
+from bywire.bench.side_by_side import key_figures_of
 from bywire.core.signals import Role
+from bywire.usecases.run import run
 from systems.loading import SPRING_AXIS, loaded
 
 T = np.linspace(0.0, 1.0, 5)

@@ -13,7 +13,7 @@ import pytest
 import bywire
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
-from bywire.bench.key_figures import key_figures_of
+from bywire.bench.side_by_side import key_figures_of
 from bywire.core.brake import load_system
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import (
@@ -246,7 +246,7 @@ def test_stimuli_are_checked_too() -> None:
 
 
 def test_a_bench_file_of_any_brake_and_its_text(tmp_path: Any) -> None:
-    from bywire.bench.bench_text import bench_text
+    from bywire.bench.bench_file import bench_text
 
     path = tmp_path / "axis.toml"
     path.write_text(

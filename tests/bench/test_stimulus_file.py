@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import bywire
-from bywire.bench.bench_text import bench_text
+from bywire.bench.bench_file import bench_text
 from bywire.core.errors import FileError, InputError, ParameterError, UnitError
 from bywire.data.writing import write_measurement
 from run_once import run_once

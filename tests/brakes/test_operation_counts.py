@@ -23,8 +23,7 @@ from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import Model
 from bywire.core.parameters import choice_fields
 from bywire.simulation.expressions import needed
-from bywire.simulation.graph import Graph
-from bywire.simulation.operation import Node
+from bywire.simulation.graph import Graph, Node
 from bywire.simulation.program import build_program
 from bywire.simulation.stages import build_stages
 

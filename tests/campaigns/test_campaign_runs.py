@@ -14,13 +14,18 @@ import bywire
 from bywire.api.run_faults import FaultCampaign
 from bywire.bench.running import run
 from bywire.campaigns.campaign_file import read_campaign
-from bywire.campaigns.criterion import Criterion
 from bywire.campaigns.findings import CampaignFindings, FaultFinding, finding
-from bywire.campaigns.judging import FACTORS, judge_healthy
-from bywire.campaigns.lasting import first_time, least_of_the_last, mean_of_the_last
-from bywire.campaigns.residual import NEVER, detected, threshold
-from bywire.campaigns.simulating import faulty_traces, healthy_traces
-from bywire.campaigns.store import CampaignStore
+from bywire.campaigns.judging import FACTORS, faulty_traces, healthy_traces, judge_healthy
+from bywire.campaigns.plan import Criterion
+from bywire.campaigns.residual import (
+    NEVER,
+    detected,
+    first_time,
+    least_of_the_last,
+    mean_of_the_last,
+    threshold,
+)
+from bywire.campaigns.running import CampaignStore
 from bywire.core.errors import DeviceError, FileError, InputError
 from bywire.simulation.cuda_device import find_device
 
@@ -153,7 +158,12 @@ def test_classes_coverage_and_reaction_follow_from_the_runs(campaign):
     assert findings.is_weighted
     object_ = campaign.as_object()
     assert json.loads(json.dumps(object_))["runs"] == 14
-    assert {table for table in campaign.tables()} >= {"Faults", "Residuals", "Criteria"}
+    tables = campaign.tables()
+    assert {*tables} >= {"Faults", "Residuals", "Criteria"}
+    frame = tables["Faults"]
+    assert frame.attrs["units"] == {"within": "s", "seen within": "s"}
+    np.testing.assert_equal(frame["within"].to_numpy(), [e.tolerance for e in findings.faults])
+    assert tables["Residuals"]["false alarms"].dtype.kind == "i"
     assert len(campaign.write(campaign.folder)) >= 3
 
 

@@ -16,8 +16,7 @@ from bywire.api.replay_answer import Replay
 from bywire.core import brake as registry
 from bywire.core.errors import FileError, ParameterError, UnitError
 from bywire.server.place import Place
-from bywire.server.tasks import identify as identify_form
-from bywire.server.tasks import replay as replay_form
+from bywire.server.task import tasks
 from systems.loading import SPRING_AXIS, forgotten
 
 Bywire = Callable[..., Outcome]
@@ -274,24 +273,24 @@ def test_forms_take_the_same_words(rig: Path) -> None:
     typed = {
         "bench": "axis.toml",
         "measurement": "rig.csv",
-        "inputs": "F_set=Kraft [lbf]",
-        "outputs": "x=Weg [inch]",
+        "input": "F_set=Kraft [lbf]",
+        "output": "x=Weg [inch]",
         "time": "Zeit [s]",
         "set": "k=9 N/mm",
     }
-    asked = replay_form.TASK.read(typed, place)
-    found = replay_form.TASK.compute(asked, rig.parent / "out", None)
+    asked = tasks()["replay"].read(typed, place)
+    found = tasks()["replay"].compute(asked, rig.parent / "out", lambda *_: None)
     assert nrmse(found) < 1e-9
     fitted = {
         **typed,
         "method": "output-error",
         "measurements": "rig.csv",
         "set": "",
-        "unknowns": "k",
+        "unknown": "k",
         "starts": "1",
     }
     del fitted["measurement"]
     (rig.parent / "out").mkdir()
-    asked = identify_form.TASK.read(fitted, place)
-    found = identify_form.TASK.compute(asked, rig.parent / "out", None)
+    asked = tasks()["identify"].read(fitted, place)
+    found = tasks()["identify"].compute(asked, rig.parent / "out", lambda *_: None)
     assert found.parameters["k"] == pytest.approx(9e3, rel=1e-9)

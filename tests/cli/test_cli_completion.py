@@ -7,7 +7,9 @@ import sys
 
 import pytest
 
-from bywire.cli.completion import ANYTHING, BENCHES, CAMPAIGNS, LOOPS, changeable, varied
+from bywire.cli.completion import changeable, names_of, varied
+
+BENCHES = names_of("experiments", "generic_experiments", ending=".toml")
 
 
 @pytest.mark.parametrize(
@@ -15,9 +17,9 @@ from bywire.cli.completion import ANYTHING, BENCHES, CAMPAIGNS, LOOPS, changeabl
     [
         (BENCHES, "hard", "hard-braking"),
         (BENCHES, "motor-o", "motor-open-loop"),
-        (LOOPS, "pres", "pressure"),
-        (CAMPAIGNS, "mot", "motorcycle"),
-        (ANYTHING, "dardanelli2010-m", "dardanelli2010-measured"),
+        (names_of("loops"), "pres", "pressure"),
+        (names_of("campaigns"), "mot", "motorcycle"),
+        (names_of(), "dardanelli2010-m", "dardanelli2010-measured"),
     ],
 )
 def test_names(complete, typed, wanted):

@@ -261,7 +261,7 @@ def test_values_lie_beside_their_checks_when_the_report_is_interrupted(
         out,
     )
     with monkeypatch.context() as stop:
-        stop.setattr("bywire.report.files.save_figure", stopped)
+        stop.setattr("bywire.report.drawing.save_figure", stopped)
         outcome = bywire(*arguments)
     assert outcome.status == 130
     assert f"the report in {out} is not complete: the same command writes it" in outcome.err

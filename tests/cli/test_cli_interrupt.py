@@ -19,6 +19,7 @@ from bywire.api.overview import overview
 from bywire.bench.running import run
 from bywire.core.scratch import UNFINISHED
 from bywire.simulation.virtual_machine import VirtualMachine
+from bywire.usecases import use_cases
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
@@ -130,7 +131,7 @@ def test_interrupt_while_the_results_are_written(bywire, bench, tmp_path, monkey
     def stopped(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bywire.report.files.save_figure", stopped)
+    monkeypatch.setattr("bywire.report.drawing.save_figure", stopped)
     text = 'experiment = "seal-stribeck"\nparameters = "dardanelli2010"\n'
     outcome = bywire("run", bench(text), "--out", tmp_path / "out")
     unfinished = f"the report in {tmp_path / 'out'} is not complete: the same command writes it"
@@ -143,7 +144,7 @@ def test_interrupt_before_there_is_a_result_leaves_no_folder(bywire, bench, tmp_
     def stopped(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bywire.api.run.run", stopped)
+    monkeypatch.setitem(vars(use_cases()["run"]), "function", stopped)
     assert bywire("run", bench(), "--out", tmp_path / "new" / "out").status == 130
     assert [p.name for p in tmp_path.iterdir()] == ["bench.toml"]
     (tmp_path / "there").mkdir()
@@ -173,7 +174,7 @@ def test_an_interrupt_that_a_library_turns_into_something_else(bywire, bench, mo
             return overview()
         raise error("SWIG director method error")
 
-    monkeypatch.setattr("bywire.api.run.run", turned)
+    monkeypatch.setitem(vars(use_cases()["run"]), "function", turned)
     outcome = bywire("run", bench())
     assert outcome.status == 130
     assert outcome.lines == ["bywire: interrupted"]

@@ -13,6 +13,7 @@ from bywire.core.clean_text import shortened
 from bywire.core.errors import FileError
 from bywire.data.formats import mdf4
 from bywire.data.writing import write_measurement
+from bywire.usecases import use_cases
 
 
 def test_a_name_of_hundreds_of_characters_is_shortened(bywire, bench):
@@ -27,7 +28,7 @@ def test_a_message_keeps_its_beginning_and_its_end(bywire, bench, monkeypatch):
     def failing(*_, **__):
         raise FileError("the file a.csv is odd: " + 50_000 * "x, " + "export it again")
 
-    monkeypatch.setattr("bywire.api.run.run", failing)
+    monkeypatch.setitem(vars(use_cases()["run"]), "function", failing)
     outcome = bywire("run", bench())
     assert outcome.err.startswith("bywire: error: the file a.csv is odd: x, x")
     assert outcome.err.endswith("export it again\n")
@@ -47,7 +48,7 @@ def test_a_full_disk_is_said_with_place_and_next_step(bywire, bench, monkeypatch
     def full(*_, **__):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "somewhere/file")
 
-    monkeypatch.setattr("bywire.api.run.run", full)
+    monkeypatch.setitem(vars(use_cases()["run"]), "function", full)
     outcome = bywire("run", bench())
     assert outcome.status == 3
     assert outcome.lines == [

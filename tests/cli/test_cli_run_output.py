@@ -132,13 +132,14 @@ def test_end_stop_is_a_warning_and_the_run_is_done(bywire, bench, tmp_path):
 def test_warnings_of_a_library_come_as_messages(bywire, bench, monkeypatch):
     import warnings
 
-    from bywire.api.run import run
+    from bywire.usecases import use_cases
+    from bywire.usecases.run import run
 
     def noisy(*arguments, **settings):
         warnings.warn("seeded", RuntimeWarning, stacklevel=1)
         return run(*arguments, **settings)
 
-    monkeypatch.setattr("bywire.api.run.run", noisy)
+    monkeypatch.setitem(vars(use_cases()["run"]), "function", noisy)
     outcome = bywire("run", bench(), "--json")
     assert (outcome.status, outcome.lines) == (0, ["bywire: warning: seeded"])
 

@@ -14,6 +14,7 @@ from command_line import BRAKING, OPEN_LOOP, QUICK, SCRIPT, refused
 
 from bywire import __version__
 from bywire.bench.experiment import EXPERIMENTS
+from bywire.usecases import use_cases
 
 CURVE = 'experiment = "seal-stribeck"\nparameters = "dardanelli2010"\n'  # the quickest result
 MISSED = CURVE + '[requirements]\nbreakaway_apply = "<= 1 mN*m"\n'
@@ -77,7 +78,7 @@ def test_a_defect_is_3_and_never_a_verdict(bywire, bench, monkeypatch):
     def broken(*_, **__):
         raise ZeroDivisionError("seeded")
 
-    monkeypatch.setattr("bywire.api.run.run", broken)
+    monkeypatch.setitem(vars(use_cases()["run"]), "function", broken)
     status, out, err = bywire("run", bench(), "--json")
     assert (status, out) == (3, "")
     assert "seeded" in err

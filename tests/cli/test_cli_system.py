@@ -11,8 +11,8 @@ from command_line import Outcome, refused
 from bywire.bench.bench import Bench
 from bywire.core import brake as registry
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.server import common_fields
 from bywire.server.place import Place
+from bywire.server.task import tasks
 from systems.loading import SPRING_AXIS, forgotten, loaded
 
 Bywire = Callable[..., Outcome]
@@ -168,10 +168,9 @@ def test_python_and_forms_take_the_only_parameter_set(tmp_path: Path) -> None:
     with loaded(SPRING_AXIS):
         options = {"input": "F_set", "output": "x"}
         assert Bench("step", options=options).parameters == "spring-axis-one"
-        field, place = common_fields.bench(), Place(tmp_path)
-        changes = {f"options.{name}": value for name, value in options.items()}
-        asked = {"bench": field.read("step", place), "set": changes}
-        assert common_fields.read_bench(asked, place).parameters == "spring-axis-one"
+        changes = "\n".join(f"options.{name}={value}" for name, value in options.items())
+        asked = tasks()["run"].read({"bench": "step", "set": changes}, Place(tmp_path))
+        assert asked["bench"] == "step"
     with pytest.raises(ParameterError, match="is for any brake: say for which"):
         Bench("step")
     with pytest.raises(UnknownNameError, match="unknown experiment 'stepp': did you mean 'step'"):
@@ -241,7 +240,7 @@ def test_a_set_for_an_assembly_that_does_not_exist_is_said(bywire: Bywire, tmp_p
     assert wrong != text
     (tmp_path / "odd_axis.py").write_text(wrong)
     system = ("--system", tmp_path / "odd_axis.py")
-    line = wrong[: wrong.index("CitedSet(\n")].count("\n") + 1
+    line = wrong[: wrong.index('CitedSet("')].count("\n") + 1
     for _ in range(2):  # made anew, then kept
         done = bywire("list", "--json", *system)
         assert f"odd_axis.py, line {line}: parameter set 'spring-axis-one'" in done.err

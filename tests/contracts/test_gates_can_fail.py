@@ -12,7 +12,7 @@ from typing import NamedTuple
 import pytest
 
 import bywire
-from bywire.contracts import energy, equations, values
+from bywire.contracts import element_contracts, values
 from bywire.contracts.elements import functions, parameter_classes
 from bywire.contracts.evidence import Contract, Evidence, examine
 
@@ -34,10 +34,16 @@ def parameters(contract: Contract) -> Gate:
     return lambda module: examine(contract, parameter_classes(module)[0])
 
 
-check_energy, check_loss = whole(energy.keeps_energy), whole(energy.loses_what_it_says)
-check_rate_units = whole(energy.has_rates_of_its_states)
-check_units, check_SI = equations.has_annotated_units, equations.is_in_SI
-check_back_ends, check_jacobian = equations.has_agreeing_back_ends, equations.has_its_slopes
+check_energy, check_loss = (
+    whole(element_contracts.keeps_energy),
+    whole(element_contracts.loses_what_it_says),
+)
+check_rate_units = whole(element_contracts.has_rates_of_its_states)
+check_units, check_SI = element_contracts.has_annotated_units, element_contracts.is_in_SI
+check_back_ends, check_jacobian = (
+    element_contracts.has_agreeing_back_ends,
+    element_contracts.has_its_slopes,
+)
 round_trip = parameters(values.survives_json)
 ranges = parameters(values.keeps_its_ranges)
 

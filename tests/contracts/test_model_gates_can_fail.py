@@ -12,7 +12,7 @@ import pytest
 
 from bywire.analysis.linear import linearize
 from bywire.api.new import write_package
-from bywire.contracts import stepping
+from bywire.contracts import model_contracts
 from bywire.contracts.evidence import Evidence, examine
 from bywire.contracts.model_contracts import OF_A_MODEL
 from bywire.contracts.subjects import demands_on
@@ -162,8 +162,8 @@ def test_engines_that_differ_are_refused(
             found.values[-1] *= 1.0 + 1e-6
         return found
 
-    original = stepping.simulate
-    monkeypatch.setattr(stepping, "simulate", off)
+    original = model_contracts.simulate
+    monkeypatch.setattr(model_contracts, "simulate", off)
     with seeded(tmp_path, f"seeded-{contract}") as subject:
         found: Evidence = examine(OF_A_MODEL[contract], subject)
     assert not found.holds

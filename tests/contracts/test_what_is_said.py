@@ -11,12 +11,11 @@ from annotated_types import Ge
 
 from bywire.api.new import write_package
 from bywire.contracts.elements import elements_by_name, numbers
-from bywire.contracts.evidence import examine
-from bywire.contracts.finding import one_by_cause
+from bywire.contracts.evidence import examine, one_by_cause
 from bywire.contracts.model_contracts import OF_A_MODEL
 from bywire.contracts.sampling import Sampler, combinations, described
-from bywire.contracts.start import Start, start_of
 from bywire.contracts.subjects import demands_on
+from bywire.contracts.trial import Start, start_of
 from bywire.core.catalog import parameters
 from bywire.core.model import ASSEMBLIES
 from bywire.core.signals import Signal, signals_of
@@ -45,7 +44,7 @@ def test_runs_of_a_model_keep_to_what_is_admissible(monkeypatch: pytest.MonkeyPa
     known = signals_of(start.model.Stimulus)
     value = float(getattr(start.stimulus, name))
     limited = known | {name: Signal(known[name].unit, "", known[name].nominal, low=value)}
-    monkeypatch.setattr("bywire.contracts.start.signals_of", lambda _: limited)
+    monkeypatch.setattr("bywire.contracts.trial.signals_of", lambda _: limited)
     rows = Start.run(start, 0.5).stimulus(np.arange(15) * 0.02)
     assert rows[:, 0].min() == value
     assert rows[:, 0].max() > value

@@ -45,7 +45,7 @@ import json, sys
 names = set()
 sys.addaudithook(lambda event, given: names.add(given[0]) if event == "import" else None)
 import bywire.server.job_process, bywire.data.reading_child
-from bywire.server.task_registry import tasks
+from bywire.server.task import tasks
 from bywire.data.format_registry import FORMATS
 from bywire.api.overview import overview
 for kind in FORMATS.all().values():

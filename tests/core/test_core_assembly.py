@@ -16,7 +16,7 @@ from bywire.core.quantities import Length
 from bywire.core.signals import Role, Signal, signals_of
 from bywire.core.wiring_check import check_wiring
 from bywire.plant import ball_screw_gear, dc_motor, end_stop
-from bywire.simulation.model_check import check_model
+from bywire.simulation.program import check_model
 
 
 class Parameters(ParameterSet):

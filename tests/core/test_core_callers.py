@@ -1,45 +1,79 @@
-"""Messages name flags to who typed a command, and arguments to who called a function."""
+"""Messages name flags to whoever typed a command, and arguments to whoever called a function."""
 
 from __future__ import annotations
 
+import ast
+import inspect
 import pickle
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 import bywire
-from bywire.core.callers import command_line, in_callers_words
-from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.core.callers import command_line, name_flag, option
+from bywire.core.errors import BywireError, ParameterError, UnknownNameError
+from bywire.usecases import use_cases
 
 
 @pytest.mark.parametrize(
-    ("written", "read"),
+    ("argument", "value", "typed", "called"),
     [
-        ("with --set parameters=NAME (a, b)", 'with overrides={"parameters": "NAME"} (a, b)'),
-        ("leave out --parameters and --set", "leave out parameters and overrides"),
-        ("give --input STIMULUS=SIGNAL with", 'give inputs={"STIMULUS": "SIGNAL"} with'),
-        ("state in --estimate-start 'x'", "state in states 'x'"),
-        ("takes --system PATH, or bywire.load_system", "takes bywire.load_system"),
-        ("resample it (bywire convert --rate), or", "resample it (bywire convert --rate), or"),
-        ("'bywire convert --exclude nothing'", "'bywire convert --exclude nothing'"),
-        ("file a--b.csv: 1--2", "file a--b.csv: 1--2"),
+        ("over", None, "--over", "over"),
+        ("overrides", None, "--set", "overrides"),
+        ("overrides", {"parameters": "NAME"}, "--set parameters=NAME", None),
+        ("inputs", {"STIMULUS": "SIGNAL"}, "--input STIMULUS=SIGNAL", None),
+        ("side", "above", "--side above", 'side="above"'),
+        ("force", True, "--force", "force=True"),
+        ("states", None, "--estimate-start", "states"),
     ],
 )
-def test_flags_are_arguments_in_a_program(written: str, read: str) -> None:
-    assert in_callers_words(written) == read
+def test_a_flag_is_an_argument_in_a_program(
+    argument: str, value: Any, typed: str, called: str | None
+) -> None:
+    use_cases()
+    assert option(argument, value) == called or called is None
     with command_line():
-        assert in_callers_words(written) == written
-    assert in_callers_words(written) == read
+        assert option(argument, value) == typed
+    if called is None:
+        (pair,) = value.items()
+        assert option(argument, value) == f'{argument}={{"{pair[0]}": "{pair[1]}"}}'
+
+
+def test_an_argument_has_one_flag() -> None:
+    use_cases()
+    with pytest.raises(ValueError, match="'overrides' is --set already, and not --change"):
+        name_flag("overrides", "--change")
+
+
+def test_messages_name_arguments_that_there_are() -> None:
+    """Every ``option("NAME")`` of the package is an argument of a use case."""
+    known = {name for case in use_cases().values() for name in case.takes}
+    known |= {n for c in use_cases().values() for n in inspect.signature(c.public).parameters}
+    named = {}
+    for path in sorted(Path(bywire.__file__).parent.rglob("*.py")):
+        for call in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "option":
+                first = call.args[0]
+                if isinstance(first, ast.Constant):
+                    named[first.value] = path.name
+    assert len(named) > 20
+    assert {name: file for name, file in named.items() if name not in known} == {}
+
+
+def said_by(call: Any, kind: type[BywireError]) -> str:
+    with pytest.raises(kind) as caught:
+        call()
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+    return str(caught.value)
 
 
 def test_errors_of_functions_name_their_arguments() -> None:
-    with pytest.raises(ParameterError) as caught:
-        bywire.run("step")
-    assert 'overrides={"parameters": "NAME"}' in str(caught.value)
-    assert "--" not in str(caught.value)
+    called = said_by(lambda: bywire.run("step"), ParameterError)
+    assert 'overrides={"parameters": "NAME"}' in called
+    assert "--" not in called
     with command_line():
-        assert "--set parameters=NAME" in str(caught.value)
-        assert "--set parameters=NAME" in str(pickle.loads(pickle.dumps(caught.value)))
-    with pytest.raises(UnknownNameError) as unknown:
-        bywire.margins("xyzzy")
-    assert "--system" not in str(unknown.value)
-    assert "bywire.load_system" in str(unknown.value)
+        assert "--set parameters=NAME" in said_by(lambda: bywire.run("step"), ParameterError)
+    unknown = said_by(lambda: bywire.margins("xyzzy"), UnknownNameError)
+    assert "--system" not in unknown
+    assert "bywire.load_system" in unknown

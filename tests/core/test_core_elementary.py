@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bywire.core import elementary, ops
-from bywire.core.elementary_series import EXPONENTIAL
+from bywire.core.elementary import EXPONENTIAL
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.compiler import PLAIN, compile_library, find_compiler
 

@@ -12,9 +12,8 @@ import xarray as xr
 
 from bywire.bench.energy_ledger import further_ledgers
 from bywire.bench.recording import record
-from bywire.contracts.run_energy import closes_its_energy
-from bywire.contracts.start import Start
-from bywire.contracts.trial import Trial
+from bywire.contracts.model_contracts import closes_its_energy
+from bywire.contracts.trial import Start, Trial
 from bywire.core.assembly import Assembly
 from bywire.core.connections import Node, network
 from bywire.core.parameters import ParameterSet
@@ -22,7 +21,7 @@ from bywire.core.quantities import Stiffness
 from bywire.core.signals import signals_of, zeros
 from bywire.core.subassembly import Sub
 from bywire.simulation.compiler import find_compiler
-from bywire.simulation.model_check import check_model
+from bywire.simulation.program import check_model
 from bywire.simulation.run import Run, simulate
 from systems.ram_pair import BOTH, PAR, Coupled, Pair, PairParameters, Ram
 

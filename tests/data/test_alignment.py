@@ -5,11 +5,10 @@ import pytest
 import xarray as xr
 
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.data import resampling
-from bywire.data.alignment import resample
+from bywire.data import alignment
+from bywire.data.alignment import METHODS, resample
 from bywire.data.channel_quality import quality
 from bywire.data.lag import estimate_lag
-from bywire.data.resampling import METHODS
 
 
 def measurement(**channels):
@@ -116,7 +115,7 @@ def test_the_axis_is_filled_piece_by_piece(method, monkeypatch):
     time = np.arange(300) * 0.01
     data = measurement(a=(time, np.sin(3 * time)))
     whole = resample(data, "4 ms", method=method).dataset["a"].values
-    monkeypatch.setattr(resampling, "_BLOCK", 64)
+    monkeypatch.setattr(alignment, "_BLOCK", 64)
     pieces = resample(data, "4 ms", method=method).dataset["a"].values
     np.testing.assert_allclose(pieces, whole, rtol=0, atol=1e-13)
 

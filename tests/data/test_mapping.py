@@ -3,8 +3,7 @@
 import pytest
 
 from bywire.core.errors import FileError, InputError, ParameterError, UnitError, UnknownNameError
-from bywire.data.mapping import Clock
-from bywire.data.mapping_file import mapping_from, read_mapping
+from bywire.data.mapping import Clock, mapping_from, read_mapping
 from bywire.data.measurement import read_measurement
 
 FILE = """

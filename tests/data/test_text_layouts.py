@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bywire.core.errors import FileError, InputError, ParameterError, UnknownNameError
-from bywire.data.mapping_file import mapping_from
+from bywire.data.mapping import mapping_from
 from bywire.data.measurement import MeasurementWarning, read_measurement, read_with_notes
 
 TIME = np.arange(40) * 0.01

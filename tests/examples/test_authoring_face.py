@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import ast
 import re
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -21,21 +19,6 @@ DEEP = re.compile(r"^\s*(?:from|import)\s+bywire\.\w+\.\w+", re.MULTILINE)
 @pytest.mark.parametrize("name", authoring.__all__)
 def test_every_name_is_there(name: str) -> None:
     assert getattr(authoring, name) is not None
-
-
-def test_type_checkers_see_the_same_names() -> None:
-    tree = ast.parse(Path(authoring.__file__).read_text(encoding="utf-8"))
-    (block,) = (node for node in tree.body if isinstance(node, ast.If))
-    seen = {}
-    for node in block.body:
-        assert isinstance(node, ast.ImportFrom)
-        for alias in node.names:
-            seen[alias.asname or alias.name] = (node.module, alias.name)
-    assert sorted(seen) == sorted(authoring.__all__)
-    for name, (module, attribute) in seen.items():
-        home = import_module(module)
-        there = getattr(home, attribute, None) or import_module(f"{module}.{attribute}")
-        assert getattr(authoring, name) is there, name
 
 
 def test_unknown_names_are_refused() -> None:

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 import typer.main
 
-import bywire.api.run as run_module
 from bywire.bench.energy_ledger import actuator_ledger
 from bywire.cli.main import main
+from bywire.usecases import use_cases
 
 SECONDS = 30.0
 """of a processor, that a case may take"""
@@ -66,17 +66,18 @@ def limited(seconds: float = SECONDS) -> Iterator[None]:
 def kept_results() -> Iterator[list[Any]]:
     """Yield a list of what benches gave since."""
     results: list[Any] = []
-    run = run_module.run
+    case = vars(use_cases()["run"])
+    run = case["function"]
 
     def keeping(*args: Any, **kwargs: Any) -> Any:
         results.append(run(*args, **kwargs))
         return results[-1]
 
-    run_module.run = keeping
+    case["function"] = keeping
     try:
         yield results
     finally:
-        run_module.run = run
+        case["function"] = run
 
 
 def judged(words: Sequence[str]) -> Verdict:

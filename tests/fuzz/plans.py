@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from random import Random
 
-from bywire.studies.points import SAMPLED, SPANNED
-from bywire.studies.sensitivity_design import SENSITIVITY
-from bywire.studies.sought_design import SOUGHT
+from bywire.studies.designs import SAMPLED, SENSITIVITY, SOUGHT, SPANNED
 from fuzz import inputs
 
 _HEAD = 'bench = "hard-braking"\n[set]\n"options.duration" = "30 ms"\n"options.settle" = "10 ms"\n'

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.identification.estimate import Estimate, Kept, as_object
-from bywire.identification.leftover import Part
+from bywire.identification.estimate import Estimate, Kept, Part, as_object
 from bywire.identification.unknown import Unknown
 
 # Deviations 0.3, 2 and 0.1; b and c go together by -0.95, a and c by 0.5.

@@ -30,7 +30,7 @@ from bywire.identification import (
     trial,
 )
 from bywire.identification.estimate import as_object
-from bywire.identification.loss import Loss
+from bywire.identification.least_squares import Loss
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
 

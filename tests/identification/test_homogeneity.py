@@ -16,7 +16,7 @@ from bywire.identification import (
     disagreements,
     estimate,
 )
-from bywire.identification.leftover import Part
+from bywire.identification.estimate import Part
 
 N = 300
 

@@ -14,8 +14,8 @@ from scipy import stats
 from bywire.core.errors import SolverError
 from bywire.identification import Estimate, MisfitWarning, Problem, Unknown, estimate
 from bywire.identification.confidence import uncertainty
-from bywire.identification.inverse_dynamics import _require_told
-from bywire.identification.leftover import Part
+from bywire.identification.equation import _require_told
+from bywire.identification.estimate import Part
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from bywire.core.errors import ParameterError
-from bywire.identification.friction_models import LAWS
+from bywire.identification.measured import split
 from bywire.identification.method import Effort
-from bywire.identification.methods.friction_model import METHOD, Options
+from bywire.identification.methods.friction_model import LAWS, METHOD, Options
 from bywire.identification.model_choice import choose
-from bywire.identification.records import split
 from bywire.identification.trust import trust
 
 MADE: Mapping[str, Mapping[str, float]] = {

@@ -10,8 +10,7 @@ import xarray as xr
 
 from bywire.core.errors import ParameterError, UnitError, UnknownNameError
 from bywire.data.writing import write_measurement
-from bywire.identification.measured import measured
-from bywire.identification.records import joined, split
+from bywire.identification.measured import joined, measured, split
 
 
 def record(count: int, level: float, interval: float = 0.01) -> xr.Dataset:

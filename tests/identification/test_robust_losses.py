@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from bywire.identification.estimate import Estimate
-from bywire.identification.least_squares import Loss, Problem, estimate
-from bywire.identification.loss import influence, rho
+from bywire.identification.least_squares import Loss, Problem, estimate, influence, rho
 from bywire.identification.unknown import Unknown
 
 

@@ -8,9 +8,8 @@ import pytest
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.life.declaration import Effects, Life, Slow, StopConditions
-from bywire.life.plan import LifePlan
-from bywire.life.projection import projected, standard_error
-from bywire.life.rates import Rates
+from bywire.life.life_file import LifePlan
+from bywire.life.projection import Rates, projected, standard_error
 from bywire.studies.distribution import Distribution
 from bywire.studies.plan import Varied
 

@@ -11,8 +11,8 @@ import xarray as xr
 import bywire
 from bywire.api.study import StudyResult
 from bywire.core.catalog import PARAMETER_SETS, main_set
-from bywire.report.changes import bench_changes
 from bywire.report.page import fragment_html
+from bywire.report.subject import bench_changes
 from bywire.synthesis.study import STUDIES, Findings
 from undrawn import undrawn
 

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from bywire.data.labeled import at_own_places
+from bywire.identification.measured import after_one_another
 from bywire.identification.method import Curve
-from bywire.identification.records import after_one_another
-from bywire.report.method_curve import method_curve
+from bywire.report.estimate_figures import method_curve
 
 FORCE = {"units": "N", "long_name": "force"}
 

@@ -9,8 +9,7 @@ from matplotlib.colors import to_hex
 
 from bywire.core.errors import ParameterError
 from bywire.report import style
-from bywire.report.overlaid_panels import overlaid_panels
-from bywire.report.overlaid_traces import overlaid_traces
+from bywire.report.overlaid import overlaid_panels, overlaid_traces
 
 NAMES = {"p_mc": "pressure", "omega": "speed"}
 

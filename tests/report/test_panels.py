@@ -9,8 +9,7 @@ import pytest
 import xarray as xr
 
 from bywire.core.errors import ParameterError
-from bywire.report.line_role import Role
-from bywire.report.panels import declared_panels, panels_by_unit
+from bywire.report.panels import Role, declared_panels, panels_by_unit
 from bywire.report.time_traces import time_traces
 
 T = np.linspace(0.0, 1.0, 51)

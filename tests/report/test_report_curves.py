@@ -11,9 +11,8 @@ from matplotlib.figure import Figure
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.report.bode import Response, bode
 from bywire.report.energy_balance import energy_balance
-from bywire.report.hysteresis_loop import hysteresis_loop
-from bywire.report.stribeck_curve import stribeck_curve
-from bywire.report.tracking import tracking
+from bywire.report.friction_figures import hysteresis_loop, stribeck_curve
+from bywire.report.step_response import tracking
 
 LOOP = ("p_mc", "i", "i_star")  # response, drive, demand
 

@@ -15,15 +15,12 @@ from matplotlib.figure import Figure
 
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.report.bode import Response, bode
+from bywire.report.drawing import figure_bytes
 from bywire.report.energy_balance import energy_balance
-from bywire.report.files import figure_bytes
-from bywire.report.hysteresis_loop import hysteresis_loop
+from bywire.report.friction_figures import hysteresis_loop, stribeck_curve
 from bywire.report.panels import Panel, Trace
-from bywire.report.step_marks import StepFacts, StepLimits
-from bywire.report.step_response import step_response
-from bywire.report.stribeck_curve import stribeck_curve
+from bywire.report.step_response import StepFacts, StepLimits, step_response, tracking
 from bywire.report.time_traces import time_traces
-from bywire.report.tracking import tracking
 
 step_figure = partial(step_response, variable="p_mc", set_point="p_ref")
 LOOP = ("p_mc", "i", "i_star")  # response, drive, demand

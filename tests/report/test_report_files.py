@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread as png_pixels
 
 from bywire.core.errors import FileError
-from bywire.report.files import figure_bytes, save_figure, write_bytes
+from bywire.report.drawing import figure_bytes, save_figure, write_bytes
 from bywire.report.step_response import step_response
 
 step_figure = partial(step_response, variable="p_mc", set_point="p_ref")

@@ -18,14 +18,10 @@ from bywire.analysis.margins import UNSTABLE, LoopMargins
 from bywire.api.agreement import agreement_table, verdict
 from bywire.api.margins import margins_table, worst_texts
 from bywire.core.errors import ParameterError
-from bywire.report.differences import differences
-from bywire.report.loop_gain import loop_gain
-from bywire.report.nichols import nichols
-from bywire.report.nyquist import nyquist
-from bywire.report.pole_map import pole_map
+from bywire.report.loop_curves import loop_gain, nichols, nyquist, sensitivity
+from bywire.report.poles import pole_map, root_locus
 from bywire.report.rate_table import left_out, rate_table
-from bywire.report.root_locus import root_locus
-from bywire.report.sensitivity import sensitivity
+from bywire.report.response_figures import differences
 
 FREQUENCY = np.geomspace(1e-2, 10.0, 400)
 CHARTS = (nyquist, nichols, sensitivity, loop_gain)

@@ -27,7 +27,7 @@ from bywire.report.document import (
     Section,
     TableBlock,
 )
-from bywire.report.inline_figure import inline_figures
+from bywire.report.drawing import inline_figures
 from bywire.report.page import page_html, write_page
 from bywire.report.step_response import step_response
 from bywire.report.tables import text_table

@@ -10,10 +10,8 @@ from matplotlib.figure import Figure
 
 from bywire.core.copies import processes
 from bywire.report import side_by_side
-from bywire.report.document import FigureBlock
-from bywire.report.files import figure_bytes
-from bywire.report.inline_figure import inline_figures
-from bywire.report.picture import Picture
+from bywire.report.document import FigureBlock, Picture
+from bywire.report.drawing import figure_bytes, inline_figures
 from bywire.report.side_by_side import FEW, drawn_side_by_side
 
 pytestmark = [

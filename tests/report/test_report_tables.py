@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 from bywire.core.parameters import ParameterSet
 from bywire.core.provenance import chosen, paper
 from bywire.core.quantities import Fraction, Length, Resistance
+from bywire.report.answer import frame_of
 from bywire.report.page import table_html
-from bywire.report.parameter_rows import parameter_rows
+from bywire.report.record import Quantity, record_data, record_table
+from bywire.report.subject import parameter_rows
 from bywire.report.tables import (
     KpiRow,
     ParameterRow,
@@ -130,3 +135,51 @@ def test_html_is_escaped() -> None:
     html = table_html(text_table(["<i>"], [['<script>alert("x")</script>&']]))
     assert "&lt;i&gt;" in html
     assert "<td>&lt;script&gt;alert(&quot;x&quot;)&lt;/script&gt;&amp;</td>" in html
+
+
+class Run(NamedTuple):
+    """A row of a result."""
+
+    name: str
+    delay: float
+    seen: tuple[float, ...]
+
+
+def test_a_quantity_is_stated_once_for_table_json_and_frame() -> None:
+    quantities: tuple[Quantity[Run], ...] = (
+        Quantity(lambda run: run.name, "run", "run"),
+        Quantity(lambda run: run.delay, "delay", "delay", "s"),
+        Quantity(
+            lambda run: list(run.seen),
+            "seen",
+            "seen within",
+            "s",
+            lambda run: f"{max(run.seen):g} s at most",
+            lambda run: max(run.seen),
+        ),
+        Quantity(lambda run: len(run.seen), "times"),
+    )
+    rows = [Run("a", 0.25, (1.0, 2.0)), Run("", math.nan, (3.0,))]
+    table = record_table(rows, quantities)
+    texts = [[cell.text for cell in row] for row in table.rows]
+    assert texts == [["a", "0.25 s", "2 s at most"], ["-", "not defined", "3 s at most"]]
+    assert record_data(rows[0], quantities) == {
+        "run": "a",
+        "delay": 0.25,
+        "seen": [1.0, 2.0],
+        "times": 2,
+    }
+    frame = frame_of(table)
+    assert frame["seen within"].to_list() == [2.0, 3.0]
+    assert frame["delay"].to_list()[0] == 0.25
+    assert frame.attrs["units"] == {"delay": "s", "seen within": "s"}
+
+
+def test_frames_say_the_units_of_rows_that_differ_in_them() -> None:
+    rows = [KpiRow("p", 2.5e6, "Pa"), KpiRow("t", None, "s")]
+    frame = frame_of(kpi_table(rows))
+    assert frame["value"].to_list()[0] == 2.5e6
+    assert math.isnan(frame["value"].to_list()[1])
+    assert frame["value unit"].to_list() == ["Pa", "s"]
+    assert frame.attrs["units"] == {}
+    assert list(frame_of(kpi_table([])).columns) == ["name", "value", "definition"]

@@ -15,7 +15,7 @@ from bywire.core.scratch import UNFINISHED, require_finished
 from bywire.report import result_folder as module
 from bywire.report.answer import write_document
 from bywire.report.document import Attachment, Document, FigureBlock, Section
-from bywire.report.files import write_bytes
+from bywire.report.drawing import write_bytes
 from bywire.report.result_folder import earlier_files, result_folder
 
 

@@ -18,15 +18,11 @@ from numpy.typing import NDArray
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.readable_axis import few_labels
-from bywire.report.study.case_axis import CaseAxis, choice_axis
-from bywire.report.study.convergence import convergence
+from bywire.report.study.cases import CaseAxis, choice_axis, parallel_coordinates, scatter
 from bywire.report.study.drawn_cases import LINES, DrawnCases, drawn_cases
-from bywire.report.study.exceedance import Curve, exceedance
-from bywire.report.study.histograms import Spread, histograms
-from bywire.report.study.parallel_coordinates import parallel_coordinates
-from bywire.report.study.scatter import scatter
-from bywire.report.study.tornado import tornado
-from bywire.studies.effects import Effect
+from bywire.report.study.influences import tornado
+from bywire.report.study.probabilities import Curve, Spread, convergence, exceedance, histograms
+from bywire.studies.findings import Effect
 from bywire.studies.statistics import running_share
 
 RNG = np.random.default_rng(1)

@@ -46,7 +46,7 @@ SEEDED = {  # imports that must not be, by the file that has them
     "core/errors.py": "from bywire.bench.bench import Bench",
     "plant/dc_motor.py": "from bywire.simulation.run import simulate",
     "control/current_pi.py": "import bywire.plant.dc_motor",
-    "bench/bench.py": "def late():\n    from bywire.report.files import save_figure",
+    "bench/bench.py": "def late():\n    from bywire.report.drawing import save_figure",
     "report/page.py": "from bywire.cli import main",
     "bench/running.py": "from bywire.brakes.wedge.model import WedgeBrake",
     "cli/main.py": "from bywire.brakes import wedge",

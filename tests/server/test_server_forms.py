@@ -3,58 +3,23 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from bywire.campaigns import running
-from bywire.cli.app import program
 from bywire.core.errors import RunError, UnknownNameError
 from bywire.server import job_process
 from bywire.server.contents import Contents, contents
 from bywire.server.pages.frame import form
 from bywire.server.place import Place
 from bywire.server.refusal import RefusedError
-from bywire.server.task import Task
-from bywire.server.task_registry import tasks
+from bywire.server.task import Task, tasks
 from undrawn import drawn, undrawn_unless_asked
 
 __all__ = ["drawn", "undrawn_unless_asked"]
 
-CALLED = {
-    "fault": "faults",
-    "input_": "inputs",
-    "output": "outputs",
-    "unknown": "unknowns",
-    "prior": "priors",
-    "start": "states",
-    "option": "options",
-    "map_": "mapping",
-    "set_": "set",
-    "overrides": "set",
-    "tolerance": "tolerances",
-    "name": "study",
-}
-"""options whose fields are called otherwise"""
-ALL = {"out", "json", "help"}
-LEFT_OUT = {
-    "run": {"over", "engine", "error_estimate", "animate"},
-    "replay": {"error_estimate"},
-    "identify": {"study"},
-    "design": {"requirements", "free_derivative", "vary", "drawn", "probability", "seed"},
-    "page": {"vary", "set"},
-    "study": {"workers", "cluster", "engine"},
-}
-"""options without a field"""
-OWN_WORDS = {
-    ("replay", "segments"),
-    ("page", "bench"),
-    ("page", "case"),
-    ("run", "bench"),
-}
-"""fields that say it otherwise: a flag in place of a file, and what a page of benches knows"""
 CAMPAIGN = """
 bench = "hard-braking"
 [set]
@@ -74,41 +39,6 @@ lasting = "20 ms"
 """
 
 
-def options_of(task: Task) -> dict[str, str]:
-    """Return the help of the options of a task's command, by the names of fields."""
-    command = program()
-    for word in (task.command or task.name).split():
-        command = command.commands[word]
-    fields = {field.name for field in task.fields}
-    found = {}
-    for option in command.params:
-        name = option.name if option.name in fields else CALLED.get(option.name, option.name)
-        found[name] = option.help.replace("\\[", "[")
-    return {name: said for name, said in found.items() if name not in ALL}
-
-
-@pytest.mark.parametrize("name", tasks())
-def test_every_option_has_a_field_that_says_the_same(name):
-    task = tasks()[name]
-    options = options_of(task)
-    fields = {field.name: field.hint for field in task.fields}
-    assert set(fields) == set(options) - LEFT_OUT.get(name, set())
-    for field, hint in fields.items():
-        if (name, field) not in OWN_WORDS:
-            assert hint == options[field], field
-
-
-def test_a_field_too_few_and_another_word_are_found(monkeypatch):
-    """The test above can fail."""
-    task = tasks()["life"]
-    first, second, _ = task.fields
-    for planted in (first, second), (first, second, replace(task.fields[2], hint="Stops.")):
-        mistaken = {**tasks(), "life": replace(task, fields=planted)}
-        monkeypatch.setitem(globals(), "tasks", lambda known=mistaken: known)
-        with pytest.raises(AssertionError):
-            test_every_option_has_a_field_that_says_the_same("life")
-
-
 @pytest.fixture(scope="module")
 def folder(visit) -> None:
     """Have files of each kind in the folder that is served."""
@@ -123,7 +53,7 @@ BAD = [
     ("run", {"bench": "hard-brakin"}, "bench", "hard-braking"),
     ("run", {"bench": "hard-braking", "set": "motor.R_mm=1 ohm"}, "set", "motor.R_m"),
     ("run", {"bench": "hard-braking", "set": "motor.R_m"}, "set", "KEY=VALUE"),
-    ("run", {"bench": "hard-braking", "faults": "motor.hott"}, "faults", "motor.hot"),
+    ("run", {"bench": "hard-braking", "fault": "motor.hott"}, "fault", "motor.hot"),
     (
         "replay",
         {"bench": "hard-braking", "measurement": "curve.toml", "set": "options.x=1"},
@@ -150,10 +80,10 @@ BAD = [
         "error_estimate",
         "true or false",
     ),
-    ("size", {"study": "drive-trains"}, "study", "drive-train"),
-    ("size", {"study": "drive-train", "parameters": "roberts"}, "parameters", "roberts2003"),
-    ("size", {"study": "drive-train", "parameters": "dardanelli2010"}, "parameters", "is for a"),
-    ("size", {"study": "drive-train", "set": "t_9=1 s"}, "set", "unknown option"),
+    ("size", {"name": "drive-trains"}, "name", "drive-train"),
+    ("size", {"name": "drive-train", "parameters": "roberts"}, "parameters", "roberts2003"),
+    ("size", {"name": "drive-train", "parameters": "dardanelli2010"}, "parameters", "is for a"),
+    ("size", {"name": "drive-train", "set": "t_9=1 s"}, "set", "unknown option"),
     ("margins", {"loop": "pressur"}, "loop", "pressure"),
     ("margins", {**LOOP, "parameters": "roberts2003"}, "parameters", "is for a"),
     ("margins", {**LOOP, "at": "20 A"}, "at", "unit"),
@@ -194,7 +124,7 @@ def test_what_does_not_fit_stands_beside_its_field(visit, task, given, field, te
         ("life", "life"),
         ("compare", "runs"),
         ("run", "bench"),
-        ("identify", "mapping"),
+        ("identify", "map"),
         ("study", "study"),
     ],
 )
@@ -219,7 +149,7 @@ def test_pages_of_tasks_are_found_and_begin_as_the_link_says(visit):
     start = visit("GET", "/").body.decode()
     for name, task in tasks().items():
         page = visit("GET", f"/task/{name}")
-        assert (f'href="/task/{name}"' in start) == bool(task.summary) == (page.status == 200)
+        assert (f'href="/task/{name}"' in start) == task.form.is_listed == (page.status == 200)
     assert 'href="/task/faults?campaign=small.toml"' in start
     assert 'href="/task/life?life=pads.toml"' in start
     page = visit("GET", "/task/faults?campaign=small.toml").body.decode()
@@ -243,11 +173,11 @@ def test_every_field_has_a_label_and_says_its_hint():
 
 
 GOOD = [
-    ("run", {"bench": "hard-braking", "set": "motor.R_m=1 ohm", "faults": "pressure.stuck=1 bar"}),
+    ("run", {"bench": "hard-braking", "set": "motor.R_m=1 ohm", "fault": "pressure.stuck=1 bar"}),
     ("faults", {"campaign": "two-wheeler", "set": "front.disc.mu_pad=0.4"}),
     ("life", {"life": "two-wheeler-pads", "check": "20", "set": "stop.pause=60 s"}),
     ("compare", {"runs": "curve.toml\nhard-braking", "set": "motor.R_m=0.4 ohm"}),
-    ("size", {"study": "drive-train", "set": "t_90=120ms"}),
+    ("size", {"name": "drive-train", "set": "t_90=120ms"}),
     (
         "linearize",
         {

@@ -10,7 +10,7 @@ import pytest
 
 from bywire.server import routes
 from bywire.server.address import HERE
-from bywire.server.task_registry import tasks
+from bywire.server.task import tasks
 
 NEWEST = '() => document.querySelector("#jobs li")?.className'
 FOCUS = "() => document.activeElement.getAttribute('aria-label') ?? document.activeElement.tagName"

@@ -20,7 +20,7 @@ from bywire.core.errors import ParameterError
 from bywire.server import job_process, jobs
 from bywire.server.address import HERE
 from bywire.server.guard import cookie_name
-from bywire.server.task_registry import tasks
+from bywire.server.task import tasks
 from undrawn import drawn, undrawn_unless_asked
 
 __all__ = ["drawn", "undrawn_unless_asked"]
@@ -49,7 +49,7 @@ def test_a_dropped_file_is_replayed_as_by_the_function(visit, tmp_path, monkeypa
     data = xr.Dataset(signals, {"time": ("time", time_, {"units": "s"})})
     file = bywire.write_measurement(data, tmp_path / "stop.csv")
     kept = visit("PUT", "/api/measurements/stop.csv", file.read_bytes()).object["file"]
-    form = {"bench": "moment-pulses", "measurement": kept, "tolerances": "nrmse <= 5 %"}
+    form = {"bench": "moment-pulses", "measurement": kept, "tolerance": "nrmse <= 5 %"}
     asked = tasks()["replay"].read(form, visit.server.service.place)
     told = []
     monkeypatch.setattr(job_process, "tell", lambda **said: told.append(said))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import pytest
 
 import bywire
 from bywire.core.errors import ParameterError
+from bywire.server import study_so_far
 from bywire.server.contents import Contents, contents
 from bywire.server.field import Field
 from bywire.server.jobs import Job, Jobs
@@ -23,9 +23,8 @@ from bywire.server.pages.frame import form
 from bywire.server.place import Place
 from bywire.server.refusal import RefusedError
 from bywire.server.shown_bench import shown_bench
-from bywire.server.study_so_far import so_far
-from bywire.server.task_registry import tasks
-from bywire.server.tasks import study
+from bywire.server.study_so_far import StudyProgress, so_far
+from bywire.server.task import tasks
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.findings import Findings
 from bywire.studies.study_file import read_study
@@ -40,23 +39,6 @@ cases = 64
 [requirements]
 breakaway_apply = "<= 0.5 N*m with 90 %"
 """
-FUNCTIONS = {
-    "agreement": "agreement.agreement",
-    "compare": "compare.compare",
-    "design": "design.design",
-    "faults": "run_faults.run_faults",
-    "frequency-response": "frequency_response.frequency_response",
-    "identify": "identify.identify",
-    "life": "life.project_life",
-    "linearize": "linearize.linearize",
-    "margins": "margins.margins",
-    "page": "page.page",
-    "replay": "replay.replay",
-    "reproduce": "reproduce.reproduce",
-    "run": "run.run",
-    "size": "study.study",
-    "study": "run_study.run_study",
-}
 FILLED = {
     "lines": "a=1\n b=2 \n\n",
     "pairs": "a = 1\n",
@@ -85,25 +67,20 @@ def place(tmp_path: Path) -> Place:
     return Place(tmp_path.resolve())
 
 
-def test_every_task_has_a_function():
-    assert set(FUNCTIONS) == set(tasks())
-
-
-@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize("name", tasks())
 def test_every_field_reaches_the_function(name, place, monkeypatch):
-    module, _, function = FUNCTIONS[name].partition(".")
-    home = import_module(f"bywire.api.{module}")
-    signature, calls = inspect.signature(getattr(home, function)), []
+    task = tasks()[name]
+    signature, calls = inspect.signature(task.case.public), []
+    if name == "identify":  # whose fields go one by one into a question
+        signature = inspect.signature(task.case.function)
 
     def called(*args: Any, **kwargs: Any) -> None:
         calls.append(signature.bind(*args, **kwargs).arguments)
 
-    monkeypatch.setattr(home, function, called)
-    task = tasks()[name]
-    fields = [replace(field, fits=None) for field in task.fields]
-    task = replace(task, fields=tuple(fields))  # what they hold means nothing
-    every = {field.name: filled(field) for field in fields}
-    least = {field.name: every[field.name] for field in fields if field.is_required}
+    monkeypatch.setitem(vars(task.case), "function", called)
+    monkeypatch.setitem(vars(task.case), "check", None)  # what the fields hold means nothing
+    every = {field.name: filled(field) for field in task.fields}
+    least = {field.name: every[field.name] for field in task.fields if field.is_required}
 
     def given(form: dict[str, Any]) -> dict[str, str]:
         task.compute(task.read(form, place), place.root / "out", lambda *_: None)
@@ -112,7 +89,7 @@ def test_every_field_reaches_the_function(name, place, monkeypatch):
     by_default = given(least)
     assert (given(every) != by_default) == (every != least)
     # A field that is filled in changes what the function is given, each one for itself.
-    for field in fields:
+    for field in task.fields:
         if not field.is_required:
             assert given({**least, field.name: every[field.name]}) != by_default, field.name
 
@@ -172,12 +149,12 @@ def test_a_study_tells_now_and_then_what_there_is(monkeypatch, tmp_path):
             raise ParameterError("too few cases")
         return []
 
-    for function in "study_report", "kept_study":
-        monkeypatch.setattr(f"bywire.api.run_study.{function}", lambda _: Report())
-    monkeypatch.setattr("bywire.server.study_so_far.so_far", estimate)
-    monkeypatch.setattr(study, "tell", lambda **said: told.append(said))
-    monkeypatch.setattr(study.time, "monotonic", lambda: clock[0])
-    progress = study._SoFar(tmp_path, lambda *_: None)
+    monkeypatch.setattr("bywire.api.run_study.kept_study", lambda _: Report())
+    monkeypatch.setattr("bywire.usecases.study_report.study_report", lambda _: Report())
+    monkeypatch.setattr(study_so_far, "so_far", estimate)
+    monkeypatch.setattr(study_so_far, "tell", lambda **said: told.append(said))
+    monkeypatch.setattr(study_so_far.time, "monotonic", lambda: clock[0])
+    progress = StudyProgress(tmp_path, lambda *_: None)
     for second in range(20):
         clock[0] = float(second)
         progress("16 cases", second / 20)

@@ -11,7 +11,7 @@ from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import actuator_ledger
 from bywire.bench.running import run as run_bench
 from bywire.core.errors import ParameterError
-from bywire.simulation.changes import Change
+from bywire.simulation.advance import Change
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.run_group import fit_lanes, simulate_group
 from bywire.simulation.sensitivity import simulate_with_sensitivities

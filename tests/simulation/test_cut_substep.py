@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bywire.core.typing import Array
-from bywire.simulation import cut_substep
-from bywire.simulation.cut_substep import CutSubstep
+from bywire.simulation import virtual_machine
+from bywire.simulation.virtual_machine import CutSubstep
 
 H = 1e-3
 
@@ -25,7 +25,7 @@ def settled(x: Array, d: Array, m: Array, p: Array, h: float) -> tuple[list[Arra
 def test_the_clock_goes_on_however_well_the_instant_is_found(
     attempts: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cut_substep, "ATTEMPTS", attempts)
+    monkeypatch.setattr(virtual_machine, "ATTEMPTS", attempts)
     substep = CutSubstep(settled, (0,), np.zeros(0), np.zeros(0), H)
     (x, *_), failed = substep.results(np.array([1.1e-3, 5.0]), np.array([-0.9e-3, 0.5 * H]))
     assert not failed

@@ -11,12 +11,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from bywire.simulation.balance import balanced
 from bywire.simulation.expressions import PLAIN_C, VECTOR_C, Dialect, needed, text
-from bywire.simulation.graph import BOOLEAN, Graph, Node, _names
+from bywire.simulation.graph import BOOLEAN, Graph, Interval, Node, _names, raised
 from bywire.simulation.quadrature import Levels
-from bywire.simulation.raised import raised
-from bywire.simulation.signs import Interval
+from bywire.simulation.stages import balanced
 
 RANGES = {("p", 0): (0.0, math.inf), ("p", 1): (-1.0, 2.0), ("p", 2): (-math.inf, 0.0)}
 UNARY = {

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.compiler import SINGLE, compile_library, find_compiler
-from bywire.simulation.rare_text import PROJECTION
+from bywire.simulation.emit_rare import PROJECTION
 from bywire.simulation.set_valued import (
     FITTING,
     NEVER,

@@ -17,7 +17,7 @@ import pytest
 import bywire
 from bywire.core import sources
 from bywire.core.errors import ModelError
-from bywire.simulation import engine, kept_kernel, program
+from bywire.simulation import engine, program
 from bywire.simulation.compiler import Compiler, find_compiler
 from bywire.simulation.ensemble import Ensemble, simulate_ensemble
 from bywire.simulation.run import Run, Trajectory, simulate
@@ -41,8 +41,8 @@ class Kept:
 
         monkeypatch.setenv("BYWIRE_CACHE", str(folder))
         monkeypatch.setattr(program, "build_program", counted)
-        monkeypatch.setattr(kept_kernel, "_is_ours", lambda kind: True)
-        monkeypatch.setattr(kept_kernel, "_running_state", lambda: self.state)
+        monkeypatch.setattr(engine, "_is_ours", lambda kind: True)
+        monkeypatch.setattr(engine, "_running_state", lambda: self.state)
 
     def run(self, run: Run, kind: str = "auto") -> Trajectory:
         """Run in what counts as a new process."""
@@ -120,14 +120,14 @@ def test_kernels_in_lanes_are_kept_by_what_they_record(
         assert kept.builds == 1
     np.testing.assert_array_equal(again("v_1").values, plain.values[:, :, 1:])
     assert kept.builds == 2
-    monkeypatch.setattr(kept_kernel, "processor", lambda: "another one")
+    monkeypatch.setattr(engine, "processor", lambda: "another one")
     again("v_1")
     assert kept.builds == 3
     # A single run needs a kernel of its own; what was kept of the model says nothing wrong.
     for _ in range(2):
         require_equal(kept.run(CONTACT), simulate(CONTACT))
         assert kept.builds == 4
-    monkeypatch.setattr(kept_kernel, "processor", lambda: "a third one")
+    monkeypatch.setattr(engine, "processor", lambda: "a third one")
     kept.run(CONTACT)
     assert kept.builds == 5
 
@@ -176,7 +176,7 @@ def test_an_entry_of_another_shape_is_built_anew(kept: Kept) -> None:
     """Its digest holds, its contents do not."""
     first = kept.run(SMALL)
     for text in ("{}", "[]", '{"library": 3}'):
-        kept.entries()[0].write_text(f"{kept_kernel._digest(text)}\n{text}")
+        kept.entries()[0].write_text(f"{engine._digest(text)}\n{text}")
         require_equal(kept.run(SMALL), first)
     assert kept.builds == 4
 
@@ -201,7 +201,7 @@ def test_nothing_is_kept_when_a_file_changed_meanwhile(
     kept: Kept, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     states = iter(["before", "after"])
-    monkeypatch.setattr(kept_kernel, "_running_state", lambda: next(states))
+    monkeypatch.setattr(engine, "_running_state", lambda: next(states))
     kept.run(SMALL)
     assert kept.entries() == []
 
@@ -259,7 +259,7 @@ def test_a_folder_that_takes_nothing(kept: Kept, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setenv("BYWIRE_CACHE", str(file / "kernels"))
     require_equal(kept.run(SMALL), first)
     assert kept.builds == 2
-    monkeypatch.setattr(kept_kernel, "keep_text", lambda path, text: None)
+    monkeypatch.setattr(engine, "keep_text", lambda path, text: None)
     monkeypatch.setenv("BYWIRE_CACHE", str(kept.folder / "below"))
     require_equal(kept.run(SMALL), first)
     assert kept.builds == 3
@@ -268,22 +268,22 @@ def test_a_folder_that_takes_nothing(kept: Kept, monkeypatch: pytest.MonkeyPatch
 def test_only_our_own_models_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of another's model nobody knows what it is made of."""
     monkeypatch.setenv("BYWIRE_CACHE", str(tmp_path))
-    monkeypatch.setattr(kept_kernel, "_running_state", lambda: "state")
+    monkeypatch.setattr(engine, "_running_state", lambda: "state")
     case = bywire.Bench("hard-braking", "dardanelli2010").cases()[0]
     ours = engine.structure_of(case.model, case.par)
     other_choice = engine.structure_of(case.model, case.par.replace({"gear.law": "directional"}))
-    assert kept_kernel.place_of(case.model, ours) is not None
-    assert kept_kernel.place_of(case.model, ours) != kept_kernel.place_of(case.model, other_choice)
+    assert engine.place_of(case.model, ours) is not None
+    assert engine.place_of(case.model, ours) != engine.place_of(case.model, other_choice)
     theirs = engine.structure_of(CONTACT.model, CONTACT.par)
-    assert kept_kernel.place_of(CONTACT.model, theirs) is None
+    assert engine.place_of(CONTACT.model, theirs) is None
 
     class Changed(type(case.model)):  # type: ignore[misc]
         """One of ours with somebody's changes."""
 
     changed = Changed()
-    assert kept_kernel.place_of(changed, engine.structure_of(changed, case.par)) is None
-    monkeypatch.setattr(kept_kernel, "_running_state", lambda: "")
-    assert kept_kernel.place_of(case.model, ours) is None
+    assert engine.place_of(changed, engine.structure_of(changed, case.par)) is None
+    monkeypatch.setattr(engine, "_running_state", lambda: "")
+    assert engine.place_of(case.model, ours) is None
 
 
 def test_a_program_that_uses_bywire_is_no_command() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bywire.core.errors import ModelError
-from bywire.simulation.model_check import check_model
+from bywire.simulation.program import check_model
 from systems.nonlinear_drive import PARAMETERS, NonlinearDrive, State
 from systems.three_contacts import heart
 

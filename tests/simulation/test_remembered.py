@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from bywire.simulation.branches import declarations, remembered, renewal
 from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph
-from bywire.simulation.remembered import declarations, remembered, renewal
 
 LEVEL = {"p": 0, "x": 2}
 

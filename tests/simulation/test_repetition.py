@@ -14,12 +14,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep
 from bywire.core.catalog import parameters
 from bywire.core.errors import SolverError
 from bywire.core.interrupts import thread_pool
-from bywire.simulation import window as part
+from bywire.simulation import repetition as part
 from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
 

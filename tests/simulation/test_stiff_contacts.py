@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bywire.simulation.contacts import unresolved
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, doubts_of
-from bywire.simulation.stiff_contacts import unresolved
 from systems.two_mass import rig
 
 

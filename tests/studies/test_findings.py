@@ -13,9 +13,8 @@ from bywire.api.study_sensitivity import drivers_data
 from bywire.api.study_tables import influence_tables
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.studies.choice_influence import choice_influence
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
-from bywire.studies.findings import Findings
+from bywire.studies.findings import Findings, choice_influence
 from bywire.studies.study_file import read_study
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bywire.studies.failure_probability import UNKNOWN, FailureProbability, counted
 from bywire.studies.rare_failures import importance_of
+from bywire.studies.statistics import UNKNOWN, FailureProbability, counted
 from bywire.studies.study_file import read_study
 
 STUDY = """

@@ -10,10 +10,14 @@ import pytest
 from scipy import stats
 
 from bywire.bench.requirements import read_limit
-from bywire.studies.failure_probability import FailureProbability
-from bywire.studies.importance_sampling import importance_sampling
-from bywire.studies.limit_state import BEYOND, BudgetSpentError, margins_of
-from bywire.studies.subset_simulation import subset_simulation
+from bywire.studies.limit_state import (
+    BEYOND,
+    BudgetSpentError,
+    importance_sampling,
+    margins_of,
+    subset_simulation,
+)
+from bywire.studies.statistics import FailureProbability
 
 pytest.importorskip("openturns")
 

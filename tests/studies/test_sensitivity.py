@@ -16,10 +16,9 @@ from bywire.api.study_run import StudyRun
 from bywire.api.study_sensitivity import drivers_data, sensitivity_tables
 from bywire.core.errors import FileError, InputError, ParameterError
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
+from bywire.studies.designs import MOST, SENSITIVITY, SensitivityDesign
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan
-from bywire.studies.points import MOST
-from bywire.studies.sensitivity_design import SENSITIVITY, SensitivityDesign
 from bywire.studies.study_file import read_study
 
 NAMES = ("motor.R_m", "motor.K_e", "motor.L_m")

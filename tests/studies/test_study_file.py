@@ -427,7 +427,7 @@ def test_a_study_loads_neither_libraries_nor_brakes_that_it_has_no_use_for(tmp_p
     """Statistics, searches, or other brakes take as long to load as all else it begins with."""
     code = """
 import sys
-from bywire.api.run_study import read_study
+from bywire.studies.study_file import read_study
 read_study(sys.argv[1]).digest
 unused = {"scipy.stats", "scipy.optimize", "bywire.brakes.wedge.model"}
 print(unused & {*sys.modules}, "bywire.brakes.motorcycle.model" in sys.modules)

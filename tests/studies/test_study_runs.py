@@ -257,5 +257,5 @@ def test_a_study_of_a_loaded_brake_says_which_it_was(tmp_path, spring_axis):
     record["systems"] = ["elsewhere/axis.py"]  # not loaded by now
     (tmp_path / "out" / "study.json").write_text(json.dumps(record))
     (tmp_path / "study.toml").write_text(DAMPED.replace("bench.toml", "unknown-step"))
-    with pytest.raises(InputError, match=r"run with system elsewhere/axis\.py"):
+    with pytest.raises(InputError, match=r"run with bywire.load_system\(.elsewhere/axis\.py"):
         bywire.study_report(tmp_path / "out")

@@ -22,8 +22,8 @@ from bywire.report.document import FigureBlock, TableBlock
 from bywire.report.readable_axis import scale_of
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.findings import Findings
-from bywire.studies.polynomial_chaos import surrogate_of
 from bywire.studies.study_file import read_study
+from bywire.studies.surrogate import surrogate_of
 
 QUANTITIES = (
     "motor.R_m",

@@ -9,8 +9,8 @@ import pytest
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.studies.findings import Findings
-from bywire.studies.polynomial_chaos import surrogate_of
 from bywire.studies.study_file import read_study
+from bywire.studies.surrogate import surrogate_of
 
 pytest.importorskip("openturns")
 VARY = """

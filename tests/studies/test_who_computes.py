@@ -16,8 +16,14 @@ import pandas as pd
 import pytest
 
 from bywire.core.errors import FileError, ParameterError, RunError
-from bywire.studies.cluster import CLUSTER_MEMORY, CLUSTER_SETTINGS, Cluster
-from bywire.studies.executor import InProcess, Pool, executor_of
+from bywire.studies.executor import (
+    CLUSTER_MEMORY,
+    CLUSTER_SETTINGS,
+    Cluster,
+    InProcess,
+    Pool,
+    executor_of,
+)
 from bywire.studies.store import Origin, StudyStore
 from bywire.studies.study_file import read_study
 
@@ -109,7 +115,7 @@ def test_a_cluster_computes_the_same_until_its_workers_are_gone(study):
 
 def test_a_cluster_that_is_not_there_is_named(study, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("bywire.studies.cluster._SECONDS", 0.5)
+    monkeypatch.setattr("bywire.studies.executor._SECONDS", 0.5)
     with pytest.raises(RunError, match=r"no cluster answers at 'tcp://192\.0\.2\.1:9'"):
         next(iter(Cluster("tcp://192.0.2.1:9").computed(read_study(study()), [0])))
 

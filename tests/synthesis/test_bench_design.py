@@ -14,24 +14,21 @@ from bywire.analysis.crossings import measured_margin
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.analysis.margins import margins
-from bywire.analysis.response.dataset import Sweep, complex_values
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep, complex_values
 from bywire.api.loop_case import loop_case
 from bywire.api.verification_parts import verdict_text, verification_parts
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import from_mapping
 from bywire.bench.running import run
 from bywire.core.catalog import main_set, parameters
-from bywire.synthesis.bench_figures import BenchFigures, bench_figures
-from bywire.synthesis.bench_sines import Small, loop_gain
-from bywire.synthesis.bench_tuning import Tuning
-from bywire.synthesis.candidate import Candidate, bench_slacks, judged, linear_slacks
+from bywire.synthesis.bench_figures import BenchFigures, Small, bench_figures, loop_gain
+from bywire.synthesis.bench_tuning import Candidate, Tuning, bench_slacks, judged, linear_slacks
 from bywire.synthesis.linear_case import NOMINAL, cases_of
 from bywire.synthesis.optimizer import Problem
 from bywire.synthesis.outcome import bench_text
 from bywire.synthesis.requirement import read
-from bywire.synthesis.trial import Trial
-from bywire.synthesis.verification import Verification, verify
+from bywire.synthesis.verification import Trial, Verification, verify
 
 PAPER = (
     "bandwidth >= 10 Hz",

@@ -8,10 +8,8 @@ from collections.abc import Mapping, Sequence
 import pytest
 
 from bywire.synthesis import bench_tuning
-from bywire.synthesis.bench_figures import BenchFigures
-from bywire.synthesis.bench_sines import Small
-from bywire.synthesis.bench_tuning import Tuning, Worth, tune
-from bywire.synthesis.candidate import bench_slacks, ceiling
+from bywire.synthesis.bench_figures import BenchFigures, Small
+from bywire.synthesis.bench_tuning import Tuning, Worth, bench_slacks, ceiling, tune
 from bywire.synthesis.linear_case import NOMINAL
 from bywire.synthesis.optimizer import Problem
 from bywire.synthesis.requirement import read

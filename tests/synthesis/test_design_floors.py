@@ -17,11 +17,9 @@ from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.margins import margins
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import UnitError
-from bywire.synthesis.bench_figures import BenchFigures
-from bywire.synthesis.bench_sines import Small
-from bywire.synthesis.candidate import Candidate, judged
-from bywire.synthesis.designer import design
-from bywire.synthesis.floors import DISK, bench_floors, linear_floors
+from bywire.synthesis.bench_figures import BenchFigures, Small
+from bywire.synthesis.bench_tuning import Candidate, judged
+from bywire.synthesis.designer import DISK, bench_floors, design, linear_floors
 from bywire.synthesis.linear_case import NOMINAL, LinearCase, cases_of, room, slack
 from bywire.synthesis.requirement import read, share_left
 from few_starts import few_starts

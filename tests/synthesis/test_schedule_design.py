@@ -11,15 +11,13 @@ from bywire.bench.bench import Bench
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.synthesis.bench_figures import BenchFigures, bench_figures
-from bywire.synthesis.candidate import judged
+from bywire.synthesis.bench_tuning import judged
 from bywire.synthesis.linear_case import cases_of
 from bywire.synthesis.optimizer import Problem
 from bywire.synthesis.outcome import ScheduleDesign
 from bywire.synthesis.requirement import read
-from bywire.synthesis.schedule_designer import design_schedule, points_by_region
-from bywire.synthesis.schedule_verification import verify_schedule
-from bywire.synthesis.trial import MOST, Trial, corners_of
-from bywire.synthesis.verification import verify
+from bywire.synthesis.schedules import design_schedule, points_by_region, verify_schedule
+from bywire.synthesis.verification import MOST, Trial, corners_of, verify
 from few_starts import few_starts
 
 ON = {"ecu.schedule.law": "regions"}

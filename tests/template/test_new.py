@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from bywire.api.new import new
 from bywire.core.errors import FileError, ParameterError
+from bywire.usecases.new import new
 
 NAME = "front-caliper"
 

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from bywire.analysis.loop import Loop
-from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array, Complex, Progress
 

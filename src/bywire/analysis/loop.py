@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from bywire.analysis.linear.closed_loop import closed_again, closed_loop
 from bywire.analysis.linear.corners import taking
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.open_loop import analog_gain, cut_open, open_loop
-from bywire.analysis.linear.sampled_system import sampled_models
-from bywire.analysis.loop_schedule import LoopSchedule
-from bywire.analysis.response.saturation import Saturation
+from bywire.analysis.linear.sampled_loops import (
+    analog_gain,
+    closed_again,
+    closed_loop,
+    cut_open,
+    open_loop,
+    sampled_models,
+)
 from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
@@ -22,6 +26,83 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
 from bywire.core.typing import Array, Complex
 from bywire.simulation.run import Run
+
+_ROUNDING = 1e-12  # share of a limit by which a demand clipped to it may differ
+
+
+@dataclass(frozen=True)
+class Saturation:
+    """A limit that a model does not record as a mode of its own.
+
+    Parameters
+    ----------
+    name
+        What its share of the time is called, for instance ``"sat_current"``.
+    signals
+        Outputs that are limited; one at its limit is enough.
+    limits
+        Dotted names of the parameters that limit the magnitude; the smallest one does.
+    """
+
+    name: str
+    signals: tuple[str, ...]
+    limits: tuple[str, ...]
+
+    def share(self, values: Array, matrix: Array, names: Sequence[str]) -> Array:
+        """Return the share of the time at the limit, shape (cases,).
+
+        Parameters
+        ----------
+        values
+            The signals, shape (cases, rows, signals).
+        matrix, names
+            Parameter vectors, shape (parameters, cases), and the names of their rows.
+        """
+        limit = matrix[[names.index(name) for name in self.limits]].min(axis=0)
+        at = np.abs(values) >= (1.0 - _ROUNDING) * limit[:, None, None]
+        return np.asarray(at.any(axis=2).mean(axis=1))
+
+
+# --- Gain schedules: regions of the operating quantity, gains of each
+
+
+@dataclass(frozen=True)
+class LoopSchedule:
+    """Gains that depend on the operating point, region by region.
+
+    Parameters
+    ----------
+    changes
+        Parameters that switch the schedule on.
+    borders
+        Parameters at which regions meet, ascending.
+    regions
+        Name of each region -> what a design may choose there: dotted name -> lowest and highest
+        value [SI]; by ascending operating point.
+    main
+        Region whose gains are also those without a schedule; it is designed first.
+    points
+        Operating points for which regions are usually designed [SI].
+    """
+
+    changes: Mapping[str, Any]
+    borders: tuple[str, ...]
+    regions: Mapping[str, Mapping[str, tuple[float, float]]]
+    main: str
+    points: tuple[float, ...]
+
+    def is_on(self, par: ParameterSet) -> bool:
+        """Tell whether parameters have the schedule switched on."""
+        values = par.flat()
+        return all(values[name] == value for name, value in self.changes.items())
+
+    def region(self, par: ParameterSet, value: float) -> str:
+        """Return the region of an operating point; a border belongs to the one above."""
+        leaves = par.leaves()
+        return tuple(self.regions)[bisect_right([leaves[name] for name in self.borders], value)]
+
+
+# --- Loops
 
 
 @dataclass(frozen=True)

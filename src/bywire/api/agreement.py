@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from bywire.analysis import agreement as measuring
@@ -14,10 +12,11 @@ from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.margins import NO_LOOP
 from bywire.analysis.response.frequency_response import require_stable
 from bywire.api.linear_texts import corner_notes
-from bywire.api.loop_case import LoopCase, loop_case, spread
+from bywire.api.loop_case import LoopCase, spread
 from bywire.bench.running import Progress
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError
-from bywire.report.answer import Answer, use_case
+from bywire.report.answer import Answer
 from bywire.report.document import Banner, Document, FigureBlock, Paragraph, Section, TableBlock
 from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount
@@ -25,7 +24,6 @@ from bywire.report.wording import amount
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_POINTS = 6
 _WIDTH = 140  # characters of a line of the table
 
 LABELS = {NOTHING: "nothing, small amplitude", LIMITS: "limits", EVERYTHING: "everything"}
@@ -102,7 +100,7 @@ class LoopAgreement(Answer):
         )
 
     def _draw(self) -> Figure:
-        from bywire.report.differences import differences
+        from bywire.report.response_figures import differences
 
         compared = self.differences
         sizes = {
@@ -139,59 +137,40 @@ class LoopAgreement(Answer):
         }
 
 
-@use_case
-def agreement(
-    loop: str,
-    parameters: str = "",
-    at: str = "",
-    overrides: Mapping[str, Any] = MappingProxyType({}),
-    *,
-    frequencies: str = "",
-    amplitudes: str = "",
-    progress: Progress | None = None,
-    side: str = "",
+def compared_responses(
+    case: LoopCase,
+    frequencies: list[float],
+    amplitudes: tuple[float, float],
+    progress: Progress | None,
 ) -> LoopAgreement:
-    """Compare nonlinear and linear response of a loop, cause by cause.
+    """Return how far both responses of a loop are from each other, cause by cause.
 
     Parameters
     ----------
-    loop, parameters, at, overrides
-        As of `bywire.margins`.
-    frequencies
-        ``"1 Hz:150 Hz:20"``, or a list with commas; six over the loop's band by default.
-    amplitudes
-        A small and a large one, ``"0.001 rad, 1 rad"``; the loop's own by default.
+    case
+        The loop at its operating point.
+    frequencies, amplitudes
+        Frequencies [Hz], and the small and the large amplitude [SI].
     progress
         Called with a label and the finished share, 0 to 1.
-    side
-        Of the linear model, as of `bywire.margins`.
-
-    Returns
-    -------
-    LoopAgreement
-        What the loop's responses differ by, cause by cause: frequencies in Hz, gains and phases in
-        degree, shares of the difference in percent.
 
     Raises
     ------
-    InputError
-        For names that are unknown, values out of range, sets of another brake, unstable loops.
+    ParameterError
+        When the loop is unstable, or its output does not answer to the set point.
     """
-    case = loop_case(loop, parameters, at, overrides, side)
-    unit = case.input_unit
-    small, large = two_amplitudes(case, amplitudes)
-    wanted = case.frequencies(frequencies, _POINTS)
     gain, closed = case.loop.gain_and_closed(case.par, case.value)
     require_stable(closed)
     if not LoopFigures(gain, closed).answers:
         raise ParameterError(
             f"loop {case.loop.name!r} at {case.point}: {NO_LOOP}, and the output does not answer "
-            "to the set point; choose other gains with --set, or another point with --at"
+            f"to the set point; choose other gains with {option('overrides')}, or another point "
+            f"with {option('at')}"
         )
     compared = measuring.agreement(
-        case.loop, case.par, case.value, wanted, (small, large), progress=progress
+        case.loop, case.par, case.value, frequencies, amplitudes, progress=progress
     )
-    return LoopAgreement(case, compared, small, large, unit)
+    return LoopAgreement(case, compared, *amplitudes, case.input_unit)
 
 
 def two_amplitudes(case: LoopCase, text: str) -> tuple[float, float]:
@@ -207,8 +186,8 @@ def two_amplitudes(case: LoopCase, text: str) -> tuple[float, float]:
     sizes = spread(text, case.input_unit, "amplitudes")
     if len(sizes) != 2 or not sizes[0] < sizes[1]:
         raise ParameterError(
-            f"--amplitudes {text}: two are wanted, the small one first: everything off is "
-            "measured with it, every cause with the large one"
+            f"{option('amplitudes')} {text}: two are wanted, the small one first: everything off "
+            "is measured with it, every cause with the large one"
         )
     return sizes[0], sizes[1]
 

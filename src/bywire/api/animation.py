@@ -10,7 +10,7 @@ from bywire.core.errors import ParameterError
 from bywire.report.animation.page import scene_page
 from bywire.report.animation.scene import SCENES
 from bywire.report.document import Attachment
-from bywire.report.files import write_bytes
+from bywire.report.drawing import write_bytes
 
 
 def require_scene(bench: Bench, over: str = "") -> None:

@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.response.large_signal import Variant, narrowest
-from bywire.report.tables import Table, text_table
+from bywire.report.tables import Table, amount_cell, measured_cell, text_table
 from bywire.report.wording import amount, measured_amount
 
 NOTE = (
@@ -52,13 +52,13 @@ def figures_table(response: xr.Dataset, unit: str) -> Table:
     for j, size in enumerate(response["amplitude"].values):
         case = response.isel(variant=0, amplitude=j)
         most = [f"{100.0 * float(case[name].max()):.3g} %" for name in known]
-        margin = measured_amount(
+        margin = measured_cell(
             float(case["phase_margin"]), "deg", _step_error(case, "phase_margin"), 3
         )
         factors = [_factor(case, name) for name in ("gain_margin", "lower_gain_margin")]
         rows.append(
             [
-                amount(float(size), unit, 3),
+                amount_cell(float(size), unit, 3),
                 _frequency(case, "bandwidth"),
                 _frequency(case, "crossover"),
                 margin,
@@ -101,7 +101,7 @@ def over_table(
     sizes = [amount(float(size), unit, 3) for size in response["amplitude"].values]
     rows = [
         [
-            amount(variant.label, range_[1]),
+            amount_cell(variant.label, range_[1]),
             *(
                 _frequency(response.isel(variant=k, amplitude=j), "bandwidth")
                 for j in range(len(sizes))

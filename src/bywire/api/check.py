@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from bywire.contracts.finding import Finding, one_by_cause
-from bywire.contracts.subjects import demands_on
-from bywire.core.brake import brakes, load_system, loaded_files
-from bywire.report.answer import Answer, use_case
-from bywire.report.bench_figures import FIGURES
+from bywire.contracts.evidence import Finding
+from bywire.report.answer import Answer
 from bywire.report.document import Banner, Document, Flat, Listing, Section, TableBlock
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import clean
@@ -110,66 +106,6 @@ class Check(Answer):
                 for f in self.findings
             ],
         }
-
-
-@use_case
-def check(
-    name: str | None = None,
-    *,
-    system: str | Path | None = None,
-    progress: Progress | None = None,
-) -> Check:
-    """Put a brake, or a part of one, to the test of every contract.
-
-    Elements and laws: units, back ends, derivatives, energy, losses, round trip and ranges of
-    their parameters. Models: units, order of the step, exact rest, energy of a run, engines,
-    lanes, linear model, derivatives of a run. Experiments: the assembly, figures, stimuli and
-    signals that they name, and the key figures that they declare.
-
-    Parameters
-    ----------
-    name
-        Of a brake, a model, an experiment, an element, a control law or a parameter set; by
-        default the brake of ``system``, else those that were loaded from files, else everything
-        that is installed.
-    system
-        File or folder of a brake to load first; its code is run.
-    progress
-        Called with what is being checked and the finished share, 0 to 1.
-
-    Returns
-    -------
-    Check
-        What holds, what does not, and what could not be checked.
-
-    Raises
-    ------
-    UnknownNameError
-        With the nearest known names.
-    FileError, ModelError
-        When the system cannot be loaded.
-
-    Examples
-    --------
-    >>> check("plant.pedal").holds
-    True
-    """
-    if system is not None:
-        named = [load_system(system).name]
-    else:
-        files = loaded_files()
-        named = [brake.name for brake in brakes().values() if brake.file in files]
-    names: list[str | None] = [name] if name is not None else [*named] or [None]
-    demands = [demand for each in names for demand in demands_on(each, FIGURES.all())]
-    subject = ", ".join(each or "everything installed" for each in names)
-
-    def settled() -> Iterator[Finding]:
-        for k, demand in enumerate(demands):
-            if progress is not None:
-                progress(subject, k / len(demands))
-            yield demand.settle()
-
-    return Check(subject, tuple(one_by_cause(settled())))
 
 
 def _figures(findings: list[Finding]) -> Table:

@@ -14,8 +14,8 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench_file import flattened
+from bywire.bench.bench_source import experiment_of
 from bywire.bench.experiment import Experiment
-from bywire.bench.experiment_choice import experiment_of
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.option_names import OPTION
 from bywire.bench.requirements import Verdict
@@ -25,8 +25,8 @@ from bywire.bench.stimuli.registry import STIMULI
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError
 from bywire.core.parameters import ParameterSet, leaf_fields
-from bywire.report.changes import bench_changes
 from bywire.report.document import Change
+from bywire.report.subject import bench_changes
 
 _BENCH = {
     "experiment": "experiment",

@@ -10,7 +10,7 @@ from typing import Any
 from bywire.api.compared_run import ComparedRun, Setting
 from bywire.bench.step_error import are_distinct
 from bywire.core.units import difference_unit
-from bywire.report.tables import Cell, Column, Table, value_text
+from bywire.report.tables import Cell, Column, Table, measured_cell, value_text
 from bywire.report.wording import clean, measured_amount
 
 _LONGEST = 48  # characters of a value in a table
@@ -96,7 +96,7 @@ def kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
             (
                 Cell(clean(each.name)),
                 *(
-                    Cell(measured_amount(v, each.unit, e), value=v)
+                    measured_cell(v, each.unit, e)
                     for v, e in zip(each.values, each.errors, strict=True)
                 ),
                 _change(each),

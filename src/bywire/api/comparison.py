@@ -17,6 +17,7 @@ from bywire.api.compared_tables import (
     verdict_table,
 )
 from bywire.bench.result_folder import verdict_record
+from bywire.core.callers import is_command_line
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Block,
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from bywire.report.step_marks import StepLimits
+    from bywire.report.step_response import StepLimits
 
 _FEW = 2  # differing settings that a legend names
 
@@ -89,7 +90,8 @@ class Comparison(Answer):
             said.append(f"not drawn, for lack of a counterpart over time: {', '.join(left_out)}")
         said += [
             f"{each.label}: its parameter set is not known here, so its values stand without "
-            "units; --system PATH loads a brake of your own"
+            f"units; {'--system PATH' if is_command_line() else 'bywire.load_system'} loads a "
+            "brake of your own"
             for each in self.runs
             if not each.has_units
         ]
@@ -202,7 +204,7 @@ class Comparison(Answer):
         return blocks_of[0], blocks_of[1]
 
     def _curves(self) -> list[Block]:
-        from bywire.report.overlaid_panels import can_overlay
+        from bywire.report.overlaid import can_overlay
 
         return [
             FigureBlock(
@@ -216,7 +218,7 @@ class Comparison(Answer):
 
     def _differences(self) -> list[Block]:
         """Return what each run differs from the first by, over time, where that can be drawn."""
-        from bywire.report.difference_traces import difference_figure
+        from bywire.report.overlaid import difference_figure
 
         first, *_ = self.runs
         blocks: list[Block] = []
@@ -232,7 +234,7 @@ class Comparison(Answer):
 
     def _step(self) -> tuple[str, StepLimits] | None:
         """Return signal and limits of the step that all runs are judged by, if they share it."""
-        from bywire.report.step_marks import step_limits
+        from bywire.report.step_response import step_limits
 
         steps = [
             None
@@ -281,6 +283,6 @@ _NOT_NAMED = ("experiment", "bywire_version", "engine")
 
 
 def _drawn(recordings: Mapping[str, xr.Dataset], step: tuple[str, StepLimits] | None) -> Figure:
-    from bywire.report.overlaid_panels import overlaid_panels
+    from bywire.report.overlaid import overlaid_panels
 
     return overlaid_panels(recordings, step=step)

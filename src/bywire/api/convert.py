@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from bywire.core import units
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError
-from bywire.data.file_format import Progress, no_progress
-from bywire.report.answer import Answer, use_case
+from bywire.report.answer import Answer
 from bywire.report.document import Document, Section, TableBlock
-from bywire.report.tables import Table, text_table
+from bywire.report.tables import Cell, Table, text_table
 
 if TYPE_CHECKING:
     from bywire.data.channel_quality import AlignedChannel, AlignmentReport, Stretch
@@ -69,8 +69,15 @@ class Conversion(Answer):
 
     def _signal_table(self) -> Table:
         rows = [
-            (name, row["unit"], str(row["samples"]), row["time"], row["column"])
+            (
+                name,
+                row["unit"],
+                Cell(str(samples), value=samples, unit="1"),
+                row["time"],
+                row["column"],
+            )
             for name, row in self._signals().items()
+            for samples in (row["samples"],)
         ]
         return text_table(("signal", "unit", "samples", "instants", "column"), rows)
 
@@ -108,97 +115,25 @@ class Conversion(Answer):
         }
 
 
-@use_case
-def convert(
-    source: str | Path,
-    target: str | Path,
-    *,
-    mapping: str | Path | None = None,
-    signals: Sequence[str] = (),
-    time: str = "",
-    rate: str | float | None = None,
-    method: str = "",
-    exclude: Sequence[str] | None = None,
-    max_gap: str = "",
-    format: str = "",
-    force: bool = False,
-    progress: Progress | None = None,
-) -> Conversion:
-    """Read a measurement file, align its signals where a rate is given, write the other file.
-
-    Parameters
-    ----------
-    source, target
-        File to read, and file to write: CSV, TSV, Parquet, MAT, MDF4, NetCDF.
-    mapping
-        File that says what the columns mean.
-    signals
-        Signals to keep, all by default: names, or columns such as ``"Pressure [psi]"`` and
-        ``"p_mc=Pressure [psi]"``, which gives one a name.
-    time
-        Column of the instants, such as ``"Zeit [s]"``, or a sample rate; that of the file by
-        default.
-    rate
-        Rate of the one time axis, for instance ``"1 kHz"`` [Hz]; by default every signal keeps its
-        own instants.
-    method
-        How to resample: ``linear`` (default), ``previous``, ``nearest`` or ``average``.
-    exclude
-        What is left out: ``gaps`` and ``missing`` (both by default), ``clipped``.
-    max_gap
-        Longest pause that is no gap, for instance ``"50 ms"``; 10 steps by default.
-    format
-        Format to write, for instance ``mat73``; else by the ending.
-    force
-        Whether a file that is there is replaced.
-    progress
-        Called with a label and the finished share, 0 to 1.
-
-    Returns
-    -------
-    Conversion
-        What was read, resampled and written, with rates in Hz and gaps in s.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read or written, or something does not fit.
-    """
-    from bywire.data.format_registry import format_to_write
-    from bywire.data.measurement import mapping_of
-    from bywire.data.named_columns import read_wanted
-    from bywire.data.writing import require_free, write_measurement
-
-    shown = no_progress if progress is None else progress
-    source, target = Path(source), Path(target)
-    format_to_write(target, format)
-    require_free(target, overwrite=force)
-    left_out = None if exclude is None else ", ".join(exclude) or "nothing"
-    for option, value in {"method": method, "exclude": left_out, "max-gap": max_gap}.items():
-        if value and rate is None:
-            raise ParameterError(
-                f"--{option} {value}: it says how to resample: give the rate too, as --rate '1 kHz'"
-            )
-    dataset, notes = read_wanted(source, mapping_of(mapping), signals, time, shown)
-    report = None
-    if rate is not None:
-        dataset, report = _aligned(dataset, rate, method, exclude, max_gap)
-    write_measurement(dataset, target, format=format, overwrite=force, progress=shown)
-    return Conversion(source, target, dataset, report, notes)
-
-
-def _aligned(
+def aligned(
     dataset: xr.Dataset,
     rate: str | float,
     method: str,
     exclude: Sequence[str] | None,
     max_gap: str,
 ) -> tuple[xr.Dataset, AlignmentReport]:
+    """Return the signals on one time axis, and what was done to them; see `bywire.convert`.
+
+    Raises
+    ------
+    ParameterError
+        For a rate that is none.
+    """
     from bywire.data.alignment import resample
 
-    frequency = units.parse(rate, "Hz", "--rate")
+    frequency = units.parse(rate, "Hz", option("rate"))
     if not frequency > 0.0:
-        raise ParameterError(f"--rate {rate}: it must be > 0 Hz")
+        raise ParameterError(f"{option('rate')} {rate}: it must be > 0 Hz")
     given = {"method": method, "max_gap": max_gap}
     options: dict[str, Any] = {key: value for key, value in given.items() if value}
     if exclude is not None:
@@ -245,7 +180,7 @@ def _around(report: AlignmentReport) -> tuple[list[str], list[str]]:
     )
     folded = (
         f"faster than the axis: {', '.join(report.folded)}; what they hold above half its rate "
-        "folds into slow content, unless --method average"
+        f"folds into slow content, unless {option('method', 'average')}"
     )
     return [head], [folded] if report.folded else []
 
@@ -255,15 +190,17 @@ def _channel_table(report: AlignmentReport) -> Table:
     return text_table(heading, [_row(channel) for channel in report.channels])
 
 
-def _row(channel: AlignedChannel) -> tuple[str, ...]:
+def _row(channel: AlignedChannel) -> tuple[str | Cell, ...]:
     quality = channel.quality
+    jitter = f"{1e3 * quality.jitter:.3g} ms" if quality.jitter * quality.rate > _ROUNDING else "-"
+    delay = f"{1e3 * channel.delay:.4g} ms" if channel.delay else "-"
     return (
         channel.name,
-        f"{quality.rate:.6g} Hz",
-        f"{1e3 * quality.jitter:.3g} ms" if quality.jitter * quality.rate > _ROUNDING else "-",
-        f"{1e3 * channel.delay:.4g} ms" if channel.delay else "-",
+        Cell(f"{quality.rate:.6g} Hz", value=quality.rate, unit="Hz"),
+        Cell(jitter, value=quality.jitter, unit="s"),
+        Cell(delay, value=channel.delay, unit="s"),
         *(_in_short(stretches) for stretches in (quality.gaps, quality.missing, quality.clipped)),
-        str(channel.excluded),
+        Cell(str(channel.excluded), value=channel.excluded, unit="1"),
     )
 
 

@@ -156,7 +156,7 @@ class DesignAnswer(Answer):
 
     def _write_bench(self, path: Path) -> Path:
         """Write the gains as a bench file."""
-        from bywire.report.files import write_bytes
+        from bywire.report.drawing import write_bytes
 
         case, tried = self.case, self.tried
         state = self.linear.status if tried is None or tried.met else "not met"

@@ -9,18 +9,18 @@ from typing import Any
 
 from bywire.api.loop_case import LoopCase
 from bywire.api.study_tables import percent
-from bywire.api.verification_parts import Part, figure_text
+from bywire.api.verification_parts import Part, figure_cell
 from bywire.bench.option_names import OPTION
 from bywire.bench.requirements import Limit
 from bywire.core.errors import InputError, ParameterError, quoted
 from bywire.core.typing import Progress, silent
 from bywire.core.units import parse
-from bywire.report.tables import text_table
+from bywire.report.tables import Cell, text_table
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.statistics import Outcome, Share, judged, share
 from bywire.studies.study_file import read_study
 from bywire.synthesis.linear_case import LinearCase, existing_case, require_given
-from bywire.synthesis.probability import Judged, judged_over
+from bywire.synthesis.outcome import Judged, judged_over
 
 DRAWN = 64
 """models that gains are chosen for, by default"""
@@ -92,8 +92,8 @@ class Probability:
     def parts(self) -> Sequence[Part]:
         """Return a table and sentences."""
         told = f"{100.0 * self.drawn.confidence:g} % interval"
-        rows = [
-            (str(wanted), *self._words(self._share(count)), figure_text(wanted.figure, worst))
+        rows: list[tuple[str | Cell, ...]] = [
+            (str(wanted), *self._words(self._share(count)), figure_cell(wanted.figure, worst))
             for wanted, count, worst in zip(
                 self.requirements, self.judged.met, self.judged.worst, strict=True
             )

@@ -10,11 +10,12 @@ from typing import Any
 from bywire.api.loop_case import LoopCase, spread
 from bywire.bench.bench import Bench
 from bywire.bench.requirements import Limit
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields
 from bywire.data.toml_file import read_toml
 from bywire.synthesis.requirement import read
-from bywire.synthesis.trial import Trial
+from bywire.synthesis.verification import Trial
 
 Spans = Mapping[str, tuple[float, float]]
 
@@ -39,7 +40,7 @@ def left_to_choose(
     left = {name: span for name, span in spans.items() if name not in changes}
     if not left:
         raise ParameterError(
-            f"--set fixes all of {', '.join(spans)}: leave out what is to be chosen"
+            f"{option('overrides')} fixes all of {', '.join(spans)}: leave out what is to be chosen"
         )
     return left
 

@@ -9,11 +9,13 @@ from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.api.loop_case import LoopCase
 from bywire.api.verification_parts import (
     Part,
+    figure_cell,
     figure_text,
     verification_object,
     verification_parts,
 )
 from bywire.bench.requirements import Limit
+from bywire.core.callers import option
 from bywire.core.parameters import leaf_fields
 from bywire.report.document import Flat, Listing, TableBlock
 from bywire.report.tables import text_table
@@ -92,8 +94,8 @@ def as_parts(
     figures = [
         [
             name,
-            figure_text(name, design.nominal[name]),
-            figure_text(name, design.worst[name][0]),
+            figure_cell(name, design.nominal[name]),
+            figure_cell(name, design.worst[name][0]),
             design.worst[name][1],
             wanted.get(name, "").removeprefix(name).strip(),
         ]
@@ -143,7 +145,7 @@ def limit_lines(case: LoopCase, limits: Mapping[str, tuple[float, float]]) -> li
         else f"{name} >= {gain_text(case, name, low)}"
         for name, (low, high) in limits.items()
     ]
-    return [f"kept for an ECU: {', '.join(texts)} (--free-derivative does not)"]
+    return [f"kept for an ECU: {', '.join(texts)} ({option('free_derivative')} does not)"]
 
 
 def unit_of(case: LoopCase, name: str) -> str:

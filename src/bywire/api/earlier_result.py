@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from bywire.core.callers import option
 from bywire.core.errors import FileError
 
 ESTIMATE = "estimate.json"
@@ -32,7 +33,7 @@ def require_own(out: Path, method: str) -> None:
             continue
         raise FileError(
             f"{out} holds a {what} of {earlier.get('method') or 'something else'}: name another "
-            f"folder with --out for {method}, or remove {path} with what belongs to it"
+            f"folder with {option('folder')} for {method}, or remove {path} with what belongs to it"
         )
 
 
@@ -81,7 +82,7 @@ def _unlink(path: Path) -> None:
     except OSError as error:
         raise FileError(
             f"cannot remove {path} of an earlier result: {error.strerror}; name another folder "
-            "with --out"
+            f"with {option('folder')}"
         ) from None
 
 
@@ -95,6 +96,7 @@ def _read(path: Path) -> dict[str, Any] | None:
             raise ValueError("it is no result of bywire identify")
     except (OSError, ValueError) as error:
         raise FileError(
-            f"{path} cannot be read ({error}): name another folder with --out, or remove it"
+            f"{path} cannot be read ({error}): name another folder with {option('folder')}, or "
+            "remove it"
         ) from None
     return earlier

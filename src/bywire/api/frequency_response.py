@@ -4,112 +4,87 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Any, cast
 
 import xarray as xr
 
 from bywire.analysis.response import frequency_response as by_sines
 from bywire.analysis.response.broadband import Broadband, broadband_response
-from bywire.analysis.response.dataset import Sweep
-from bywire.analysis.response.frequency_response import require_stable
+from bywire.analysis.response.frequency_response import require_stable, with_step_errors
 from bywire.analysis.response.large_signal import (
     Variant,
     variants_over,
     widths,
     with_widths,
 )
-from bywire.analysis.response.step_share import with_step_errors
+from bywire.analysis.response.sweep import Sweep
 from bywire.api.frequency_response_answer import FrequencyResponse
-from bywire.api.loop_case import LoopCase, loop_case, over_range, spread
+from bywire.api.loop_case import LoopCase
 from bywire.bench.running import Progress
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, of_difference
-from bywire.core.blas import on_one_thread
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.callers import option
+from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields
-from bywire.core.typing import silent
 from bywire.core.units import shown
-from bywire.report.answer import use_case
 from bywire.report.wording import amount
 
-_POINTS = 20
-_EXCITATIONS = ("sine", "multisine", "chirp")
 
-
-@use_case
-@on_one_thread()
-def frequency_response(
-    loop: str,
-    parameters: str = "",
-    at: str = "",
-    overrides: Mapping[str, Any] = MappingProxyType({}),
+def measured_response(
+    case: LoopCase,
+    overrides: Mapping[str, Any],
+    frequencies: list[float],
+    amplitudes: list[float],
+    over: tuple[str, str, list[float]],
+    excitation: str,
+    progress: Progress,
     *,
-    frequencies: str = "",
-    amplitudes: str = "",
-    excitation: str = "sine",
-    over: str = "",
-    progress: Progress | None = None,
-    estimate_error: bool = True,
-    side: str = "",
+    estimate_error: bool,
 ) -> FrequencyResponse:
-    """Measure a closed loop's response by amplitude on the nonlinear model.
+    """Return the response of a loop, with its error from the step where that is asked for.
 
     Parameters
     ----------
-    loop, parameters, at, overrides
-        As of `bywire.margins`.
-    frequencies
-        ``"1 Hz:150 Hz:20"``, or a list with commas; twenty over the loop's band by default.
-    amplitudes
-        With their unit and commas; the loop's own by default.
-    excitation
-        ``"sine"`` (one frequency at a time), ``"multisine"``, or ``"chirp"``.
+    case, overrides
+        The loop at its operating point, and what the user changed.
+    frequencies, amplitudes
+        Of the input [Hz, SI].
     over
-        Range for bandwidths, ``"NAME=LOW:HIGH:COUNT"``.
-    progress
-        Called with a label and the finished share, 0 to 1.
-    estimate_error
-        Whether the response is measured in half steps too: gain, phase and bandwidths then say
-        how large their error from the step is (``NAME_step_error`` in ``data``).
-    side
-        Of the linear models, as of `bywire.margins`.
-
-    Returns
-    -------
-    FrequencyResponse
-        Gain and phase [degree] by frequency [Hz] and amplitude [SI], with bandwidths in Hz.
+        Name, unit and values of the range for bandwidths; an empty name without one.
+    excitation, progress, estimate_error
+        As of `bywire.frequency_response`.
 
     Raises
     ------
-    InputError
-        For names that are unknown, values out of range, sets of another brake, unstable loops.
+    ParameterError
+        When the linear loop is unstable.
     """
-    if excitation not in _EXCITATIONS:
-        raise unknown_name("excitation", excitation, _EXCITATIONS)
-    case = loop_case(loop, parameters, at, overrides, side)
-    unit = case.input_unit
-    wanted = case.frequencies(frequencies, _POINTS)
-    sizes = spread(amplitudes, unit, "amplitudes") if amplitudes else list(case.loop.amplitudes)
     base, note = _sustained(case, overrides)
-    variants, varied = _variants(base, case, over)
+    variants = _variants(base, over)
     point = variants[0].point
     flags = [n for n in point.model.Output._fields if n == "stuck" or n.startswith("sat_")]
     sweep = Sweep(
         case.loop.inputs,
         case.loop.output,
-        wanted,
-        sizes,
+        frequencies,
+        amplitudes,
         flags=flags,
         whole=case.loop.whole(point.par),
         saturations=case.loop.saturations,
     )
-    response = _measured(variants, sweep, excitation, progress or silent)
+    response = _measured(variants, sweep, excitation, progress)
     response = with_widths(response, widths(variants, response))
     if estimate_error:
-        response = _with_step_errors(response, variants, sweep, excitation, progress or silent)
+        response = _with_step_errors(response, variants, sweep, excitation, progress)
     linear = variants[0].linear(response["frequency"].values)
     return FrequencyResponse(
-        case, response, linear, tuple(variants), varied, unit, note, sweep.tolerance
+        case,
+        response,
+        linear,
+        tuple(variants),
+        over[:2],
+        case.input_unit,
+        note,
+        sweep.tolerance,
     )
 
 
@@ -127,29 +102,30 @@ def _sustained(case: LoopCase, changes: Mapping[str, Any]) -> tuple[Variant, str
         for name, value in after.items()
         if value != before[name]
     ]
-    note = f"set for sines that last: {', '.join(texts)}; --set keeps another value"
+    note = f"set for sines that last: {', '.join(texts)}; {option('overrides')} keeps another "
+    note += "value"
     return Variant(loop, par, case.value), note if texts else ""
 
 
-def _variants(base: Variant, case: LoopCase, range_: str) -> tuple[list[Variant], tuple[str, str]]:
-    """Return the cases of a range, or the one without, and name and unit of what varies.
+def _variants(base: Variant, over: tuple[str, str, list[float]]) -> list[Variant]:
+    """Return the cases of a range, or the one without.
 
     Raises
     ------
     ParameterError
         When the linear loop is unstable in one of them.
     """
-    if not range_:
+    name, unit, values = over
+    if not name:
         require_stable(base.loop.closed(base.par, base.value))
-        return [base], ("", "1")
-    name, unit, values = over_range(range_, case)
+        return [base]
     variants = variants_over(base, name, values)
     for variant in variants:
         try:
             require_stable(base.loop.closed(variant.par, variant.value))
         except ParameterError as error:
             raise ParameterError(f"{name} = {amount(variant.label, unit)}: {error}") from None
-    return variants, (name, unit)
+    return variants
 
 
 def _with_step_errors(

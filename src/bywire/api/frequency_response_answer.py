@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.analysis.response.frequency_response import largest
 from bywire.analysis.response.large_signal import (
     Variant,
 )
-from bywire.analysis.response.step_share import largest
 from bywire.api.bandwidth_tables import (
     NOTE,
     figures_object,
@@ -172,7 +172,7 @@ class FrequencyResponse(Answer):
         return bode(lines)
 
     def _over_range(self) -> Figure:
-        from bywire.report.bandwidth_range import bandwidth_range
+        from bywire.report.response_figures import bandwidth_range
 
         return bandwidth_range(self.data, [v.label for v in self.variants], *self.range)
 

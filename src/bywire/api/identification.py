@@ -16,7 +16,6 @@ from bywire.identification.estimate import Estimate, as_object
 from bywire.identification.method import Identified
 from bywire.identification.parameter_file import parameter_file
 from bywire.report.answer import Answer
-from bywire.report.changes import changes_block
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -32,8 +31,7 @@ from bywire.report.document import (
     spaced,
 )
 from bywire.report.estimate_tables import check_table, estimate_table, figure_table
-from bywire.report.parameter_rows import parameter_rows
-from bywire.report.subject import Subject
+from bywire.report.subject import Subject, changes_block, parameter_rows
 from bywire.report.tables import parameter_table
 
 
@@ -123,7 +121,7 @@ class Identification(Answer):
             lines += [f"lies at its bound: {label}" for label in estimate.at_bounds()]
         comment = "\n".join([*lines, *([method.bench_note] if method.bench_note else [])])
         if method.bench is not None:
-            from bywire.bench.bench_text import bench_text
+            from bywire.bench.bench_file import bench_text
 
             return bench_text(method.bench.with_overrides(self.identified.parameters), comment)
         changes = {**self.chosen.changes, **self.identified.parameters}
@@ -148,7 +146,7 @@ class Identification(Answer):
         )
 
     def _sections(self, subject: Subject | None) -> list[Section]:
-        from bywire.report.method_curve import method_curve
+        from bywire.report.estimate_figures import method_curve
 
         curves = [
             FigureBlock(partial(method_curve, curve), curve.caption, curve.name)
@@ -181,7 +179,7 @@ class Identification(Answer):
             yield Listing(self.identified.notes)
 
     def _residuals(self) -> list[Block]:
-        from bywire.report.residual_figure import residual_figure
+        from bywire.report.estimate_figures import residual_figure
 
         return [
             FigureBlock(partial(residual_figure, estimate), _residual_caption(name, estimate), key)
@@ -190,7 +188,7 @@ class Identification(Answer):
         ]
 
     def _correlations(self) -> list[Block]:
-        from bywire.report.correlation_matrix import correlation_matrix
+        from bywire.report.estimate_figures import correlation_matrix
 
         blocks: list[Block] = [
             FigureBlock(
@@ -311,6 +309,6 @@ def _residual_caption(name: str, estimate: Estimate) -> str:
 
 
 def _write_text(text: str, path: Path) -> Path:
-    from bywire.report.files import write_bytes
+    from bywire.report.drawing import write_bytes
 
     return write_bytes(path, text.encode())

@@ -6,24 +6,18 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
-from bywire.bench.running import Progress
 from bywire.core.arguments import whole_number
 from bywire.core.errors import ParameterError
-from bywire.core.typing import Array, silent
+from bywire.core.typing import Array
 from bywire.core.units import difference_unit
-from bywire.life.life_file import CONDITIONS, WEAR, read_life
-from bywire.life.one_by_one import one_by_one
-from bywire.life.plan import CONDITION, LifePlan
-from bywire.life.projection import CONFIDENCE, Projection, projected
-from bywire.report.answer import Answer, use_case
-from bywire.report.changes import defaults_of, value_changes
+from bywire.life.life_file import CONDITION, CONDITIONS, WEAR, LifePlan
+from bywire.life.projection import CONFIDENCE, Projection
+from bywire.report.answer import Answer
 from bywire.report.document import (
     Banner,
     Change,
@@ -36,10 +30,8 @@ from bywire.report.document import (
     recording_file,
     spaced,
 )
-from bywire.report.parameter_rows import parameter_rows
-from bywire.report.subject import Subject
-from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
-from bywire.report.wording import amount
+from bywire.report.subject import Subject, defaults_of, parameter_rows, value_changes
+from bywire.report.tables import KpiRow, Table, amount_cell, kpi_table, parameter_table, text_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -187,11 +179,11 @@ class LifeResult(Answer):
                 (
                     name,
                     each.label,
-                    amount(path[0], each.unit),
-                    amount(path[-1], each.unit),
-                    amount(float(path.min()), each.unit),
-                    amount(float(path.max()), each.unit),
-                    amount(rate, difference_unit(each.unit)),
+                    amount_cell(path[0], each.unit),
+                    amount_cell(path[-1], each.unit),
+                    amount_cell(float(path.min()), each.unit),
+                    amount_cell(float(path.max()), each.unit),
+                    amount_cell(rate, difference_unit(each.unit)),
                 )
             )
         return text_table(
@@ -266,51 +258,6 @@ def wear_changes(plan: LifePlan) -> tuple[Change, ...]:
             if chosen[name] != default
         ),
     )
-
-
-@use_case
-def project_life(
-    source: str | Path,
-    overrides: Mapping[str, str] = MappingProxyType({}),
-    *,
-    check: int = 0,
-    progress: Progress | None = None,
-) -> LifeResult:
-    """Project how a brake wears, and when its life ends.
-
-    Parameters
-    ----------
-    source
-        Life file, see ``docs/life.md``; or the name of a life.
-    overrides
-        Changes of the bench, of wear (``wear.NAME``) and of what is between stops
-        (``stop.NAME``), as texts with units.
-    check
-        Stops that are also run one by one, to check the projection, in whole rounds of the
-        population; none by default.
-    progress
-        Called with a label and the finished share, 0 to 1.
-
-    Returns
-    -------
-    LifeResult
-        Stops until the end, with an interval; slow states after every stop in SI units.
-
-    Raises
-    ------
-    InputError
-        For a life file that does not fit, and a brake that is at its end from the start.
-    RunError
-        When a run fails, or a stop lacks a key figure that wear is computed from.
-    KeyboardInterrupt
-        When interrupted.
-    """
-    shown = progress or silent
-    plan = read_life(source, overrides)
-    require_checkable(check, plan)
-    made = projected(plan, shown)
-    rounds = min(check, made.stops) // plan.count
-    return LifeResult(made, one_by_one(plan, rounds * plan.count, shown) if rounds else {})
 
 
 def require_checkable(check: int, plan: LifePlan) -> None:

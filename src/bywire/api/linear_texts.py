@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.rates import rates
+from bywire.analysis.linear.linear_model import LinearModel, rates
 from bywire.analysis.locus import Locus
-from bywire.analysis.periodic.averaged_map import PeriodicModel
-from bywire.analysis.reduction.error import ReductionError
-from bywire.analysis.reduction.reduce import TOLERANCE, Reduced, reduce
+from bywire.analysis.periodic import PeriodicModel
+from bywire.analysis.reduction import TOLERANCE, Reduced, ReductionError, reduce
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError, quoted
 from bywire.core.pairs import DIGITS, read_count
 from bywire.core.signals import signals_of
@@ -38,7 +37,7 @@ def json_file(name: str, content: Mapping[str, Any]) -> Attachment:
 
 
 def _write_json(content: Mapping[str, Any], path: Path) -> Path:
-    from bywire.report.files import write_bytes
+    from bywire.report.drawing import write_bytes
 
     return write_bytes(path, json.dumps(content, indent=1).encode())
 
@@ -113,11 +112,11 @@ def reduced(model: LinearModel, text: str, band: float | None = None) -> Reduced
         order = read_count(text)
         if not order:
             raise ParameterError(
-                f"--reduce {quoted(text)}: an order is a whole number >= 1 of at most "
+                f"{option('reduce')} {quoted(text)}: an order is a whole number >= 1 of at most "
                 f"{DIGITS} digits; with a unit, it is a band, for instance '150 Hz'"
             )
         return reduce(model, order=order, band=band)
-    return reduce(model, band=number(text, "Hz", "--reduce"), tolerance=TOLERANCE)
+    return reduce(model, band=number(text, "Hz", option("reduce")), tolerance=TOLERANCE)
 
 
 def _is_number(text: str) -> bool:
@@ -198,7 +197,7 @@ def locus_object(locus: Locus) -> dict[str, Any]:
 
 def locus_lines(locus: Locus) -> list[str]:
     """Return where over its range a loop is stable, a text each."""
-    from bywire.report.root_locus import border_text
+    from bywire.report.poles import border_text
 
     if not locus.borders:
         state = "stable" if locus.stable.all() else "unstable"

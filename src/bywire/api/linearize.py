@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,82 +11,25 @@ import numpy as np
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.locus import Locus, locus
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.periodic.averaged_map import PeriodicModel, dithered_loop
+from bywire.analysis.periodic import PeriodicModel, dithered_loop
 from bywire.api import linear_texts as texts
 from bywire.api.linearize_answer import LinearizedLoop
 from bywire.api.linearize_plant import (
-    LinearizedPlant,
     PlantCase,
-    PlantLocus,
-    linearize_plant,
     plant_case,
-    plant_locus,
 )
-from bywire.api.loop_case import LoopCase, loop_case, over_range
+from bywire.api.loop_case import LoopCase, loop_case, range_of
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, of_difference
+from bywire.core.callers import option
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError
-from bywire.report.answer import use_case
 
 
-@use_case
-def linearize(
-    name: str,
-    parameters: str = "",
-    at: str = "",
-    overrides: Mapping[str, Any] = MappingProxyType({}),
-    *,
-    locus: str = "",
-    reduce: str = "",
-    friction: str = "",
-    speed: str = "",
-    dither: bool = False,
-    side: str = "",
-) -> LinearizedLoop | LinearizedPlant | PlantLocus:
-    """Return the exact linear model of a closed loop or of a plant.
+def linearized_loop(case: LoopCase, locus: str, reduce: str, dither: bool) -> LinearizedLoop:
+    """Return the linear model of a loop, with what else was asked for.
 
-    Parameters
-    ----------
-    name
-        Name of a loop or of a plant.
-    parameters
-        Parameter set; the main one of its brake by default.
-    at
-        Operating point with its unit, for instance ``"20 bar"``; the loop's own by default.
-    overrides
-        Other parameters by dotted name: SI numbers, or texts with units.
-    locus
-        Range over which the poles are followed, ``"NAME=LOW:HIGH:COUNT"``.
-    reduce
-        An order, or a band such as ``"150 Hz"``, to which the model is reduced.
-    friction, speed
-        Of a plant: ``"removed"``, ``"sliding"`` or ``"stuck"``, and the motor's speed of sliding.
-    dither
-        Of a loop: whether it is also linearized about its motion under dither, friction on.
-    side
-        As of `bywire.margins`.
-
-    Returns
-    -------
-    LinearizedLoop, LinearizedPlant or PlantLocus
-        The linear model, SI units inside, with its poles in 1/s; along a range its poles alone.
-
-    Raises
-    ------
-    InputError
-        For names that are unknown, values out of range, and options that do not fit together.
-    SolverError
-        When the motion under dither does not repeat itself.
+    ``locus``, ``reduce``, ``dither``: as of `bywire.linearize`.
     """
-    if name in PLANTS.all():
-        if dither:
-            raise ParameterError("--dither is for loops: leave it out, or name a loop")
-        if locus and reduce:
-            raise ParameterError("--reduce and --locus exclude each other: ask for one of them")
-        if locus:
-            return plant_locus(name, parameters, at, overrides, friction, speed, locus, side)
-        return linearize_plant(name, parameters, at, overrides, friction, speed, reduce, side)
-    case = _loop_case(name, parameters, at, overrides, friction, speed, side)
     model = case.loop.closed(case.par, case.value)
     dithered = _dithered(case) if dither else None
     return LinearizedLoop(
@@ -114,19 +56,19 @@ def linear_case(
     Parameters
     ----------
     name, parameters, at, overrides, friction, speed, side
-        As of `linearize`.
+        As of `bywire.linearize`.
 
     Raises
     ------
     InputError
-        As `linearize`.
+        As `bywire.linearize`.
     """
     if name in PLANTS.all():
         return plant_case(name, parameters, at, overrides, friction, speed, side)
-    return _loop_case(name, parameters, at, overrides, friction, speed, side)
+    return linear_loop_case(name, parameters, at, overrides, friction, speed, side)
 
 
-def _loop_case(
+def linear_loop_case(
     name: str,
     parameters: str,
     at: str,
@@ -135,27 +77,47 @@ def _loop_case(
     speed: str,
     side: str,
 ) -> LoopCase:
+    """Return the loop that is linearized; see `linear_case`.
+
+    Raises
+    ------
+    InputError
+        As `bywire.linearize`, and for what plants alone have.
+    """
     if name not in LOOPS.all():
         raise LOOPS.unknown(name, PLANTS)
-    for option, given in (("--friction", friction), ("--speed", speed)):
+    for argument, given in (("friction", friction), ("speed", speed)):
         if given:
             raise ParameterError(
-                f"{option} is for plants ({', '.join(PLANTS.all())}): controllers are linearized "
-                "without dry friction; leave it out"
+                f"{option(argument)} is for plants ({', '.join(PLANTS.all())}): controllers are "
+                "linearized without dry friction; leave it out"
             )
     return loop_case(name, parameters, at, overrides, side)
 
 
+def locus_range(case: LoopCase | PlantCase, range_: str) -> tuple[str, str, list[float]]:
+    """Return name, unit and values of the range over which poles are followed.
+
+    Raises
+    ------
+    InputError
+        For what is no range.
+    """
+    quantity = case.point.quantity if isinstance(case, PlantCase) else case.loop.at
+    return range_of(range_, quantity, case.par, "locus")
+
+
 def _followed(case: LoopCase, range_: str) -> Locus:
-    name, unit, values = over_range(range_, case, "--locus")
+    name, unit, values = locus_range(case, range_)
     return locus(case.loop, case.par, case.value, name, unit, sorted(values))
 
 
 def _dithered(case: LoopCase) -> PeriodicModel:
     if not case.loop.whole(case.par):
         raise ParameterError(
-            f"--dither: loop {case.loop.name!r} of {case.name} has none; it takes a loop through "
-            f"which a dither runs ({_dithered_loops()}), switched on in the parameters of its ECU"
+            f"{option('dither', True)}: loop {case.loop.name!r} of {case.name} has none; it takes "
+            f"a loop through which a dither runs ({_dithered_loops()}), switched on in the "
+            "parameters of its ECU"
         )
     return dithered_loop(case.loop, case.par, case.value)
 

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bywire.analysis.crossings import bandwidth
-from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.rates import rates
+from bywire.analysis.linear.linear_model import LinearModel, rates
 from bywire.analysis.locus import Locus
 from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.margins import NO_LOOP
-from bywire.analysis.periodic.averaged_map import PeriodicModel
-from bywire.analysis.reduction.reduce import Reduced
+from bywire.analysis.periodic import PeriodicModel
+from bywire.analysis.reduction import Reduced
 from bywire.api import linear_texts as texts
 from bywire.api.loop_case import LoopCase
 from bywire.report.answer import Answer
@@ -156,7 +155,7 @@ class LinearizedLoop(Answer):
         return blocks
 
     def _draw_locus(self, locus: Locus) -> Figure:
-        from bywire.report.root_locus import root_locus
+        from bywire.report.poles import root_locus
 
         case = self.case
         ends = (float(locus.values[0]), float(locus.values[-1]))
@@ -205,7 +204,7 @@ def closed_bandwidth(model: LinearModel) -> float:
 
 
 def _poles(model: LinearModel, width: float) -> Figure:
-    from bywire.report.pole_map import pole_map
+    from bywire.report.poles import pole_map
 
     return pole_map(rates(model), model.period, width)
 

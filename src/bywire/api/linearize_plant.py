@@ -14,11 +14,11 @@ from bywire.analysis.linear.linearize import Friction
 from bywire.analysis.linear.plant import PLANTS, Plant, PlantPoint
 from bywire.analysis.locus import Locus, locus_of
 from bywire.analysis.loop import Quantity
-from bywire.analysis.reduction.error import ReductionError, reduction_error
-from bywire.analysis.reduction.reduce import Reduced
+from bywire.analysis.reduction import Reduced, ReductionError, reduction_error
 from bywire.api import linear_texts as texts
 from bywire.api.loop_case import range_of
 from bywire.api.parameter_choice import parameters_for
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError, UnitError, unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.values import number
@@ -219,7 +219,7 @@ def linearize_plant(
     reduce: str,
     side: str = "",
 ) -> LinearizedPlant:
-    """Return the linear model of a plant; see `bywire.api.linearize.linearize`."""
+    """Return the linear model of a plant; see `bywire.linearize`."""
     case = plant_case(name, parameters, at, overrides, friction, speed, side)
     model = case.plant.linear(case.par, case.point)
     reduced = texts.reduced(model, reduce, case.plant.band) if reduce else None
@@ -236,10 +236,10 @@ def plant_locus(
     range_: str,
     side: str = "",
 ) -> PlantLocus:
-    """Return the poles of a plant over a range; see `bywire.api.linearize.linearize`."""
+    """Return the poles of a plant over a range; see `bywire.linearize`."""
     case = plant_case(name, parameters, at, overrides, friction, speed, side)
     quantity = case.point.quantity
-    over, unit, values = range_of(range_, quantity, case.par, "--locus")
+    over, unit, values = range_of(range_, quantity, case.par, "locus")
 
     def model(value: float) -> LinearModel:
         if over == quantity.name:
@@ -297,7 +297,7 @@ def _operating_point(plant: Plant, at: str) -> tuple[Quantity, float]:
         except UnitError:
             continue
     known = ", ".join(f"{quantity.name} in {quantity.unit}" for quantity in plant.at)
-    raise UnitError(f"--at {at!r}: {plant.name} takes one of {known}")
+    raise UnitError(f"{option('at')} {at!r}: {plant.name} takes one of {known}")
 
 
 def _friction(friction: str, speed: str) -> tuple[Friction, float]:
@@ -305,21 +305,22 @@ def _friction(friction: str, speed: str) -> tuple[Friction, float]:
     kind = next((each for each in kinds if each == (friction or "removed")), None)
     if kind is None:
         raise unknown_name("kind of friction", friction, kinds)
-    omega = number(speed, "rad/s", "--speed") if speed else 0.0
+    omega = number(speed, "rad/s", option("speed")) if speed else 0.0
     if kind == "sliding" and omega == 0.0:
         raise ParameterError(
-            "--friction sliding: friction at rest has no slope; give the motors' speed with "
-            "--speed, for instance '5 rad/s', positive toward clamping"
+            f"{option('friction', 'sliding')}: friction at rest has no slope; give the motors' "
+            f"speed with {option('speed')}, for instance '5 rad/s', positive toward clamping"
         )
     if kind != "sliding" and omega != 0.0:
         raise ParameterError(
-            f"--speed {speed}: only sliding friction depends on it: add --friction sliding, or "
+            f"{option('speed')} {speed}: only sliding friction depends on it: add "
+            f"{option('friction', 'sliding')}, or "
             "leave it out"
         )
     return kind, omega
 
 
 def _draw_locus(locus: Locus) -> Figure:
-    from bywire.report.root_locus import root_locus
+    from bywire.report.poles import root_locus
 
     return root_locus(locus, math.nan)

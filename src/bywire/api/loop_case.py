@@ -12,6 +12,7 @@ import numpy as np
 from bywire.analysis.linear.corners import read_sides
 from bywire.analysis.loop import LOOPS, Loop, Quantity
 from bywire.api.parameter_choice import parameters_for
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.pairs import read_count
 from bywire.core.parameters import ParameterSet, leaf_fields
@@ -154,13 +155,13 @@ def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> lis
     return [float(value) for value in between(low, high, count)]
 
 
-def over_range(text: str, chosen: LoopCase, option: str = "--over") -> tuple[str, str, list[float]]:
+def over_range(text: str, chosen: LoopCase, argument: str = "over") -> tuple[str, str, list[float]]:
     """Return name, unit and values of a range for a loop, see `range_of`."""
-    return range_of(text, chosen.loop.at, chosen.par, option)
+    return range_of(text, chosen.loop.at, chosen.par, argument)
 
 
 def range_of(
-    text: str, quantity: Quantity, par: ParameterSet, option: str
+    text: str, quantity: Quantity, par: ParameterSet, argument: str
 ) -> tuple[str, str, list[float]]:
     """Return name, unit and values of ``NAME=LOW:HIGH:COUNT``; ``at`` is the operating point.
 
@@ -171,7 +172,7 @@ def range_of(
     """
     name, equals, values = (part.strip() for part in text.partition("="))
     if not equals:
-        raise ParameterError(f"{option} {text}: write NAME=LOW:HIGH:COUNT")
+        raise ParameterError(f"{option(argument)} {text}: write NAME=LOW:HIGH:COUNT")
     if name in ("at", quantity.name):
         return quantity.name, quantity.unit, spread(values, quantity.unit, quantity.name)
     if name not in par.leaves():

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from bywire.analysis.linear.corners import CornerError
 from bywire.analysis.loop_curves import Family, loop_curve
 from bywire.analysis.margins import MARGINS, NO_LOOP, LoopMargins, figures_at, margins_of, worst
 from bywire.api.linear_texts import corner_notes
-from bywire.api.loop_case import LoopCase, loop_case, over_range
+from bywire.api.loop_case import LoopCase
 from bywire.core.parameters import ParameterSet
-from bywire.report.answer import Answer, use_case
+from bywire.report.answer import Answer
 from bywire.report.document import (
     Banner,
     Block,
@@ -26,7 +25,7 @@ from bywire.report.document import (
     Section,
     TableBlock,
 )
-from bywire.report.tables import Cell, Column, Table
+from bywire.report.tables import Cell, Column, Table, amount_cell
 from bywire.report.wording import amount, clean
 
 if TYPE_CHECKING:
@@ -157,63 +156,17 @@ class Margins(Answer):
         return Banner("stable over the whole range", "good")
 
 
-@use_case
-def margins(
-    loop: str,
-    parameters: str = "",
-    at: str = "",
-    overrides: Mapping[str, Any] = MappingProxyType({}),
-    over: str = "",
-    *,
-    side: str = "",
-) -> Margins:
-    """Return margins and bandwidth of a loop as it is sampled.
-
-    Parameters
-    ----------
-    loop
-        Name of the loop.
-    parameters
-        Parameter set; the main one of the loop's brake by default.
-    at
-        Operating point with its unit, for instance ``"20 bar"``; the loop's own by default.
-    overrides
-        Other parameters by dotted name: SI numbers, or texts with units.
-    over
-        Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"``, or ``"at=5 bar:35 bar:7"``.
-    side
-        Side of the corners of operations on which the operating point lies: ``"above"``,
-        ``"below"``, or of single operations ``"FILE:LINE=above"``, with commas. Without, a point
-        on a corner whose sides have different linear models is refused.
-
-    Returns
-    -------
-    Margins
-        Gain margins as factors, phase margin in degree, crossover and bandwidth in Hz, delay margin
-        in s: at the operating point, or at each value of the range with the worst.
-
-    Raises
-    ------
-    InputError
-        For names that are unknown, values out of range, and sets of another brake.
-
-    Examples
-    --------
-    >>> import bywire
-    >>> found = bywire.margins("pressure", at="20 bar")
-    >>> round(found.margins[0].phase)  # degree
-    76
-    """
-    case = loop_case(loop, parameters, at, overrides, side)
-    if not over:
-        return Margins(case, (margins_of(figures_at(case.loop, case.par, case.value)),))
-    name, unit, values = over_range(over, case)
+def margins_over(
+    case: LoopCase, name: str, unit: str, values: Sequence[float]
+) -> tuple[LoopMargins, ...]:
+    """Return the margins at each value of a range, or at the operating point without one."""
+    if not name:
+        return (margins_of(figures_at(case.loop, case.par, case.value)),)
     cases = case.loop.varied(case.par, case.value, name, values)
-    each = tuple(
+    return tuple(
         _margins_at(case, point, f"{name} = {amount(at, unit)}")
         for point, at in zip(cases, values, strict=True)
     )
-    return Margins(case, each, name, unit, tuple(values))
 
 
 def _margins_at(case: LoopCase, point: tuple[ParameterSet, float], label: str) -> LoopMargins:
@@ -239,14 +192,14 @@ def margins_table(
     heading = [*(figure.heading for figure in MARGINS.values()), "stable"]
     rows = [
         (
-            *(_cell(getattr(margins, k), figure.unit, 3) for k, figure in MARGINS.items()),
+            *(amount_cell(getattr(margins, k), figure.unit, 3) for k, figure in MARGINS.items()),
             _state_cell(margins),
         )
         for margins in margins_at
     ]
     if name:
         heading = [clean(name), *heading]
-        rows = [(_cell(v, unit), *row) for v, row in zip(values, rows, strict=True)]
+        rows = [(amount_cell(v, unit), *row) for v, row in zip(values, rows, strict=True)]
     return Table(tuple(map(Column, heading)), tuple(rows))
 
 
@@ -254,10 +207,6 @@ def _state_cell(margins: LoopMargins) -> Cell:
     if margins.is_sound:
         return Cell("yes", value=True)
     return Cell("NO" if margins.has_loop else "no loop", "bad", value=False)
-
-
-def _cell(value: float, unit: str, digits: int = 4) -> Cell:
-    return Cell(amount(value, unit, digits), value=value)
 
 
 def worst_texts(
@@ -283,10 +232,7 @@ def worst_texts(
 
 
 def _drawn(kind: str, family: Family) -> Figure:
-    from bywire.report.loop_gain import loop_gain
-    from bywire.report.nichols import nichols
-    from bywire.report.nyquist import nyquist
-    from bywire.report.sensitivity import sensitivity
+    from bywire.report.loop_curves import loop_gain, nichols, nyquist, sensitivity
 
     draw = {"loop-gain": loop_gain, "nyquist": nyquist, "nichols": nichols}
     return draw.get(kind, sensitivity)(family)

@@ -13,6 +13,7 @@ import xarray as xr
 from bywire.api.parameter_choice import set_for
 from bywire.api.replay import columns_of_bench, driven_bench
 from bywire.bench.relative_changes import settled
+from bywire.core.callers import option
 from bywire.core.errors import InputError, ParameterError, unknown_name, unknown_of_few
 from bywire.core.values import parsed
 from bywire.data.file_format import Progress, no_progress
@@ -24,9 +25,8 @@ from bywire.identification.fitting.question import (
     find_method,
 )
 from bywire.identification.measured import measured
-from bywire.report.changes import defaults_of, value_changes
 from bywire.report.document import Change
-from bywire.report.subject import Subject
+from bywire.report.subject import Subject, defaults_of, value_changes
 
 if TYPE_CHECKING:
     from bywire.core.parameters import ParameterSet
@@ -145,10 +145,11 @@ def _require_columns_alone(method: Method, question: Question) -> None:
         For anything else that is asked, and signals that the method does not take.
     """
     noisy = any(question.noise.values())
-    beyond = [flag for flag in question.given if flag not in ("--input", "--output")]
+    beyond = [name for name in question.given if name not in ("inputs", "outputs")]
     if beyond or noisy:
         raise ParameterError(
-            f"{(beyond or ['--output with a noise'])[0]} is for methods of any bench "
+            f"{option(beyond[0] if beyond else 'outputs')}{'' if beyond else ' with a noise'} is "
+            f"for methods of any bench "
             f"({', '.join(BENCH_METHODS.all())}): leave it out for {method.name}"
         )
     signals = {**method.signals, **method.optional}
@@ -187,7 +188,8 @@ def _with_parameters(
     if not method.assembly:
         if parameters or overrides:
             raise ParameterError(
-                f"{method.name} needs no parameters: leave out --parameters and --set"
+                f"{method.name} needs no parameters: leave out {option('parameters')} and "
+                f"{option('overrides')}"
             )
         return ChosenMethod(method, options)
     if method.bench is not None:
@@ -198,7 +200,9 @@ def _with_parameters(
     base = cited.parameters()
     for key in overrides:
         if key in options.flat() and key not in base.flat():
-            raise unknown_name("parameter (--option sets the method's)", key, base.flat())
+            raise unknown_name(
+                f"parameter ({option('options')} sets the method's)", key, base.flat()
+            )
     changes = parsed(type(base), settled(base, overrides), "parameter")
     return ChosenMethod(method, options, cited.name, base.replace(changes), changes)
 
@@ -215,11 +219,13 @@ def _options(method: Method, values: Mapping[str, Any]) -> ParameterSet:
 def _require_not_fitted(holdout: Source, measurements: Sequence[Source]) -> None:
     """Refuse a held-out measurement that is fitted too, or none beside it: it proves nothing."""
     if not measurements:
-        raise ParameterError("--holdout is for measurement files: leave it out")
+        raise ParameterError(f"{option('holdout')} is for measurement files: leave it out")
     for fitted in measurements:
         if isinstance(holdout, xr.Dataset) or isinstance(fitted, xr.Dataset):
             if isinstance(fitted, xr.Dataset) and fitted is holdout:
-                raise ParameterError("--holdout is fitted too: hold out a record that is not")
+                raise ParameterError(
+                    f"{option('holdout')} is fitted too: hold out a record that is not"
+                )
             continue
         try:
             equal = filecmp.cmp(fitted, holdout, shallow=False)
@@ -228,8 +234,8 @@ def _require_not_fitted(holdout: Source, measurements: Sequence[Source]) -> None
         if equal:
             same = "is" if Path(fitted).samefile(holdout) else "has the same content as"
             raise ParameterError(
-                f"--holdout {holdout} {same} {fitted}, which is fitted: hold out a record that is "
-                "not"
+                f"{option('holdout')} {holdout} {same} {fitted}, which is fitted: hold out a "
+                "record that is not"
             )
 
 
@@ -244,7 +250,8 @@ def _on_bench(
     """Return a method of any bench for the one that is asked about."""
     if question.bench is None:
         raise ParameterError(
-            f"{method.name} needs --bench: a bench file (TOML), or an experiment of 'bywire list'"
+            f"{method.name} needs {option('bench')}: a bench file (TOML), or an experiment of "
+            "'bywire list'"
         )
     bench = driven_bench(question.bench, changes)
     on_bench = method.on(bench, replace(question, holdout=None))

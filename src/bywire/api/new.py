@@ -12,7 +12,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from bywire.core.arguments import checked
 from bywire.core.brake import brakes
 from bywire.core.errors import FileError, ParameterError, quoted
 from bywire.core.scratch import scratch_folder
@@ -70,34 +69,6 @@ class NewBrake(Answer):
             "package": str(self.package),
             "next": steps,
         }
-
-
-@checked
-def new(name: str, folder: str | Path = ".") -> NewBrake:
-    """Write the package of a new brake, with tests, that passes ``bywire check``.
-
-    Parameters
-    ----------
-    name
-        Of the brake: small letters, digits and single dashes, such as ``my-brake``.
-    folder
-        Where its folder ``my-brake`` is made; the current one by default, made where it is missing.
-
-    Returns
-    -------
-    NewBrake
-        Its name, the folder of its project, and its package.
-
-    Raises
-    ------
-    ParameterError
-        When the name is none that Python and bywire can take, with the reason.
-    FileError
-        When there is such a folder already, or it cannot be written.
-    """
-    written = write_package(name, Path(folder).expanduser())
-    package = written / "src" / name.replace("-", "_")
-    return NewBrake(name.replace("_", "-"), written, package)
 
 
 def write_package(name: str, folder: Path) -> Path:

@@ -12,7 +12,8 @@ from typing import Any
 from bywire.core.brake import brakes
 from bywire.core.errors import FileError, unknown_name
 from bywire.core.sources import source_state
-from bywire.report.answer import Answer, use_case
+from bywire.report.answer import Answer
+from bywire.report.answering import answering
 from bywire.report.document import Document, Section, TableBlock
 from bywire.report.tables import Table, text_table
 
@@ -93,7 +94,7 @@ class Overview(Answer):
         return "\n".join([*lines, "", _HINT])
 
 
-@use_case
+@answering
 def overview(topic: str = "") -> Overview:
     """Return everything that has a name, from an index that is made anew when a file changes.
 

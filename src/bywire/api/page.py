@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from bywire.bench import bench_file
-from bywire.bench.bench import Bench
-from bywire.core.errors import ParameterError, unknown_name
-from bywire.core.parameters import leaf_fields
-from bywire.report.answer import Answer, use_case
-from bywire.report.changes import bench_changes
+from bywire.report.answer import Answer
 from bywire.report.document import Document, Listing, Section
+from bywire.report.subject import bench_changes
 
 if TYPE_CHECKING:
     from bywire.export.exported import Exported
@@ -58,71 +52,3 @@ class BenchPage(Answer):
             is_paged=False,
             changes=bench_changes(self.made.bench),
         )
-
-
-@use_case
-def page(
-    bench: Bench | str | Path,
-    out: str | Path,
-    overrides: Mapping[str, str] = MappingProxyType({}),
-    *,
-    vary: Sequence[str] = (),
-    case: str = "",
-) -> BenchPage:
-    """Write a bench as one HTML file that computes it: no server, no installation.
-
-    Parameters
-    ----------
-    bench
-        A `Bench`, the path of a bench file, or the name of an experiment.
-    out
-        File of the page (.html); one that is there is replaced.
-    overrides
-        Changes of a bench file or experiment, as ``--set`` takes them.
-    vary
-        Parameters that stand first in the page; by default those that the bench changes,
-        else those that its brake declares (`bywire.authoring.Sliders`).
-    case
-        Which run of the experiment it computes; may be left out where there is but one.
-
-    Returns
-    -------
-    BenchPage
-        The file and its size.
-
-    Raises
-    ------
-    InputError
-        When the bench cannot be exported, for a name in ``vary`` that is no number of the bench or
-        has no effect in it, and when the file cannot be written.
-    CompilerError
-        Without the extra ``compiler``.
-    """
-    import gzip
-
-    from bywire.bench.running import run
-    from bywire.export.exported import exported, start_source
-    from bywire.export.interface import interface
-    from bywire.report.files import write_bytes
-    from bywire.report.live_page.content import page_text
-    from bywire.report.time_traces import shown_panels
-
-    if Path(out).suffix.lower() not in (".html", ".htm"):
-        raise ParameterError(f"out = {str(out)!r} is no page: give a file that ends in .html")
-    if not isinstance(bench, Bench):
-        bench = bench_file.read(bench, overrides)
-    elif overrides:
-        bench = bench.with_overrides(overrides)
-    made = exported(bench, case)
-    _, reads = start_source(made)
-    used = [each.name for each in interface(made, "brake", reads).of("parameter")]
-    for name in vary:
-        if name not in leaf_fields(type(bench.par)):
-            raise unknown_name("parameter", name, used)
-        if name not in used:
-            raise ParameterError(f"{name} has no effect in this bench: leave it out of vary")
-    result = run(bench)
-    panels = shown_panels(result.recordings[made.case.label])
-    content = page_text(made, panels, result, vary).encode()
-    file = write_bytes(out, content)
-    return BenchPage(file, made, len(content), len(gzip.compress(content, mtime=0)))

@@ -28,8 +28,8 @@ from bywire.report.document import (
     spaced,
 )
 from bywire.report.subject import Subject
-from bywire.report.tables import Cell, Column, Table
-from bywire.report.wording import amount, clean, duration, measured_amount
+from bywire.report.tables import Cell, Column, Table, measured_cell
+from bywire.report.wording import amount, clean, duration
 
 _SHOWN = ("nrmse", "vaf", "max_error", "bias", "lag")
 
@@ -107,7 +107,7 @@ class Replay(Answer):
         )
 
     def _figures(self) -> list[FigureBlock]:
-        from bywire.report.replay_figure import replay_figure
+        from bywire.report.replay_figures import replay_figure
 
         return [
             FigureBlock(
@@ -126,7 +126,7 @@ class Replay(Answer):
         ]
 
     def _track_figures(self) -> list[FigureBlock]:
-        from bywire.report.track_figure import track_figure
+        from bywire.report.replay_figures import track_figure
 
         known = self.replayed.run.par.leaves()
         return [
@@ -238,8 +238,8 @@ def fit_table(fits: Sequence[SegmentFit]) -> Table:
 
 def _figure(kpi: Kpi) -> Cell:
     if kpi.unit == "s" and math.isfinite(kpi.value) and not kpi.bound > 0.0:
-        return Cell(duration(kpi.value), value=kpi.value)
-    return Cell(measured_amount(kpi.value, kpi.unit, kpi.bound, 3), value=kpi.value)
+        return Cell(duration(kpi.value), value=kpi.value, unit=kpi.unit)
+    return measured_cell(kpi.value, kpi.unit, kpi.bound, 3)
 
 
 def _tracked(track: Track) -> dict[str, Any]:

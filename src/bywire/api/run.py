@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, overload
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from bywire.api.run_remarks import remarks
 from bywire.api.run_sections import energy, how_it_was_made, outcome, schematic_section, source_says
-from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
 from bywire.bench.faults.fault_section import from_text
 from bywire.bench.requirements import Verdict
 from bywire.bench.result import Result
 from bywire.bench.result_folder import kpi_record, verdict_record
-from bywire.bench.running import Progress
 from bywire.bench.stated import stated_figures
-from bywire.report.answer import Answer, use_case
-from bywire.report.changes import bench_changes
+from bywire.report.answer import Answer
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -35,11 +30,11 @@ from bywire.report.document import (
     recording_file,
 )
 from bywire.report.stated_levels import stated_figure
+from bywire.report.subject import bench_changes
 from bywire.report.tables import KpiRow, kpi_table
 from bywire.report.wording import amount, measured_amount
 
 if TYPE_CHECKING:
-    from bywire.api.run_over import BenchRange
     from bywire.report.bench_figures import Shown
 
 _SCATTERED = (
@@ -208,104 +203,6 @@ class BenchResult(Result, Answer):
             "step_errors": self._step_errors(),
             "warnings": self.warnings,
         }
-
-
-@overload
-def run(
-    bench: Bench | str | Path,
-    overrides: Mapping[str, str] = ...,
-    *,
-    faults: Sequence[str] = ...,
-    progress: Progress | None = None,
-    engine: str = "auto",
-    estimate_error: bool = True,
-    animate: bool = ...,
-) -> BenchResult: ...
-
-
-@overload
-def run(
-    bench: Bench | str | Path,
-    overrides: Mapping[str, str] = ...,
-    *,
-    over: str,
-    faults: Sequence[str] = ...,
-    progress: Progress | None = None,
-    engine: str = "auto",
-    estimate_error: bool = True,
-    animate: bool = ...,
-) -> BenchRange: ...
-
-
-@use_case
-def run(
-    bench: Bench | str | Path,
-    overrides: Mapping[str, str] = MappingProxyType({}),
-    *,
-    over: str = "",
-    faults: Sequence[str] = (),
-    progress: Progress | None = None,
-    engine: str = "auto",
-    estimate_error: bool = True,
-    animate: bool = False,
-) -> BenchResult | BenchRange:
-    """Make all runs of a bench, and judge them; over a range, for each of its values.
-
-    Parameters
-    ----------
-    bench
-        What is tested: a `Bench`, the path of a bench file, or the name of an experiment, which
-        is then run with its defaults and the main parameter set of its brake.
-    overrides
-        Changes of a bench file or experiment, as ``--set`` takes them.
-    over
-        Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"options.p_to=20 bar, 30 bar"``:
-        the values run side by side, and the result is a `BenchRange`.
-    faults
-        What fails beside what the bench says, as ``--fault`` takes it, for instance
-        ``"pressure.stuck=20 bar@1 s"``.
-    progress
-        Called with the run's label and its finished share, 0 to 1.
-    engine
-        ``compiled``, ``virtual-machine``, or the compiled C of the ECU in the loop, ``sil``
-        (double precision) or ``sil-single``; ``auto`` is what the bench says.
-    estimate_error
-        Whether all runs are made in half and double steps too, for the error from the step of key
-        figures and recorded signals. A requirement that is closer to its limit than this error
-        is undecided, neither met nor missed.
-    animate
-        Whether the result's folder gets a page that plays each run, where its assembly has one.
-
-    Returns
-    -------
-    BenchResult
-        Recordings and key figures in SI units, verdicts on what was required, books of energy in J.
-    BenchRange
-        Over a range: the same of every value.
-
-    Raises
-    ------
-    InputError
-        When the experiment cannot be set up.
-    RunError
-        When a run fails.
-    """
-    if not isinstance(bench, Bench):
-        bench = bench_file.read(bench, overrides)
-    elif overrides:
-        bench = bench.with_overrides(overrides)
-    bench = faulty(bench, faults)
-    if animate:
-        from bywire.api.animation import require_scene
-
-        require_scene(bench, over)
-    if over:
-        from bywire.api.run_over import run_over
-
-        return run_over(bench, over, progress, engine, estimate_error)
-    result = running.run(bench, progress, engine, estimate_error)
-    given = {each.name: getattr(result, each.name) for each in fields(result)}
-    return BenchResult(**given, animated=animate)
 
 
 def faulty(bench: Bench, faults: Sequence[str]) -> Bench:

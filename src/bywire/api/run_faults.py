@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bywire.api.study_tested import varied_texts
-from bywire.bench.running import Progress
-from bywire.campaigns.campaign_file import read_campaign
 from bywire.campaigns.findings import CampaignFindings, FaultFinding
 from bywire.campaigns.residual import NEVER
-from bywire.campaigns.running import complete
-from bywire.campaigns.store import CampaignStore
 from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
-from bywire.core.typing import Array, silent
+from bywire.core.typing import Array
 from bywire.core.units import difference_unit, display_factor
-from bywire.report.answer import Answer, use_case
+from bywire.report.answer import Answer
 from bywire.report.document import Banner, Document, FigureBlock, Listing, Section, TableBlock
+from bywire.report.record import Quantity, record_data, record_table
 from bywire.report.subject import Subject
-from bywire.report.tables import Table, text_table
+from bywire.report.tables import Cell, Table, amount_cell, text_table
 from bywire.report.wording import amount
 
 if TYPE_CHECKING:
@@ -33,6 +30,17 @@ if TYPE_CHECKING:
 
 _CLASSES = ((0.99, "high"), (0.90, "medium"), (0.60, "low"))
 """diagnostic coverage: ISO 26262-5:2018, annex D"""
+_COLUMNS = (
+    "fault",
+    "off the healthy run",
+    "violates",
+    "within",
+    "seen within",
+    "first by",
+    "class",
+    "severity",
+    "with reaction",
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -119,63 +127,59 @@ class FaultCampaign(Answer):
         )
         return Banner(_sentences([*harm, text]) if harm else text, "bad" if harm else "none")
 
-    def _table(self) -> Table:
+    @cached_property
+    def _quantities(self) -> dict[str, Quantity[FaultFinding]]:
+        """What is said of a fault, by heading or key, in the order of the JSON object."""
         plan = self.findings.plan
-        signals = signals_of(plan.case(0).model.Output)
-        heads = [
-            "fault",
-            "off the healthy run",
-            "violates",
-            "within",
-            "seen within",
-            "first by",
-            "class",
-            *self._further,
+        is_rated = any(criterion.severity for criterion in plan.criteria)
+        every: list[Quantity[FaultFinding]] = [
+            Quantity(lambda f: f.failing.mode.name, "fault", "fault", text=_name),
+            Quantity(lambda f: f.failing.mode.summary, "summary"),
+            Quantity(lambda f: f.failing.value if f.failing.mode.unit else None, "value"),
+            Quantity(lambda f: f.failing.mode.unit, "unit"),
+            Quantity(lambda f: f.failing.is_present, "present"),
+            Quantity(lambda f: f.failing.latent and f.failing.latent.mode.name, "after"),
+            Quantity(lambda f: f.kind, "class", "class"),
+            Quantity(lambda f: f.severity(plan), "severity", "severity" if is_rated else ""),
+            Quantity(lambda f: f.cases, "runs"),
+            Quantity(lambda f: f.criteria, "violated", "violates", text=_violated),
+            Quantity(
+                lambda f: f.tolerance,
+                "tolerated_for",
+                "within",
+                "s",
+                lambda f: _milliseconds(f.tolerance),
+            ),
+            Quantity(lambda f: f.violated.tolist(), "violated_after"),
+            Quantity(
+                lambda f: f.seen.tolist(),
+                "seen_after",
+                "seen within",
+                "s",
+                lambda f: _worst(f.seen),
+                lambda f: _latest(f.seen),
+            ),
+            Quantity(lambda f: f.first_seen_by, "first_by", "first by"),
+            Quantity(
+                _with_reaction,
+                "with_reaction",
+                "with reaction" if plan.reaction else "",
+                text=_reacted,
+            ),
+            Quantity(_extremes, "extremes", "off the healthy run", text=self._off_healthy),
         ]
-        rows = []
-        for each in self.findings.faults:
-            effects = [
-                f"{name} {_range(sides[0], sides[1], signals[name].unit)}"
-                for name, sides in each.extremes.items()
-            ]
-            violated = ", ".join(f"{name} ({n}/{each.cases})" for name, n in each.criteria.items())
-            further = {"severity": each.severity(plan) or "-", "with reaction": self._reacted(each)}
-            rows.append(
-                [
-                    self._name(each),
-                    "; ".join(effects),
-                    violated or "-",
-                    _milliseconds(each.tolerance),
-                    _worst(each.seen),
-                    each.first_seen_by or "-",
-                    each.kind,
-                    *(further[name] for name in self._further),
-                ]
-            )
-        return text_table(heads, rows)
+        return {each.heading or each.key: each for each in every}
 
-    @property
-    def _further(self) -> list[str]:
-        """Columns that not every campaign has."""
-        plan = self.findings.plan
-        rated = any(criterion.severity for criterion in plan.criteria)
-        return [*(["severity"] if rated else []), *(["with reaction"] if plan.reaction else [])]
+    def _table(self) -> Table:
+        columns = [self._quantities[name] for name in _COLUMNS if name in self._quantities]
+        return record_table(self.findings.faults, columns)
 
-    def _name(self, each: FaultFinding) -> str:
-        mode, value = each.failing.mode, each.failing.value
-        size = f" {amount(value, mode.unit)}" if mode.unit else ""
-        beside = f" after {each.failing.latent.mode.name}" if each.failing.latent else ""
-        start = " (there from the start)" if each.failing.is_present else ""
-        return f"{mode.name}{size}{beside}{start}"
-
-    def _reacted(self, each: FaultFinding) -> str:
-        """Return what is still violated where the fault is answered."""
-        if not each.reacted:
-            return "-"
-        counts = {name: (int(np.sum(~np.isnan(t))), t.size) for name, t in each.reacted.items()}
-        said = [f"{name} ({n}/{m})" for name, (n, m) in counts.items() if n]
-        worse = "worse: " if each.only_with_reaction else ""
-        return worse + ", ".join(said) if said else "nothing"
+    def _off_healthy(self, each: FaultFinding) -> str:
+        signals = signals_of(self.findings.plan.case(0).model.Output)
+        return "; ".join(
+            f"{name} {_range(low, high, signals[name].unit)}"
+            for name, (low, high, _) in each.extremes.items()
+        )
 
     def _residual_table(self) -> Table:
         findings = self.findings
@@ -184,15 +188,14 @@ class FaultCampaign(Answer):
         for residual in findings.plan.watched:
             _, alarms, delay, seen = findings.curve(residual.name)[_at_threshold()]
             limit = findings.healthy.thresholds[residual.name]
-            said = "never looked at" if limit <= NEVER else amount(limit, residual.unit, 3)
             rows.append(
                 [
                     residual.name,
                     residual.summary,
-                    said,
-                    str(alarms),
-                    f"{seen} of {dangerous}",
-                    _milliseconds(delay),
+                    "never looked at" if limit <= NEVER else amount_cell(limit, residual.unit, 3),
+                    Cell(str(alarms), value=alarms, unit="1"),
+                    Cell(f"{seen} of {dangerous}", value=seen, unit="1"),
+                    Cell(_milliseconds(delay), value=delay, unit="s"),
                 ]
             )
         heads = ["residual", "compares", "threshold", "false alarms", "sees", "median delay"]
@@ -209,8 +212,8 @@ class FaultCampaign(Answer):
                     c.name,
                     c.signal,
                     c.sense.replace("_", " "),
-                    amount(c.level, unit),
-                    amount(c.lasting, "s"),
+                    amount_cell(c.level, unit),
+                    amount_cell(c.lasting, "s"),
                     c.severity or "-",
                 ]
             )
@@ -225,7 +228,7 @@ class FaultCampaign(Answer):
             return []
 
         def times() -> Figure:
-            return fault_times([FaultTimes(self._name(f), f.violated, f.seen) for f in dangerous])
+            return fault_times([FaultTimes(_name(f), f.violated, f.seen) for f in dangerous])
 
         def curves() -> Figure:
             rows = {r.name: findings.curve(r.name) for r in plan.watched}
@@ -265,94 +268,10 @@ class FaultCampaign(Answer):
                 "high": alarms.high,
             },
             "thresholds": dict(findings.healthy.thresholds),
-            "faults": [self._fault_data(each) for each in findings.faults],
+            "faults": [record_data(each, self._quantities.values()) for each in findings.faults],
             "warnings": self.warnings,
             "notes": self.notes,
         }
-
-    def _fault_data(self, each: FaultFinding) -> dict[str, Any]:
-        return {
-            "fault": each.failing.mode.name,
-            "summary": each.failing.mode.summary,
-            "value": each.failing.value if each.failing.mode.unit else None,
-            "unit": each.failing.mode.unit,
-            "present": each.failing.is_present,
-            "after": each.failing.latent.mode.name if each.failing.latent else None,
-            "class": each.kind,
-            "severity": each.severity(self.findings.plan),
-            "runs": each.cases,
-            "violated": each.criteria,
-            "tolerated_for": each.tolerance,
-            "violated_after": each.violated.tolist(),
-            "seen_after": each.seen.tolist(),
-            "first_by": each.first_seen_by,
-            "with_reaction": None
-            if not each.reacted
-            else {
-                "runs": len(each.answered),
-                "violated_after": {n: times.tolist() for n, times in each.reacted.items()},
-                "violated_only_with_it": each.only_with_reaction,
-                "violated_sooner_with_it": each.sooner_with_reaction,
-            },
-            "extremes": {
-                name: {
-                    "least": float(sides[0].min()),
-                    "largest": float(sides[1].max()),
-                    "end": float(sides[2].mean()),
-                }
-                for name, sides in each.extremes.items()
-            },
-        }
-
-
-@use_case
-def run_faults(
-    campaign: str | Path,
-    out: str | Path | None = None,
-    overrides: Mapping[str, str] = MappingProxyType({}),
-    *,
-    progress: Progress | None = None,
-) -> FaultCampaign:
-    """Run a campaign: every fault of a brake in a maneuver, at several onsets.
-
-    Parameters
-    ----------
-    campaign
-        Campaign file, see ``docs/faults.md``; or the name of one that comes with a brake.
-    out
-        Folder in which outcomes are kept, so that the same call goes on after an interrupt;
-        nothing is kept by default.
-    overrides
-        Changes of the bench, as texts with units.
-    progress
-        Called with a label and the finished share, 0 to 1.
-
-    Returns
-    -------
-    FaultCampaign
-        Of every fault its effect, fault tolerant time, time to detection [s] and class;
-        diagnostic coverage, false alarms.
-
-    Raises
-    ------
-    InputError
-        For a campaign that does not fit, and a folder that holds another one.
-    RunError
-        When a run fails.
-    KeyboardInterrupt
-        When interrupted; finished faults stay in the folder.
-    """
-    plan = read_campaign(campaign, overrides)
-    store = CampaignStore(None if out is None else Path(out))
-    try:
-        return FaultCampaign(complete(plan, store, progress or silent), store.folder)
-    except KeyboardInterrupt:
-        if store.folder is None:
-            raise
-        kept = sum(store.kept(number) is not None for number in range(len(plan.faults)))
-        raise KeyboardInterrupt(
-            f"{kept} of {len(plan.faults)} faults are kept: the same command goes on"
-        ) from None
 
 
 def _sentences(texts: Sequence[str]) -> str:
@@ -369,6 +288,46 @@ def coverage_class(coverage: float) -> str:
     ('high', 'low', 'none')
     """
     return next((name for least, name in _CLASSES if coverage >= least), "none")
+
+
+def _name(each: FaultFinding) -> str:
+    mode, value = each.failing.mode, each.failing.value
+    size = f" {amount(value, mode.unit)}" if mode.unit else ""
+    beside = f" after {each.failing.latent.mode.name}" if each.failing.latent else ""
+    start = " (there from the start)" if each.failing.is_present else ""
+    return f"{mode.name}{size}{beside}{start}"
+
+
+def _violated(each: FaultFinding) -> str:
+    return ", ".join(f"{name} ({n}/{each.cases})" for name, n in each.criteria.items())
+
+
+def _extremes(each: FaultFinding) -> dict[str, dict[str, float]]:
+    return {
+        name: {"least": float(low.min()), "largest": float(high.max()), "end": float(end.mean())}
+        for name, (low, high, end) in each.extremes.items()
+    }
+
+
+def _with_reaction(each: FaultFinding) -> dict[str, Any] | None:
+    if not each.reacted:
+        return None
+    return {
+        "runs": len(each.answered),
+        "violated_after": {name: times.tolist() for name, times in each.reacted.items()},
+        "violated_only_with_it": each.only_with_reaction,
+        "violated_sooner_with_it": each.sooner_with_reaction,
+    }
+
+
+def _reacted(each: FaultFinding) -> str:
+    """Return what is still violated where the fault is answered."""
+    if not each.reacted:
+        return "-"
+    counts = {name: (int(np.sum(~np.isnan(t))), t.size) for name, t in each.reacted.items()}
+    said = [f"{name} ({n}/{m})" for name, (n, m) in counts.items() if n]
+    worse = "worse: " if each.only_with_reaction else ""
+    return worse + ", ".join(said) if said else "nothing"
 
 
 def _at_threshold() -> int:
@@ -390,10 +349,15 @@ def _milliseconds(time: float) -> str:
     return f"{time:.3g} s" if time >= 1.0 else f"{1e3 * time:.3g} ms"
 
 
+def _latest(times: Array) -> float:
+    """Return the latest time [s]; NaN where there is none."""
+    return float(np.nanmax(times, initial=-math.inf)) if not np.isnan(times).all() else math.nan
+
+
 def _worst(times: Array) -> str:
     """Return the latest time, and in how many runs there is none."""
-    seen = times[~np.isnan(times)]
-    if not seen.size:
+    never = int(np.isnan(times).sum())
+    if never == times.size:
         return "never"
-    text = _milliseconds(float(seen.max()))
-    return text if seen.size == times.size else f"{text}, {times.size - seen.size} never"
+    text = _milliseconds(_latest(times))
+    return f"{text}, {never} never" if never else text

@@ -37,7 +37,7 @@ from bywire.report.document import (
     spaced,
 )
 from bywire.report.subject import Subject
-from bywire.report.tables import Cell, Column, Table
+from bywire.report.tables import Cell, Column, Table, amount_cell
 from bywire.report.wording import amount, clean, measured_amount
 
 if TYPE_CHECKING:
@@ -187,7 +187,7 @@ class BenchRange(Answer):
         heads = [Column(f"{k.name} {limits.get(k.name, '')}".strip(), numeric=True) for k in kpis]
         rows = [
             (
-                Cell(amount(value, self.unit), value=value),
+                amount_cell(value, self.unit),
                 *(_cell(kpi.name, result) for kpi in kpis),
             )
             for value, result in zip(self.values, self.results, strict=True)
@@ -236,7 +236,7 @@ class BenchRange(Answer):
 
     def _figures(self) -> list[Block]:
         from bywire.report.kpi_curves import kpi_curves
-        from bywire.report.overlaid_panels import can_overlay
+        from bywire.report.overlaid import can_overlay
 
         captions = {
             "curves": "The values on top of each other, in the color that the scale shows.",
@@ -257,8 +257,8 @@ class BenchRange(Answer):
         return blocks
 
     def _drawn(self, label: str, recordings: Sequence[xr.Dataset]) -> Figure:
-        from bywire.report.overlaid_panels import Scale, overlaid_panels
-        from bywire.report.step_marks import step_limits
+        from bywire.report.overlaid import Scale, overlaid_panels
+        from bywire.report.step_response import step_limits
 
         steps = [
             step_limits(r.bench.definition, r.bench.chosen_options, r.verdicts)
@@ -332,5 +332,5 @@ def _cell(name: str, result: Result) -> Cell:
     for verdict in result.verdicts:
         if verdict.kpi == name and not verdict.met:
             judged = "missed" if verdict.is_decided else "undecided"
-            return Cell(f"{text} {judged}", "bad", kpi.value)
-    return Cell(text, value=kpi.value)
+            return Cell(f"{text} {judged}", "bad", kpi.value, kpi.unit)
+    return Cell(text, value=kpi.value, unit=kpi.unit)

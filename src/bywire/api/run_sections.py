@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -14,12 +15,18 @@ from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES
 from bywire.core.units import difference_unit
 from bywire.report.document import Block, Details, Paragraph, Section, TableBlock
-from bywire.report.parameter_rows import parameter_rows
-from bywire.report.schematic.blocks import schematic_blocks
+from bywire.report.schematic import schematic_blocks
 from bywire.report.stated_levels import stated_level
-from bywire.report.subject import Subject
-from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
-from bywire.report.wording import amount
+from bywire.report.subject import Subject, parameter_rows
+from bywire.report.tables import (
+    Cell,
+    KpiRow,
+    Table,
+    amount_cell,
+    kpi_table,
+    parameter_table,
+    text_table,
+)
 
 RECORDED = ("bywire_version", "parameter_hash", "step", "engine", "status", "seed")
 """attributes of a recording that say how it was made"""
@@ -105,9 +112,10 @@ def energy_table(books: Ledger) -> Table:
     """Return a ledger as a table: place, energy, share of what was turned over."""
     total = books.turnover
 
-    def row(side: str, label: str, energy: float) -> tuple[str, str, str, str]:
-        share = f"{100.0 * energy / total:.3g} %" if total > 0 else "-"
-        return side, label, amount(energy, "J"), share
+    def row(side: str, label: str, energy: float) -> tuple[str | Cell, ...]:
+        share = 100.0 * energy / total if total > 0 else math.nan
+        text = f"{share:.3g} %" if total > 0 else "-"
+        return side, label, amount_cell(energy, "J"), Cell(text, value=share, unit="%")
 
     rows = [row("from", posting.label, posting.energy) for posting in books.sources]
     rows += [row("to", posting.label, posting.energy) for posting in books.sinks]
@@ -118,7 +126,7 @@ def energy_table(books: Ledger) -> Table:
 def _signal_errors(errors: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> list[Details]:
     """Return how far each recorded signal is off, where that was estimated."""
     rows = [
-        (label, name, amount(error["rms"], unit, 2), amount(error["max"], unit, 2))
+        (label, name, amount_cell(error["rms"], unit, 2), amount_cell(error["max"], unit, 2))
         for label, signals in errors.items()
         for name, error in signals.items()
         for unit in (difference_unit(error["unit"]),)

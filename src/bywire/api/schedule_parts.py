@@ -10,6 +10,7 @@ from bywire.api.design_parts import gain_text, kept_lines, unit_of
 from bywire.api.loop_case import LoopCase
 from bywire.api.verification_parts import (
     Part,
+    figure_cell,
     figure_text,
     verification_object,
     verification_parts,
@@ -19,7 +20,7 @@ from bywire.core.units import shown
 from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount
 from bywire.synthesis.outcome import Across, ScheduleDesign
-from bywire.synthesis.schedule_designer import scheduled
+from bywire.synthesis.schedules import scheduled
 from bywire.synthesis.verification import Verification
 
 _SEEN = (
@@ -134,7 +135,7 @@ def _frozen(case: LoopCase, across: Sequence[Across]) -> list[Part]:
         [
             f"{shown(row.at, at.unit)}",
             row.region,
-            *(figure_text(name, row.figures[name]) for name in _SEEN),
+            *(figure_cell(name, row.figures[name]) for name in _SEEN),
             f"{100.0 * row.slack:+.1f} %",
         ]
         for row in across

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,14 +12,10 @@ import xarray as xr
 
 from bywire.api.parameter_choice import set_for
 from bywire.bench.relative_changes import settled
-from bywire.bench.running import Progress
-from bywire.core.blas import on_one_thread
 from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
-from bywire.core.typing import silent
 from bywire.core.values import parsed
-from bywire.report.answer import Answer, use_case
-from bywire.report.changes import defaults_of, value_changes
+from bywire.report.answer import Answer
 from bywire.report.document import (
     Details,
     Document,
@@ -31,9 +26,8 @@ from bywire.report.document import (
     TableBlock,
     recording_file,
 )
-from bywire.report.parameter_rows import parameter_rows
-from bywire.report.subject import Subject
-from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
+from bywire.report.subject import Subject, defaults_of, parameter_rows, value_changes
+from bywire.report.tables import Cell, KpiRow, Table, kpi_table, parameter_table, text_table
 from bywire.report.wording import in_display_unit, unit_text
 from bywire.synthesis.study import STUDIES, Cut, Findings, Map, Study
 
@@ -166,53 +160,16 @@ class StudyResult(Answer):
         }
 
 
-@use_case
-@on_one_thread()
-def study(
-    name: str,
-    parameters: str = "",
-    overrides: Mapping[str, Any] = MappingProxyType({}),
-    *,
-    progress: Progress | None = None,
-) -> StudyResult:
-    """Compare designs of a brake at equal demands.
-
-    Parameters
-    ----------
-    name
-        Name of the study.
-    parameters
-        Parameter set; the main one of the study's brake by default.
-    overrides
-        Changes: names with a dot are the brake's parameters, others the study's options; SI
-        numbers, or texts with units.
-    progress
-        Called with a label and the finished share, 0 to 1.
-
-    Returns
-    -------
-    StudyResult
-        The designs with their figures in SI units, the best, and what limits it.
-
-    Raises
-    ------
-    InputError
-        For names that are unknown, values out of range, and changes without effect.
-    """
-    definition, named, par, options = asked_study(name, parameters, overrides)
-    findings = definition.compute(par, options, progress or silent)
-    return StudyResult(definition, named, par, options, findings)
+AskedStudy = tuple[Study, str, ParameterSet, ParameterSet]
 
 
-def asked_study(
-    name: str, parameters: str, overrides: Mapping[str, Any]
-) -> tuple[Study, str, ParameterSet, ParameterSet]:
+def asked_study(name: str, parameters: str, overrides: Mapping[str, Any]) -> AskedStudy:
     """Return a study, the name of its parameter set, and parameters and options as changed.
 
     Raises
     ------
     InputError
-        As `study`.
+        As `bywire.study`.
     """
     definition = STUDIES.find(name)
     cited = set_for(f"study {definition.name!r}", definition.assembly, parameters)
@@ -238,7 +195,8 @@ def _changed(
 
 def cut_table(cut: Cut) -> Table:
     """Return a cut of a study's designs as a table in display units."""
-    heading, columns = [], []
+    heading: list[str] = []
+    columns: list[list[object]] = []
     for name in cut.columns:
         values = cut.data[name].values
         if values.dtype.kind in "UO":  # words
@@ -247,7 +205,7 @@ def cut_table(cut: Cut) -> Table:
             continue
         shown, unit = in_display_unit(values, str(cut.data[name].attrs["units"]))
         heading.append(f"{name} [{unit_text(unit) or '-'}]")
-        columns.append([f"{float(value):.4g}" for value in shown])
+        columns.append([Cell(f"{value:.4g}", value=value, unit=unit) for value in shown.tolist()])
     return text_table(heading, zip(*columns, strict=True))
 
 

@@ -9,13 +9,12 @@ import numpy as np
 
 from bywire.report.document import Block, FigureBlock
 from bywire.report.study.drawn_cases import LINES, POINTS, DrawnCases, drawn_cases
-from bywire.studies.findings import Findings
-from bywire.studies.judgment import Judgment
+from bywire.studies.findings import Findings, Judgment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from bywire.report.study.case_axis import CaseAxis
+    from bywire.report.study.cases import CaseAxis
 
 _DRIVERS = 3  # quantities that a key figure is drawn over
 _AXES = 9  # of parallel coordinates
@@ -87,7 +86,7 @@ def _required(findings: Findings) -> list[str]:
 
 def _axis(findings: Findings, name: str) -> CaseAxis:
     """Return the axis of a quantity that varies, or of a key figure."""
-    from bywire.report.study.case_axis import CaseAxis, choice_axis
+    from bywire.report.study.cases import CaseAxis, choice_axis
 
     varied = {v.name: v for v in findings.plan.varied}.get(name)
     if varied is None:
@@ -99,7 +98,7 @@ def _axis(findings: Findings, name: str) -> CaseAxis:
 
 
 def _scatter(findings: Findings, name: str, cases: DrawnCases) -> Figure:
-    from bywire.report.study.scatter import scatter
+    from bywire.report.study.cases import scatter
 
     drivers = [_axis(findings, each) for each in findings.drivers(name)[:_DRIVERS]]
     limit = bound_of(findings, name)
@@ -108,7 +107,7 @@ def _scatter(findings: Findings, name: str, cases: DrawnCases) -> Figure:
 
 
 def _parallel(findings: Findings, cases: DrawnCases) -> Figure:
-    from bywire.report.study.parallel_coordinates import parallel_coordinates
+    from bywire.report.study.cases import parallel_coordinates
 
     figures = _required(findings)
     ranked = [each for name in figures for each in findings.drivers(name)[:_DRIVERS]]

@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING
 from bywire.api.study_tables import figure_text
 from bywire.bench import running
 from bywire.bench.bench import Bench
-from bywire.bench.bench_text import bench_text
+from bywire.bench.bench_file import bench_text
 from bywire.bench.result import Result
 from bywire.report.document import Attachment, recording_file
 from bywire.report.wording import amount
 from bywire.studies.chunk import case_bench
-from bywire.studies.findings import Findings
-from bywire.studies.judgment import Judgment
+from bywire.studies.findings import Findings, Judgment
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,9 +6,8 @@ from typing import Any
 
 from bywire.api.study_rare import rare_data
 from bywire.api.study_sensitivity import drivers_data
-from bywire.studies.findings import Findings
-from bywire.studies.judgment import Judgment
-from bywire.studies.spread import Spread
+from bywire.studies.findings import Findings, Judgment
+from bywire.studies.statistics import Spread
 
 
 def findings_data(findings: Findings) -> dict[str, Any]:

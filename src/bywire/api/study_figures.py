@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from bywire.studies.effects import Effect
-    from bywire.studies.judgment import Judgment
+    from bywire.studies.findings import Effect, Judgment
 
 _PANELS = 4  # requirements whose convergence is drawn
 _SHARES = 100  # points of a convergence, spaced by equal ratios
@@ -31,14 +30,7 @@ Recordings = Callable[[], Mapping[str, Mapping[str, "xr.Dataset"]]]
 def load_drawing() -> None:
     """Load what draws the figures of a study and writes its report, ahead of its findings."""
     from bywire.data import netcdf  # noqa: F401
-    from bywire.report import overlaid_panels, page  # noqa: F401
-    from bywire.report.study import (  # noqa: F401
-        convergence,
-        histograms,
-        influence_bars,
-        parallel_coordinates,
-        scatter,
-    )
+    from bywire.report import overlaid, page  # noqa: F401
 
 
 def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
@@ -130,7 +122,7 @@ def _on_choices(findings: Findings) -> str:
 
 
 def _histograms(findings: Findings) -> Figure:
-    from bywire.report.study.histograms import Spread, histograms
+    from bywire.report.study.probabilities import Spread, histograms
 
     return histograms(
         {
@@ -149,21 +141,21 @@ def _histograms(findings: Findings) -> Figure:
 
 
 def _influences(findings: Findings) -> Figure:
-    from bywire.report.study.influence_bars import influence_bars
+    from bywire.report.study.influences import influence_bars
 
     each = {name: findings.influences(name) for name in shown_figures(findings)}
     return influence_bars({name: found for name, found in each.items() if found})
 
 
 def _tornado(findings: Findings, effects: Mapping[str, Sequence[Effect]]) -> Figure:
-    from bywire.report.study.tornado import tornado
+    from bywire.report.study.influences import tornado
 
     limits = {name: limit for name in effects if (limit := bound_of(findings, name)) is not None}
     return tornado(effects, findings.units, limits)
 
 
 def _convergence(findings: Findings) -> Figure:
-    from bywire.report.study.convergence import convergence
+    from bywire.report.study.probabilities import convergence
 
     shown = _converging(findings)[:_PANELS]
     return convergence(
@@ -200,7 +192,7 @@ def _overlays(findings: Findings, recordings: Recordings) -> list[Block]:
 
 
 def _overlaid(each: Mapping[str, xr.Dataset]) -> Figure:
-    from bywire.report.overlaid_panels import overlaid_panels
+    from bywire.report.overlaid import overlaid_panels
 
     return overlaid_panels(_alike_once(each))
 

@@ -12,12 +12,11 @@ import numpy as np
 from bywire.report.document import FigureBlock, TableBlock
 from bywire.report.tables import OUTCOMES, Cell, Column, Table, value_text
 from bywire.report.wording import amount, clean
-from bywire.studies.failure_probability import FailureProbability, Interval
+from bywire.studies.designs import IMPORTANCE, SUBSET
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan
 from bywire.studies.rare_failures import Importance, RareFailure
-from bywire.studies.sought_design import IMPORTANCE, SUBSET
-from bywire.studies.statistics import Outcome
+from bywire.studies.statistics import FailureProbability, Interval, Outcome
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -228,7 +227,7 @@ def _shown(value: float | str, unit: str) -> str:
 
 
 def _curves(findings: Findings) -> Figure:
-    from bywire.report.study.exceedance import Curve, exceedance
+    from bywire.report.study.probabilities import Curve, exceedance
 
     seen = [each for each in findings.rare if each.failure.span]
     return exceedance([_curve(findings, each, Curve) for each in seen])

@@ -11,10 +11,10 @@ from bywire.api.study_rare import rare_notes, search_notes, state_texts
 from bywire.api.study_sensitivity import missing_indices
 from bywire.api.study_tables import shown_figures
 from bywire.core.units import shown
+from bywire.studies.designs import WORST
 from bywire.studies.findings import Findings
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.sensitivity import VarianceShares
-from bywire.studies.sought_design import WORST
 
 _REASONS = 10  # that are named
 _WIDE = 0.15  # reach of an interval of shares of the variance to either side, that tells little

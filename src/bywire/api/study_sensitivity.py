@@ -11,9 +11,7 @@ from bywire.api.study_tables import figure_text, shown_figures, strongest
 from bywire.report.document import FigureBlock, TableBlock
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import clean
-from bywire.studies.choice_influence import ChoiceInfluence
-from bywire.studies.effects import Effect
-from bywire.studies.findings import Findings
+from bywire.studies.findings import ChoiceInfluence, Effect, Findings
 from bywire.studies.sensitivity import ElementaryEffects, Estimate, VarianceShares
 
 if TYPE_CHECKING:
@@ -127,7 +125,7 @@ def _share(value: float) -> str:
 
 
 def _bars(findings: Findings) -> Figure:
-    from bywire.report.study.sensitivity_bars import sensitivity_bars
+    from bywire.report.study.influences import sensitivity_bars
 
     each = {name: findings.sensitivity(name).drivers for name in shown_figures(findings)}
     each = {name: found for name, found in each.items() if found}

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
-from bywire.api.run_study import kept_study
 from bywire.api.study_run import StudyRun
-from bywire.api.study_tables import figure_text, shown_figures, varied_table
-from bywire.bench.relative_changes import share_of
-from bywire.core.errors import ParameterError, unknown_name
-from bywire.core.values import number
-from bywire.report.answer import Answer, use_case
+from bywire.api.study_tables import figure_text, varied_table
+from bywire.core.callers import option
+from bywire.report.answer import Answer
 from bywire.report.document import Document, Section, TableBlock, spaced
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import amount, clean
-from bywire.studies.polynomial_chaos import require_fittable, surrogate_of
 from bywire.studies.surrogate import Surrogate
 
 _POOR = 0.5  # share of the variance below which a surrogate is no use
@@ -63,7 +57,7 @@ class StudySurrogates(Answer):
         varied, first = self.study.plan.varied, next(iter(self.surrogates.values()))
         moved = [
             f"no case has {v.name} = {amount(v.nominal, v.unit)} as the bench has it: the nearest, "
-            f"{amount(first.nominal[v.name], v.unit)}, is taken; choose another by --at"
+            f"{amount(first.nominal[v.name], v.unit)}, is taken; choose another by {option('at')}"
             for v in varied
             if self.at and v.name not in self.at and first.nominal[v.name] != v.nominal
         ]
@@ -132,60 +126,3 @@ class StudySurrogates(Answer):
             },
             "warnings": self.warnings,
         }
-
-
-@use_case
-def study_surrogates(
-    folder: str | Path,
-    kpis: str | Sequence[str] = (),
-    at: Mapping[str, Any] = MappingProxyType({}),
-) -> StudySurrogates:
-    """Return polynomials that tell key figures of a study between its cases; nothing is run.
-
-    Parameters
-    ----------
-    folder
-        Folder of the study.
-    kpis
-        Key figure, or several; by default those that something is required of, or all.
-    at
-        Values of what varies at which to tell them: SI numbers, texts with units, or changes such
-        as ``"+5 %"`` of what the bench has; the others as in the bench.
-
-    Returns
-    -------
-    StudySurrogates
-        Each surrogate with its error in the key figure's unit; ``.surrogates["overshoot"]`` is
-        called with values or arrays [SI].
-
-    Raises
-    ------
-    InputError
-        When the folder holds no study, for names that are unknown, values beyond what the cases
-        have shown, or between those of a quantity that has single ones, too few cases, designs that
-        do not show what lies between their points, and structural choices among what varies.
-    """
-    report = kept_study(folder)
-    require_fittable(report.plan)  # before values are read: those of a choice are no numbers
-    findings = report.findings
-    quantities = {v.name: v for v in report.plan.varied}
-    values: dict[str, float] = {}
-    for name, text in at.items():
-        if name not in quantities:
-            raise unknown_name("quantity of the study", name, quantities)
-        share = share_of(text)
-        change = (1.0 + share) * quantities[name].nominal if share is not None else text
-        values[name] = number(change, quantities[name].unit or "1", name)
-    surrogates: dict[str, Surrogate] = {}
-    refused: dict[str, str] = {}
-    wanted = [kpis] if isinstance(kpis, str) else kpis
-    required = [each.figure for each in report.plan.demands]
-    for kpi in wanted or shown_figures(findings) or required:
-        try:
-            surrogates[kpi] = surrogate_of(findings, kpi)
-        except ParameterError as error:
-            refused[kpi] = str(error)
-    if not surrogates:
-        why = "; ".join(dict.fromkeys(refused.values()))
-        raise ParameterError(why or f"{folder}: no case is computed yet")
-    return StudySurrogates(report, surrogates, values, refused)

@@ -12,12 +12,9 @@ from bywire.report.document import Listing, TableBlock
 from bywire.report.study.drawn_cases import BARS
 from bywire.report.tables import OUTCOMES, Cell, Column, Table, text_table, value_text
 from bywire.report.wording import amount, clean
-from bywire.studies.choice_influence import ChoiceInfluence
-from bywire.studies.effects import ONE, Effect
-from bywire.studies.findings import Findings
-from bywire.studies.judgment import Judgment
+from bywire.studies.designs import WORST
+from bywire.studies.findings import ONE, ChoiceInfluence, Effect, Findings, Judgment
 from bywire.studies.plan import StudyPlan
-from bywire.studies.sought_design import WORST
 from bywire.studies.statistics import Influence, Share
 
 _URGENCY = ("missed", "undecided", "met")  # outcomes, in the order in which they matter
@@ -62,7 +59,16 @@ def _worst(findings: Findings, judgment: Judgment) -> Cell:
     if not known.size:
         return Cell("-" if judgment.worst is None else "not defined")
     value = float(figures[known[0] if judgment.worst is None else judgment.worst])
-    return Cell(figure_text(findings, kpi, value), value=value)
+    return figure_cell(findings, kpi, value)
+
+
+def figure_cell(
+    findings: Findings, name: str, value: float, *, is_difference: bool = False
+) -> Cell:
+    """Return the cell of a value of a key figure; see `figure_text`."""
+    unit = findings.units[name]
+    text = figure_text(findings, name, value, is_difference=is_difference)
+    return Cell(text, value=value, unit=difference_unit(unit) if is_difference else unit)
 
 
 def figure_text(
@@ -127,8 +133,8 @@ def spread_table(findings: Findings) -> Table:
         values = [each.nominal, *middle, each.least, each.largest]
         name = clean(each.name)
         name += f" (not defined in {each.undefined})" if each.undefined else ""
-        texts = (figure_text(findings, each.name, v) for v in values)
-        rows.append((Cell(name), *(Cell(t, value=v) for t, v in zip(texts, values, strict=True))))
+        cells = (figure_cell(findings, each.name, v) for v in values)
+        rows.append((Cell(name), *cells))
     return Table((Column("name"), *(Column(h, numeric=True) for h in heads)), tuple(rows))
 
 
@@ -202,8 +208,8 @@ def _effect_table(findings: Findings, name: str, effects: Sequence[Effect]) -> T
             (
                 Cell(each.quantity),
                 *map(Cell, ends),
-                *(Cell(figure_text(findings, name, v), value=v) for v in figures),
-                Cell(figure_text(findings, name, each.swing, is_difference=True), value=each.swing),
+                *(figure_cell(findings, name, v) for v in figures),
+                figure_cell(findings, name, each.swing, is_difference=True),
             )
         )
     return Table((Column("quantity"), *(Column(h, numeric=True) for h in heads)), tuple(rows))

@@ -10,12 +10,10 @@ from bywire.api.run_remarks import fault_texts
 from bywire.api.run_sections import options_in_use
 from bywire.bench.bench import Bench
 from bywire.bench.result import Result
-from bywire.report.changes import bench_changes
 from bywire.report.document import Block, Listing, Paragraph, Section
-from bywire.report.subject import Subject
+from bywire.report.subject import Subject, bench_changes
 from bywire.report.wording import clean
-from bywire.studies.plan import StudyPlan, Varied
-from bywire.studies.studied_bench import StudiedBench
+from bywire.studies.plan import StudiedBench, StudyPlan, Varied
 
 
 def tested_line(plan: StudyPlan) -> str:

@@ -18,7 +18,8 @@ from bywire.identification import trust as trusted
 from bywire.identification.fitting.question import Question
 from bywire.identification.method import Effort
 from bywire.identification.trust import Trust
-from bywire.report.answer import Answer, use_case
+from bywire.report.answer import Answer
+from bywire.report.answering import answering
 from bywire.report.document import Document, Flat, Listing, Section, TableBlock
 from bywire.report.estimate_tables import trust_table
 
@@ -102,7 +103,7 @@ class TrustStudy(Answer):
             yield Listing(self.troubles)
 
 
-@use_case
+@answering
 @on_one_thread()
 def trust(
     method: str,

@@ -9,10 +9,10 @@ from typing import Any
 from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.api.loop_case import LoopCase
 from bywire.bench.requirements import Limit
-from bywire.report.tables import Table, text_table
+from bywire.report.tables import Cell, Table, amount_cell, text_table
 from bywire.report.wording import amount
 from bywire.synthesis.bench_figures import BenchFigures
-from bywire.synthesis.candidate import Candidate
+from bywire.synthesis.bench_tuning import Candidate
 from bywire.synthesis.verification import Verification
 
 Part = str | Table
@@ -38,7 +38,7 @@ def verification_parts(
         )
     for name in ("phase_margin", "gain_margin", "lower_gain_margin", "disk_margin"):
         both = [nominal, tried.nominal][: len(columns)]
-        cells = [figure_text(name, figures[name]) for figures in both]
+        cells = [figure_cell(name, figures[name]) for figures in both]
         rows.append([f"{name}, linear model", *cells])
     parts: list[Part] = [text_table(["nonlinear bench", *(c for c, _ in columns)], rows)]
     tries = [candidate.figures for candidate in shown]
@@ -96,6 +96,11 @@ def verdict_text(requirements: Sequence[Limit], tried: Verification) -> str:
     return f"requirements: {', '.join(texts)}"
 
 
+def figure_cell(name: str, value: float) -> Cell:
+    """Return the cell of a figure; see `figure_text`."""
+    return Cell(figure_text(name, value), value=value, unit=LOOP_FIGURES[name].unit)
+
+
 def figure_text(name: str, value: float) -> str:
     """Return a figure with its unit; a gain margin as a factor and in dB."""
     text = amount(value, LOOP_FIGURES[name].unit, 3)
@@ -104,19 +109,21 @@ def figure_text(name: str, value: float) -> str:
     return text
 
 
-def _figure_rows(case: LoopCase, where: str, columns: list[BenchFigures | None]) -> list[list[str]]:
+def _figure_rows(
+    case: LoopCase, where: str, columns: list[BenchFigures | None]
+) -> list[list[str | Cell]]:
     """Return rows of one trial: what the sines and the step show, a column for each design."""
 
-    def cell(figures: BenchFigures | None, k: int, name: str) -> str:
+    def cell(figures: BenchFigures | None, k: int, name: str) -> Cell:
         if figures is None or not figures.small:
-            return "-"
-        return amount(getattr(figures.small[k], name), LOOP_FIGURES[name].unit, 3)
+            return Cell("-")
+        return amount_cell(getattr(figures.small[k], name), LOOP_FIGURES[name].unit, 3)
 
     sizes = next(
         ([s.amplitude for s in figures.small] for figures in columns if figures and figures.small),
         [],
     )
-    rows = [
+    rows: list[list[str | Cell]] = [
         [
             f"{name}, sine of {amount(size, case.input_unit, 3)}{where}",
             *(cell(figures, k, name) for figures in columns),
@@ -127,7 +134,7 @@ def _figure_rows(case: LoopCase, where: str, columns: list[BenchFigures | None])
     steps = next((tuple(figures.step) for figures in columns if figures and figures.step), ())
     for name in steps:
         cells = [
-            amount(figures.step.get(name) if figures else None, LOOP_FIGURES[name].unit, 3)
+            amount_cell(figures.step.get(name) if figures else None, LOOP_FIGURES[name].unit, 3)
             for figures in columns
         ]
         rows.append([f"{name}, {case.loop.proof}{where}", *cells])

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from bywire.bench.bench_source import usual_set
+from bywire.bench.bench_source import experiment_of, usual_set
 from bywire.bench.effects import are_alike, refuse_without_effect, switches_of
 from bywire.bench.experiment import Case, Cases, Experiment, as_run
-from bywire.bench.experiment_choice import experiment_of
 from bywire.bench.extent import check_seed, checked_interval, checked_step
 from bywire.bench.faults.fault_section import Injection, injections
 from bywire.bench.faults.injected import checked_sections, with_faults

@@ -1,28 +1,125 @@
-"""Bench files: TOML in, Bench out; nothing in them is executed."""
+"""Bench files: TOML in, Bench out, and back; nothing in them is executed."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
 from bywire.bench.bench import Bench
-from bywire.bench.bench_source import content_of_experiment, meant_by
-from bywire.bench.bench_text import PATHS
-from bywire.bench.experiment_choice import experiment_of
+from bywire.bench.bench_source import content_of_experiment, experiment_of, meant_by
+from bywire.bench.faults.course import Course
 from bywire.bench.faults.fault_section import with_units_wanted
 from bywire.bench.faults.injected import checked_sections
 from bywire.bench.relative_changes import is_relative, settled
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.bench.stimulus_sections import stimulus_sections
 from bywire.core.arguments import checked
+from bywire.core.callers import option
 from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
 from bywire.core.errors import InputError, ParameterError, unknown_name
+from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.section import Hint, Section, Table, table_of
 from bywire.core.values import parsed, require_unit, require_units
 from bywire.data.file_kinds import BENCH, require_kind
 from bywire.data.toml_file import read_toml
+
+PATHS = ("trace", "trace_map", "file")
+"""keys of options and stimuli that name files: written down, they must hold from any folder"""
+
+
+def bench_text(bench: Bench, comment: str = "") -> str:
+    """Return a bench as TOML.
+
+    Parameters
+    ----------
+    bench
+        What is written; numbers get their SI units, texts stay as they were typed.
+    comment
+        First lines.
+
+    Examples
+    --------
+    >>> print(bench_text(Bench("hard-braking", "dardanelli2010", overrides={"motor.R_m": 0.4})))
+    experiment = "hard-braking"
+    parameters = "dardanelli2010"
+    <BLANKLINE>
+    [set]
+    "motor.R_m" = "0.4 ohm"
+    <BLANKLINE>
+    """
+    definition = bench.definition
+    simulation: dict[str, Any] = {"step": bench.step} if bench.step != Bench.step else {}
+    simulation |= {} if bench.record is None else {"record": bench.record}
+    simulation |= {"seed": bench.seed} if bench.seed else {}
+    simulation |= {} if bench.engine == "auto" else {"engine": bench.engine}
+    sections: dict[str, tuple[Mapping[str, Any], Mapping[str, str]]] = {
+        "options": (bench.options, _units(definition.options)),
+        **_stimulus(bench),
+        "set": (bench.overrides, _units(type(bench.par))),
+        "simulation": (simulation, {"step": "s", "record": "s"}),
+        "requirements": (bench.requirements, {}),
+    }
+    lines = [f"# {line}" for line in comment.splitlines()]
+    lines += [f'experiment = "{bench.experiment}"', f'parameters = "{bench.parameters}"']
+    lines += [f'assembly = "{bench.assembly}"'] if bench.assembly else []
+    for name, (values, units) in sections.items():
+        if values:
+            lines += ["", f"[{name}]"]
+            lines += [f"{_key(k)} = {_text(k, v, units.get(k, '1'))}" for k, v in values.items()]
+    for section, fault in zip(bench.faults, bench.injections, strict=True):
+        units = _units(Course) | {"value": fault.mode.unit or "1"}
+        lines += ["", "[[faults]]"]
+        lines += [
+            f"{_key(k)} = {_text(k, v, units.get(k, '1'))}"
+            for k, v in section.items()
+            if k != "set"
+        ]
+        changed = section.get("set", {})
+        of_parameters = _units(type(bench.par))
+        lines += [
+            f'set."{k}" = {_text(k, v, of_parameters.get(k, "1"))}' for k, v in changed.items()
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _stimulus(bench: Bench) -> dict[str, tuple[Mapping[str, Any], Mapping[str, str]]]:
+    """Return the sections of the stimulus by title, each with the units of its values."""
+    definition, options = bench.definition, bench.chosen_options
+    levels = {} if definition.beside is None else dict(definition.beside(options))
+    if definition.driven_unit is not None:
+        levels[""] = definition.driven_unit(options)
+    stimuli: dict[str, tuple[Mapping[str, Any], Mapping[str, str]]] = {}
+    for name, section in stimulus_sections(bench.stimulus).items():
+        cls = STIMULI.find(str(section["kind"])).parameter_class
+        units = _units(cls, levels[name])
+        stimuli[f"stimulus.{name}" if name else "stimulus"] = (section, units)
+    return stimuli
+
+
+def _units(cls: type[ParameterSet], level: str = "") -> dict[str, str]:
+    return {n: leaf.unit.symbol.replace("level", level) for n, leaf in leaf_fields(cls).items()}
+
+
+def _key(name: str) -> str:
+    return f'"{name}"' if "." in name else name
+
+
+def _text(name: str, value: Any, symbol: str) -> str:
+    if isinstance(value, (str, Path)):
+        path = name in PATHS and str(value)
+        return json.dumps(str(Path(path).resolve()) if path else str(value), ensure_ascii=False)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Sequence):
+        return f"[{', '.join(_text(name, node, symbol) for node in value)}]"
+    number = value if isinstance(value, int) else float(value)  # all digits: it runs the same
+    return json.dumps(f"{number} {symbol}") if symbol != "1" else f"{number}"
+
+
+# --- Reading
 
 _LIST = "(see 'bywire list')"
 _Quoted = Annotated[str, Hint("write it in quotation marks")]
@@ -226,7 +323,10 @@ def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str
         elif name in SECTIONS:
             raise ParameterError(f"{name} is a section: write {name}.NAME=VALUE")
         elif section == _FAULTS:
-            raise ParameterError("faults are put in by --fault NAME=VALUE@ONSET, not by --set")
+            raise ParameterError(
+                f"faults are put in by {option('faults')} NAME=VALUE@ONSET, not by "
+                f"{option('overrides')}"
+            )
         elif name in BenchFile.model_fields:
             changed[name] = value
         else:

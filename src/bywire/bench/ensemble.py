@@ -18,16 +18,36 @@ from bywire.bench.result import Result
 from bywire.bench.running import Progress, judged, recording_of, static_recordings
 from bywire.bench.side_by_side import rounds
 from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, abandoned, steps_of, unestimated
-from bywire.bench.varied_choices import choices_that_vary
 from bywire.core.arguments import checked
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.leaf import Leaf
-from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
 from bywire.core.typing import Array
 from bywire.simulation import ensemble
-from bywire.simulation.ensemble import Ensemble
+from bywire.simulation.ensemble import Ensemble, Variations
 from bywire.simulation.run import Run
-from bywire.simulation.variations import Variations
+
+
+def varied_choices(bench: Bench) -> Mapping[str, tuple[Any, ...]]:
+    """Return what every choice of a bench that may vary can be, by its name.
+
+    Structural choices of the brake, and of the options ``options.NAME`` those that are listed
+    or true or false: a text of another kind names a signal, or a file.
+    """
+    return choices_that_vary(type(bench.par), type(bench.chosen_options))
+
+
+@lru_cache(maxsize=64)  # the cases of a study ask for the same ones
+def choices_that_vary(
+    of: type[ParameterSet], chosen: type[ParameterSet]
+) -> Mapping[str, tuple[Any, ...]]:
+    """Return the same by the classes of a bench's parameters and options."""
+    options = {f"{OPTION}{name}": choices_of(chosen, name) for name in choice_fields(chosen)}
+    parameters = {name: choices_of(of, name) for name in choice_fields(of)}
+    return parameters | {name: admitted for name, admitted in options.items() if admitted}
+
+
+# --- The ensemble
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from bywire.bench.rows import Rows
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
 from bywire.core.version import __version__
-from bywire.simulation.changes import put_in_signals
+from bywire.simulation.advance import put_in_signals
 from bywire.simulation.run import Run, Trajectory, doubts_of
 from bywire.simulation.run_group import RunGroup
 
@@ -208,7 +208,7 @@ def energy_doubts_of_cases(
 def _losses(runs: Sequence[Run]) -> Collection[str] | None:
     """Return the losses that grow whatever happens; None for all.
 
-    In the loss of a contact stands what a change of its parameters does, see `simulation.changes`.
+    In the loss of a contact stands what a change of its parameters does, see `simulation.advance`.
     """
     return runs[0].model.Flow._fields if any(run.changes for run in runs) else None
 

@@ -13,13 +13,13 @@ import xarray as xr
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict, read_limit
+from bywire.core.callers import option
 from bywire.core.errors import FileError, InputError
 from bywire.core.scratch import require_finished
 from bywire.data.netcdf import read_recording
 
 RECORD = "result.json"
 """file of a result folder that says what it holds"""
-_AGAIN = "run the bench again with --out, or name another folder"
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def read_result(folder: Path) -> FolderResult:
     try:
         status = str(record["status"])
         if status == "interrupted":
-            raise FileError(f"{folder} is not finished: its run was interrupted; {_AGAIN}")
+            raise FileError(f"{folder} is not finished: its run was interrupted; {_again()}")
         kpis = tuple(_kpi(name, each) for name, each in record["kpis"].items())
         verdicts = tuple(_verdict(each) for each in record["requirements"])
         # Names alone, within the folder: it may have moved since.
@@ -81,11 +81,11 @@ def read_result(folder: Path) -> FolderResult:
         }
     except (AttributeError, InputError, KeyError, TypeError, ValueError) as error:
         raise FileError(
-            f"{folder / RECORD} is damaged ({type(error).__name__}: {error}); {_AGAIN}"
+            f"{folder / RECORD} is damaged ({type(error).__name__}: {error}); {_again()}"
         ) from None
     recordings = {path.stem: _recording(path) for path in files if path.suffix == ".nc"}
     if not recordings:
-        raise FileError(f"{folder / RECORD} names no recording; {_AGAIN}")
+        raise FileError(f"{folder / RECORD} names no recording; {_again()}")
     return FolderResult(name, recordings, kpis, verdicts, status, warned, changes)
 
 
@@ -129,20 +129,20 @@ def record_of(folder: Path) -> dict[str, Any]:
     require_finished(folder)
     if not path.is_file():
         raise FileError(
-            f"{folder} is no finished result of bywire run: it has no {RECORD}; {_AGAIN}"
+            f"{folder} is no finished result of bywire run: it has no {RECORD}; {_again()}"
         )
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise FileError(f"{path} cannot be read ({error}); {_AGAIN}") from None
+        raise FileError(f"{path} cannot be read ({error}); {_again()}") from None
     if not isinstance(record, dict):
-        raise FileError(f"{path} is damaged: it holds no JSON object; {_AGAIN}")
+        raise FileError(f"{path} is damaged: it holds no JSON object; {_again()}")
     return record
 
 
 def _recording(path: Path) -> xr.Dataset:
     if not path.is_file():
-        raise FileError(f"{path.parent} is damaged: {path.name} is missing; {_AGAIN}")
+        raise FileError(f"{path.parent} is damaged: {path.name} is missing; {_again()}")
     return read_recording(path)
 
 
@@ -177,3 +177,7 @@ def _verdict(record: Mapping[str, Any]) -> Verdict:
 def _number(value: Any) -> float:
     """Return a number of a JSON object, in which null stands for what is not defined."""
     return math.nan if value is None else float(value)
+
+
+def _again() -> str:
+    return f"run the bench again with {option('out')}, or name another folder"

@@ -15,11 +15,18 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.bench.faults.fault_section import require_admissible
 from bywire.bench.faults.modes import Mode, modes_of
-from bywire.campaigns.criterion import CriterionSection, criteria_of
 from bywire.campaigns.declared import CAMPAIGNS
-from bywire.campaigns.plan import CampaignPlan, Failing, Reaction, evenly, touch_alike
+from bywire.campaigns.judging import require_small
+from bywire.campaigns.plan import (
+    CampaignPlan,
+    CriterionSection,
+    Failing,
+    Reaction,
+    criteria_of,
+    evenly,
+    touch_alike,
+)
 from bywire.campaigns.residual import Residual, residuals_of
-from bywire.campaigns.simulating import require_small
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.quantities import TimeConstant, Unit
 from bywire.core.section import Name, Names, Section, Table
@@ -27,9 +34,8 @@ from bywire.core.signals import signals_of
 from bywire.core.values import number, written
 from bywire.data.file_kinds import CAMPAIGN, require_kind
 from bywire.data.toml_file import read_toml
-from bywire.studies.measured import MeasuredSection
 from bywire.studies.study_file import BenchName, read_bench
-from bywire.studies.vary_section import read_all_varied
+from bywire.studies.vary_section import MeasuredSection, read_all_varied
 
 _MOST = 10_000
 

@@ -1,76 +1,66 @@
-"""The commands of ``bywire``, in the order of the help."""
+"""The commands of ``bywire``: those of all use cases, and a few by hand."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from functools import cache
 from typing import Annotated, Any
 
 import typer
 
-from bywire.cli.bench_commands import (
-    benchmark_command,
-    list_command,
-    reproduce_command,
-    run,
-)
-from bywire.cli.brake_commands import check_command, new_command
-from bywire.cli.compare_command import compare
-from bywire.cli.data_commands import convert
-from bywire.cli.export_commands import export_app
-from bywire.cli.fault_commands import faults_command
-from bywire.cli.identification_commands import identify, replay
-from bywire.cli.life_command import life_command
-from bywire.cli.loop_commands import (
-    agreement_command,
-    frequency_response_command,
-    linearize_command,
-    margins_command,
-)
+from bywire.cli.bench_commands import benchmark_command, list_command
 from bywire.cli.output import result
-from bywire.cli.page_command import page_command
 from bywire.cli.serve_command import serve_command
-from bywire.cli.sizing_commands import design_command, study_command
-from bywire.cli.study_commands import study_app
+from bywire.cli.study_group import StudyGroup
+from bywire.cli.use_case_commands import command_of
+from bywire.usecases import use_cases
 
-app = typer.Typer(
-    name="bywire",
-    help="A virtual test bench for brake-by-wire actuators.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-app.command("list")(list_command)
-app.command("run")(run)
-app.command("compare")(compare)
-app.command("page")(page_command)
-app.command("serve")(serve_command)
-app.command("reproduce")(reproduce_command)
-app.command("benchmark")(benchmark_command)
-app.command("linearize")(linearize_command)
-app.command("frequency-response")(frequency_response_command)
-app.command("agreement")(agreement_command)
-app.command("margins")(margins_command)
-study_app.command("size")(study_command)
-app.add_typer(study_app, name="study")
-app.command("life")(life_command)
-app.command("faults")(faults_command)
-app.command("design")(design_command)
-app.add_typer(export_app, name="export")
-app.command("convert")(convert)
-app.command("identify")(identify)
-app.command("replay")(replay)
-app.command("check")(check_command)
-app.command("new")(new_command)
+_ORDER = """
+list, run, compare, page, serve, reproduce, benchmark, linearize, frequency-response, agreement,
+margins, life, faults, design, convert, identify, replay, check, new,
+study run, study resume, study extend, study report, study status, study surrogate, study size,
+export controller, export fmu, export wasm
+"""
+"""commands in the order of the help; others follow"""
+_GROUPS: dict[str, dict[str, Any]] = {
+    "study": {
+        "cls": StudyGroup,
+        "help": "Run a study of many cases (run FILE), or compare designs of a brake (NAME).",
+    },
+    "export": {"help": "Write parts of a bench in the form that other tools take."},
+}
+"""groups of commands, by the first of their words"""
 
 
 @cache
 def program() -> Any:
     """Return the command line, called with its arguments: its options are read off once."""
-    found = typer.main.get_command(app)
+    found = typer.main.get_command(app())
     _keep_brackets(found)
     return found
+
+
+def app() -> typer.Typer:
+    """Return the commands as typer has them."""
+    made = typer.Typer(
+        name="bywire",
+        help="A virtual test bench for brake-by-wire actuators.",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    made.callback(invoke_without_command=True)(_root)
+    groups = {word: typer.Typer(no_args_is_help=True, **more) for word, more in _GROUPS.items()}
+    order = [words.strip() for words in _ORDER.split(",")]
+    found = dict(_commands())
+    for words in sorted(found, key=lambda words: order.index(words) if words in order else 99):
+        group, _, name = words.rpartition(" ")
+        groups.get(group, made).command(name)(found[words])
+    for word, members in groups.items():
+        made.add_typer(members, name=word)
+    return made
 
 
 def _keep_brackets(command: Any) -> None:
@@ -82,7 +72,16 @@ def _keep_brackets(command: Any) -> None:
         _keep_brackets(inner)
 
 
-@app.callback(invoke_without_command=True)
+def _commands() -> Iterator[tuple[str, Callable[..., None]]]:
+    """Yield every command with the words behind ``bywire``."""
+    yield "list", list_command
+    yield "serve", serve_command
+    yield "benchmark", benchmark_command
+    for case in use_cases().values():
+        for command in case.commands:
+            yield command.words, command_of(case, command)
+
+
 def _root(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,

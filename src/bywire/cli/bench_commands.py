@@ -1,4 +1,4 @@
-"""Options of the commands that run what is ready: benches, papers, the benchmark."""
+"""The commands that are no use cases of one function: list, benchmark."""
 
 from __future__ import annotations
 
@@ -11,16 +11,8 @@ from typing import Annotated
 import typer
 
 from bywire.cli import completion
-from bywire.cli.options import (
-    BenchChanges,
-    BenchFile,
-    ErrorEstimate,
-    JsonFlag,
-    OutFolder,
-    changes,
-)
+from bywire.cli.options import JsonFlag
 from bywire.cli.show import show
-from bywire.core import option_texts as texts
 from bywire.core.errors import InputError
 
 
@@ -30,7 +22,7 @@ def list_command(
         typer.Argument(
             metavar="[TOPIC|NAME|WORD]",
             help="A kind of things; or a name: its options, signals, units; or what it is about.",
-            autocompletion=completion.ANYTHING,
+            autocompletion=completion.names_of(),
         ),
     ] = None,
     json: JsonFlag = False,
@@ -44,57 +36,6 @@ def list_command(
     from bywire.api.describe import describe
 
     show(lambda _: describe(name), as_json=json)
-
-
-def run(
-    bench: BenchFile,
-    set_: BenchChanges = None,
-    over: Annotated[str, typer.Option(help=texts.RUN_OVER)] = "",
-    fault: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME[=VALUE][@ONSET]", help=texts.RUN_FAULT),
-    ] = None,
-    engine: Annotated[
-        str, typer.Option(help="What computes, e.g. sil: the ECU's compiled C in the loop.")
-    ] = "auto",
-    error_estimate: ErrorEstimate = True,
-    animate: Annotated[
-        bool, typer.Option("--animate", help="Write pages that play the runs, with --out.")
-    ] = False,
-    out: OutFolder = None,
-    json: JsonFlag = False,
-) -> None:
-    """Run a bench file or an experiment; exit status 1 unless every requirement is met."""
-    from bywire.api.run import run as run_bench
-    from bywire.core.errors import InputError
-
-    if animate and out is None:
-        raise InputError("--animate writes into a folder: give one by --out")
-    show(
-        lambda progress: run_bench(
-            bench,
-            changes(set_),
-            over=over,
-            faults=fault or (),
-            progress=progress,
-            engine=engine,
-            estimate_error=error_estimate,
-            animate=animate,
-        ),
-        out,
-        json,
-    )
-
-
-def reproduce_command(
-    source: Annotated[str, typer.Argument(help=texts.SOURCE)],
-    out: OutFolder = None,
-    json: JsonFlag = False,
-) -> None:
-    """Make a paper's tables and figures: stated, computed, agrees or not."""
-    from bywire.api.reproduce import reproduce
-
-    show(lambda progress: reproduce(source, progress=progress), out, json)
 
 
 def benchmark_command(

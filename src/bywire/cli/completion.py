@@ -16,7 +16,7 @@ def names_of(*kinds: str, ending: str = "") -> Callable[[str], Completed]:
     Parameters
     ----------
     kinds
-        Kinds of things, for instance ``"experiments"``; see `bywire.overview`.
+        Kinds of things, for instance ``"experiments"``, see `bywire.overview`; all by default.
     ending
         Of files, for instance ``".toml"``; none where empty.
     """
@@ -25,7 +25,12 @@ def names_of(*kinds: str, ending: str = "") -> Callable[[str], Completed]:
         from bywire.api.overview import overview
 
         things = overview().things
-        known = {name: str(text) for kind in kinds for name, text in _texts(things[kind]).items()}
+        known = {
+            name: text
+            for kind in kinds or things
+            for name, text in _texts(things[kind]).items()
+            if isinstance(text, str)
+        }
         fitting = [(name, known[name]) for name in sorted(known) if name.startswith(incomplete)]
         return fitting + (_files(incomplete, ending) if ending else [])
 
@@ -84,30 +89,3 @@ def _all_parameters() -> dict[str, str]:
 
     sets = PARAMETER_SETS.all().values()
     return {name: cited.name for cited in sets for name in cited.parameters().flat()}
-
-
-BENCHES = names_of("experiments", "generic_experiments", ending=".toml")
-LOOPS = names_of("loops")
-LOOPS_OR_PLANTS = names_of("loops", "plants")
-METHODS = names_of("methods")
-SETS = names_of("parameter_sets")
-SIZING = names_of("studies")
-LIVES = names_of("lives", ending=".toml")
-CAMPAIGNS = names_of("campaigns", ending=".toml")
-ANYTHING = names_of(
-    "brakes",
-    "assemblies",
-    "parameter_sets",
-    "experiments",
-    "generic_experiments",
-    "elements",
-    "loops",
-    "plants",
-    "studies",
-    "lives",
-    "methods",
-    "stimuli",
-    "campaigns",
-    "residuals",
-    "kpis",
-)

@@ -19,7 +19,9 @@ def serve_command(
         typer.Argument(
             metavar="[BENCH|FOLDER]",
             show_default=False,
-            autocompletion=completion.BENCHES,
+            autocompletion=completion.names_of(
+                "experiments", "generic_experiments", ending=".toml"
+            ),
             help="Bench file, experiment or folder; the current folder by default.",
         ),
     ] = None,

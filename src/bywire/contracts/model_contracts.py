@@ -1,25 +1,379 @@
-"""All contracts of a model and of its parameter sets."""
+"""Contracts of a model and of its parameter sets: units, runs, energies, sensitivities."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
 
+import numpy as np
+
+from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
 from bywire.bench.faults.modes import modes_of
-from bywire.contracts.evidence import Contract, Evidence
-from bywire.contracts.finding import Demand, Demands
-from bywire.contracts.model_units import has_its_units
-from bywire.contracts.rest import hides_no_friction, rests_exactly
-from bywire.contracts.run_derivatives import has_its_derivatives
-from bywire.contracts.run_energy import closes_its_energy
-from bywire.contracts.small_signal import is_its_linear_model, is_linear_beside_its_corners
-from bywire.contracts.stepping import (
-    has_agreeing_engines,
-    has_agreeing_lanes,
-    is_of_second_order,
+from bywire.bench.recording import record
+from bywire.contracts.dimensioned import Dimensioned, fits
+from bywire.contracts.evidence import (
+    Contract,
+    Demand,
+    Demands,
+    Evidence,
+    NotCheckedError,
+    measured,
+    place_of,
 )
-from bywire.contracts.trial import Trial
+from bywire.contracts.rest import hides_no_friction, rests_exactly
+from bywire.contracts.small_signal import is_its_linear_model, is_linear_beside_its_corners
+from bywire.contracts.trial import LARGE, Start, Trial, constants, lanes, states
 from bywire.contracts.values import set_keeps_its_ranges, set_survives_json
-from bywire.core.parameters import ParameterSet
+from bywire.core.errors import ParameterError, SolverError
+from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.signals import Signal, signals_of
+from bywire.core.typing import Array
+from bywire.simulation.compiler import find_compiler
+from bywire.simulation.run import Run, simulate
+from bywire.simulation.sensitivity import simulate_with_sensitivities
+
+OFF = 0.37
+"""how far from the start equations are evaluated, of usual magnitudes: away from their zeros"""
+
+
+def has_its_units(trial: Trial) -> Iterator[Evidence]:
+    """Find whether the model's members give the dimensions of its signals."""
+    model, start = trial.model, trial.start
+    par = with_units(start.par)
+    x, m = _moved_signals(start.state), _moved_signals(start.memory)
+    second = Dimensioned(1.0, "s")
+    contact = _contact(model, x, par)
+    mass, balance = model.mass(x, par), model.balance(x, x, m, par, contact)
+    states = signals_of(model.State)
+    for name in states:
+        unit = f"({states[name].unit})/s"
+        rate = getattr(balance, name) / _at_least_one(getattr(mass, name))
+        yield _fits(f"rate of {name}", rate, unit, trial, "balance", "wire")
+    bounds = model.bounds(x, x, m, par, contact)
+    for name, pair in zip(model.frictions, bounds, strict=True):
+        for value in pair:
+            rate, unit = value / _at_least_one(getattr(mass, name)), f"({states[name].unit})/s"
+            yield _fits(f"bound of {name} over its mass", rate, unit, trial, "bounds", "friction")
+    reaction = tuple(
+        _at_least_one(getattr(mass, name)) * Dimensioned(0.1, states[name].unit) / second
+        for name in (*model.frictions, *model.limits)
+    )
+    rates = type(x)(*(Dimensioned(0.1, s.unit) / second for s in states.values()))
+    powers = model.powers(x, x, rates, m, par, contact, reaction)
+    for name, signal in signals_of(model.Flow).items():
+        unit = f"({signal.unit})/s"
+        yield _fits(f"power of {name}", getattr(powers, name), unit, trial, "powers", "power")
+    flow = _carrying(model.Flow, {n: 0.1 * s.nominal for n, s in signals_of(model.Flow).items()})
+    recorded = model.output(x, m, par, contact, reaction, flow)
+    yield from _all_fit("recorded ", recorded, signals_of(model.Output), trial, "record")
+    u = _moved_signals(start.stimulus)
+    for task in model.tasks(start.par):
+        held = task.tick(x, m, u, par)
+        place = place_of(task.tick)
+        for evidence in _all_fit(f"{task.name}: ", held, signals_of(model.Memory), trial, "tasks"):
+            yield Evidence(evidence.holds, evidence.text, place=place)
+
+
+def with_units(par: ParameterSet) -> ParameterSet:
+    """Return a parameter set whose numbers carry their units."""
+    known = leaf_fields(type(par))
+    values = {}
+    for name, value in par.leaves().items():
+        leaf = known.get(name) or known[name.rpartition(".")[0]]  # a node of a table
+        values[name] = Dimensioned(value, leaf.unit.symbol)
+    return par.with_leaves(values)
+
+
+def _moved_signals(signals: Any) -> Any:
+    kind: Any = type(signals)
+    known = signals_of(kind)
+    values = {n: s.within(getattr(signals, n) + OFF * s.nominal) for n, s in known.items()}
+    return _carrying(kind, values)
+
+
+def _carrying(kind: Any, values: Mapping[str, float]) -> Any:
+    known = signals_of(kind)
+    return kind(*(Dimensioned(values[name], signal.unit) for name, signal in known.items()))
+
+
+def _contact(model: Any, x: Any, par: Any) -> tuple[Any, ...]:
+    """Return forces of the contacts: overlaps over compliances, of either sign."""
+    forces: list[Any] = []
+    for group, matrix in zip(model.gap(x, x, par), model.compliance(par), strict=True):
+        forces += [d / matrix[k][k] for k, d in enumerate(group)]
+    return tuple(forces)
+
+
+def _at_least_one(mass: Any) -> Any:
+    return mass if isinstance(mass, Dimensioned) else Dimensioned(float(mass))
+
+
+def _all_fit(
+    prefix: str, values: Sequence[Any], known: Mapping[str, Signal], trial: Trial, member: str
+) -> Iterator[Evidence]:
+    for (name, signal), value in zip(known.items(), values, strict=True):
+        yield _fits(f"{prefix}{name}", value, signal.unit, trial, "output", member)
+
+
+def _fits(what: str, value: Any, unit: str, trial: Trial, *members: str) -> Evidence:
+    text = f"{what} is {value}, wanted {unit}"
+    return Evidence(fits(value, unit), text, place=trial.place(*members))
+
+
+# --- Energies: a run gives what was put in, to losses and to what is stored
+
+RESIDUAL = 1e-6
+"""of the energy that is turned over: what may be left once the step's own error is taken off"""
+ENERGY_SHARES = (LARGE, 0.05)
+
+
+def closes_its_energy(trial: Trial) -> Iterator[Evidence]:
+    """Find whether the recorded energies of a large and of a small run close, book by book.
+
+    The step's own error falls with its square: of the residuals at two steps the difference tells
+    it, and it is taken off.
+    """
+    place = trial.place("powers", "power")
+    for share in ENERGY_SHARES:
+        run = trial.start.run(share)
+        coarse, fine = (_ledgers(replace(run, step=run.step / n)) for n in (1, 2))
+        turned = {book: each for book, each in fine.items() if each.turnover}
+        if not turned:
+            raise NotCheckedError(
+                f"the recording shows no energies (E_source, losses E_..., E_stored) that change "
+                f"in a run from {trial.start.known}"
+            )
+        size = "large" if share == LARGE else "small"
+        for book, each in turned.items():
+            before = coarse[book].closing_error if book in coarse else each.closing_error
+            left = (4.0 * each.closing_error - before) / 3.0 / each.turnover
+            where = f", in the book {book!r}" if book else ""
+            text = (
+                f"{abs(left):.1e} of the {each.turnover:.3g} J of a {size} run are unexplained"
+                + where
+            )
+            yield measured(abs(left), RESIDUAL, text, place)
+
+
+def _ledgers(run: Run) -> dict[str, Ledger]:
+    """Return the books of a run by name, the first one's empty."""
+    recording = record(run, simulate(run), 0.0, 0.0, {})
+    first = actuator_ledger(recording)
+    return {"": first, **further_ledgers(recording)}
+
+
+# --- Sensitivities: the exact derivatives of a run are its differences
+
+PARAMETERS = 8
+"""how many parameters are tried: those that move the states most"""
+INFLUENCE = 1e-3
+"""relative change of a parameter by which its influence is judged"""
+DIFFERENCE = 1e-6
+"""relative step of the differences"""
+SLOPE = 1e-3
+"""by how much a derivative may differ from them, of the largest of all states, half of the time"""
+
+
+def has_its_derivatives(trial: Trial) -> Iterator[Evidence]:
+    """Find whether the derivatives of the states by the parameters are differences of runs.
+
+    Without dry friction, and without controllers that round: breakaway and reversals move in time
+    with a parameter, which exact derivatives follow within a few per cent and differences do not.
+    """
+    if find_compiler() is None:
+        raise NotCheckedError("there is no C compiler: install the extra bywire[compiler]")
+    run = trial.large_run(frictions=False)
+    names = [f"x_{name}" for name in trial.model.State._fields]
+    chosen = _strongest(trial, run)
+    if not chosen:
+        raise NotCheckedError(f"from {trial.start.known} no parameter moves any state")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of converters; their runs are those of the plant alone
+        exact = simulate_with_sensitivities(run, tuple(chosen), names)
+    at = run.par.leaves()
+    ahead = {name: [at[name]] * 2 * len(chosen) for name in chosen}
+    for k, name in enumerate(chosen):
+        ahead[name][2 * k : 2 * k + 2] = [_moved(run, name, sign * DIFFERENCE) for sign in (1, -1)]
+    values = lanes(run, ahead)[:, :, : len(names)]
+    whose = "the plant alone" if trial.rounds else "the run"
+    nominal = np.array([abs(s.nominal) for s in signals_of(trial.model.State).values()])
+    for k, name in enumerate(chosen):
+        width = ahead[name][2 * k] - ahead[name][2 * k + 1]
+        differences = (values[2 * k] - values[2 * k + 1]) / width / nominal
+        slopes = exact.derivatives[:, :, k] / nominal
+        rounding = np.abs(values[2 * k]).max(axis=0) * 1e-12 / width / nominal
+        largest = float(max(np.abs(slopes).max(), np.abs(differences).max()))
+        if largest * SLOPE <= rounding.max():
+            continue  # what the states feel of this parameter drowns in rounding
+        # Not everywhere: contacts that close move in time, and fixed steps do not show that.
+        off = np.median(np.abs(slopes - differences), axis=0) / largest
+        j = int(np.argmax(off))
+        state = trial.model.State._fields[j]
+        text = (
+            f"d({state})/d({name}) of {whose} without dry friction is off by {off[j]:.1e} of the "
+            "largest, in usual magnitudes, half of the time"
+        )
+        yield measured(float(off[j]), SLOPE, text, trial.place("balance", "wire"))
+
+
+def _strongest(trial: Trial, run: Run) -> list[str]:
+    """Return the parameters that move the states most, each by the same share of its value."""
+    known = dict(constants(run))
+    cases: dict[str, float] = {}
+    for name in known:
+        try:
+            value = _moved(run, name, INFLUENCE)
+            run.par.replace({name: value})
+        except ParameterError:
+            continue
+        cases[name] = value
+    if not cases:
+        return []
+    table = {
+        name: [known[name], *(cases[name] if other == name else known[name] for other in cases)]
+        for name in cases
+    }
+    count = len(trial.model.State._fields)
+    values = lanes(run, table)[:, :, :count]
+    nominal = np.array([s.nominal for s in signals_of(trial.model.State).values()])
+    size = np.maximum(np.ptp(values[0], axis=0), 1e-3 * np.abs(nominal))
+    moved = (np.abs(values[1:] - values[0]) / size).max(axis=1).mean(axis=1)
+    order = np.argsort(-moved)[:PARAMETERS]
+    names = list(cases)
+    return [names[k] for k in order if moved[k] > 1e-9]
+
+
+def _moved(run: Run, name: str, share: float) -> float:
+    value = run.par.leaves()[name]
+    return value + share * (abs(value) or leaf_fields(type(run.par))[name].unit.nominal)
+
+
+# --- Runs: order of the step, and one result of every engine
+
+ORDER = 2.0
+SHORTFALL = 0.3
+"""by how much the observed order may fall short of two; a model of first order is off by one"""
+HALVINGS = 4
+SMOOTH_SHARES = (1.0, 0.3, 0.1)
+SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03)
+"""of the controllers' moves: where stick and slip change instants, one run's errors scatter"""
+SCATTER = 0.2
+"""least standard error of the order of one run: a few errors may lie on a line by chance"""
+ROUNDING = 1e-12
+"""of a state's largest or usual magnitude: differences below it tell nothing of the step"""
+AGREEMENT = 1e-9
+"""by how much engines may differ, of the largest value of a signal in the run, which counts at
+least a thousandth of the usual one"""
+_VIRTUAL = 0.02  # length [s] of the run that is repeated without a compiler
+
+
+def is_of_second_order(trial: Trial) -> Iterator[Evidence]:
+    """Find whether every state of the plant converges with the square of the substep.
+
+    Without dry friction, and with it: a substep in which a velocity turns round is cut there.
+    """
+    orders = list(_orders(trial, False, ORDER))
+    if not orders:
+        raise NotCheckedError(f"from {trial.start.known} no state moves enough to tell it")
+    yield from orders
+    if trial.model.frictions:
+        yield from _orders(trial, True, ORDER)
+
+
+def _orders(trial: Trial, frictions: bool, wanted: float) -> Iterator[Evidence]:
+    """Yield what is found of every state that moves enough to tell it."""
+    start = trial.start
+    steps = [start.step / 2**k for k in range(HALVINGS + 1)]
+    names = start.state._fields
+    nominal = np.array([abs(s.nominal) for s in signals_of(trial.model.State).values()])
+    errors = []
+    for share in SHARES if frictions else SMOOTH_SHARES:
+        try:
+            runs = [
+                states(simulate(trial.drive.run(share, step, frictions)), names) for step in steps
+            ]
+        except SolverError:  # what runs away without its friction
+            continue
+        floor = ROUNDING * np.maximum(np.abs(runs[-1]).max(axis=0), nominal)
+        changes = [np.sqrt(np.mean((a - b) ** 2, axis=0)) for a, b in pairwise(runs)]
+        errors.append(np.where(changes > floor, changes, np.nan))
+    for k, name in enumerate(names if errors else ()):
+        order, doubt = _observed(np.array(errors)[:, :, k])
+        if doubt < SHORTFALL:
+            how = "with" if frictions else "without"
+            text = (
+                f"{name} converges with order {order:.2f} +- {doubt:.2f} in the substep {how} dry "
+                f"friction, wanted is {wanted:g}"
+            )
+            place = trial.place("balance", "wire")
+            yield measured(max(wanted - order - doubt, 0.0), SHORTFALL, text, place)
+
+
+def _observed(errors: Array) -> tuple[float, float]:
+    """Return the order with which errors fall, and twice its standard error.
+
+    The mean over the runs, those counting most whose errors lie on a line.
+
+    Parameters
+    ----------
+    errors
+        Of every run at every halving of the step, shape (runs, halvings).
+    """
+    logs = np.log2(errors)
+    logs = logs[np.isfinite(logs).all(axis=1)]
+    if not logs.size:
+        return math.nan, math.inf
+    halving = np.arange(HALVINGS) - 0.5 * (HALVINGS - 1)
+    spread = float(np.sum(halving**2))
+    slopes = logs @ halving / spread
+    rest = logs - logs.mean(axis=1, keepdims=True) - slopes[:, None] * halving
+    variances = np.sum(rest**2, axis=1) / (HALVINGS - 2) / spread + SCATTER**2
+    total = float(np.sum(1.0 / variances))
+    return -float(np.sum(slopes / variances)) / total, 2.0 / math.sqrt(total)
+
+
+def has_agreeing_engines(trial: Trial) -> Iterator[Evidence]:
+    """Find whether the compiled kernel and the virtual machine compute one run."""
+    if find_compiler() is None:
+        raise NotCheckedError("there is no C compiler: install the extra bywire[compiler]")
+    run = trial.start.run(LARGE, duration=_duration(trial.start))
+    compiled = simulate(run, engine="compiled")
+    virtual = simulate(run, engine="virtual-machine")
+    yield from _agree(
+        compiled.values, virtual.values, type(trial.model).Output, "the virtual machine", trial
+    )
+
+
+def has_agreeing_lanes(trial: Trial) -> Iterator[Evidence]:
+    """Find whether an ensemble's lanes compute what the single run does."""
+    if find_compiler() is None:
+        raise NotCheckedError("there is no C compiler: install the extra bywire[compiler]")
+    run = trial.large_run(frictions=True)
+    name, value = next(iter(constants(run)))
+    lane = lanes(run, {name: [value]})[0]
+    yield from _agree(simulate(run).values, lane, run.model.Output, "a lane", trial)
+
+
+def _duration(start: Start) -> float:
+    return max(_VIRTUAL, 2.0 * start.period)
+
+
+def _agree(
+    first: Array, second: Array, signals: Any, what: str, trial: Trial
+) -> Iterator[Evidence]:
+    known = signals_of(signals)
+    for k, (name, signal) in enumerate(known.items()):
+        scale = max(float(np.abs(first[:, k]).max()), 1e-3 * abs(signal.nominal))
+        off = float(np.abs(first[:, k] - second[:, k]).max()) / scale
+        text = f"{name} of {what} is off by {off:.1e} of its largest value"
+        yield measured(off, AGREEMENT, text, trial.place("output", "record"))
+
+
+# --- All of them
 
 OF_A_SET: dict[str, Contract] = {
     "round trip": set_survives_json,

@@ -10,10 +10,9 @@ import casadi as ca
 import numpy as np
 
 from bywire.contracts.evidence import Evidence, NotCheckedError, measured
-from bywire.contracts.probe import states
-from bywire.contracts.trial import Trial
+from bywire.contracts.trial import Trial, states
 from bywire.core.signals import signals_of
-from bywire.simulation.contact_set import contact_forces
+from bywire.simulation.contacts import contact_forces
 from bywire.simulation.run import simulate
 from bywire.simulation.symbols import SX
 

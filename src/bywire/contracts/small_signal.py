@@ -25,8 +25,7 @@ from bywire.analysis.linear.linearize import Friction, free_signals, linearize, 
 from bywire.analysis.linear.smooth_functions import SmoothPoint
 from bywire.analysis.loop import LOOPS
 from bywire.contracts.evidence import Evidence, NotCheckedError, measured
-from bywire.contracts.probe import states
-from bywire.contracts.trial import Trial
+from bywire.contracts.trial import Trial, states
 from bywire.core.errors import InputError, SolverError
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array

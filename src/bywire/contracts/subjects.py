@@ -8,9 +8,8 @@ from typing import Any
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.contracts import element_contracts, experiment_contracts, model_contracts
 from bywire.contracts.elements import Element, elements_of, every_element
-from bywire.contracts.finding import Demand
-from bywire.contracts.start import start_of, start_of_a_rig
-from bywire.contracts.trial import Trial
+from bywire.contracts.evidence import Demand
+from bywire.contracts.trial import Trial, start_of, start_of_a_rig
 from bywire.core.brake import Brake, brakes
 from bywire.core.catalog import PARAMETER_SETS, CitedSet
 from bywire.core.errors import unknown_name

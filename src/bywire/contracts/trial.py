@@ -1,25 +1,338 @@
-"""One model with one parameter set on trial, and the runs that its contracts share."""
+"""One model with one parameter set on trial: where its runs start, and what they share."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
-from functools import cached_property
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from typing import Annotated, Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from bywire.analysis.loop import LOOPS
+from bywire.bench.experiment import EXPERIMENTS
 from bywire.contracts.evidence import NotCheckedError, Place, place_of
-from bywire.contracts.probe import Drive, Probe, drive_of
-from bywire.contracts.start import Start
-from bywire.core.errors import BywireError, ParameterError, RunError
-from bywire.core.model import Model
+from bywire.core.errors import BywireError, InputError, ParameterError, RunError
+from bywire.core.model import Bounds, Model, Task
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import Signal, signals_of, zeros
 from bywire.core.typing import Array
+from bywire.core.wrapping import Wrapping
 from bywire.simulation.engine import prepare
 from bywire.simulation.ensemble import simulate_ensemble
-from bywire.simulation.run import Run
+from bywire.simulation.run import Run, Trajectory, simulate
+
+STEP = 20e-6
+"""substep [s] of the runs, or the next smaller one that divides the sample times"""
+ACTIVE = 0.2
+"""time [s] of the one wave that excites a run; then the stimulus is what it was before"""
+DURATION = 0.3
+
+
+@dataclass(frozen=True)
+class Start:
+    """A model ready to run.
+
+    Parameters
+    ----------
+    model, par
+        The system and its parameters.
+    state, memory, stimulus
+        Where it starts, at rest if anybody says where that is.
+    known
+        Who says so, for instance ``"loop pressure"``.
+    """
+
+    model: Model
+    par: ParameterSet
+    state: NamedTuple
+    memory: NamedTuple
+    stimulus: NamedTuple
+    known: str
+
+    @property
+    def period(self) -> float:
+        """Sample time of the fastest task [s]."""
+        return min(task.period for task in self.model.tasks(self.par))
+
+    @property
+    def step(self) -> float:
+        """Substep [s]: at most `STEP`, and a whole number of them in every sample time."""
+        periods = [task.period for task in self.model.tasks(self.par)]
+        for count in range(int(np.ceil(self.period / STEP - 1e-9)), 100_000):
+            step = self.period / count
+            if all(abs(p / step - round(p / step)) < 1e-9 * p / step for p in periods):
+                return step
+        return self.period
+
+    def run(self, share: float, duration: float = DURATION, record: float = 0.0) -> Run:
+        """Return a run in which every signal of the stimulus swings once, within its range.
+
+        Parameters
+        ----------
+        share
+            Amplitude, of the signal's usual magnitude.
+        record
+            Recording interval [s]; the fastest sample time by default.
+        """
+        base = np.array([float(value) for value in self.stimulus])
+        signals = signals_of(type(self.stimulus))
+        reach = np.array([0.0 if n.startswith("noise_") else s.nominal for n, s in signals.items()])
+
+        low = np.array([s.low for s in signals.values()])
+        high = np.array([s.high for s in signals.values()])
+
+        def stimulus(t: Array) -> Array:
+            wave = np.where(t < ACTIVE, np.sin(2.0 * np.pi / ACTIVE * t), 0.0)
+            return np.asarray(np.clip(base + share * wave[:, None] * reach, low, high))
+
+        return Run(
+            self.model,
+            self.par,
+            self.state,
+            self.memory,
+            stimulus,
+            duration,
+            self.step,
+            record or self.period,
+        )
+
+
+def start_of(model: Model, par: ParameterSet) -> Start:
+    """Return where the runs of a model with some parameters start.
+
+    The operating point of one of its loops, or the start of one of its experiments, of the same
+    choices where there is one; else its rest. A rest is often on a stop, where contacts just touch
+    and little can be put to the test.
+    """
+    known = list(_points(model, par)) or list(_cases(model, par))
+    same = [each for each in known if each.par.choices() == par.choices()]
+    if known:
+        return (same or known)[0]
+    state, memory = model.rest(par)
+    return Start(model, par, state, memory, zeros(model.Stimulus), "the model's rest")
+
+
+def start_of_a_rig(model: Model, sets: Iterable[ParameterSet], module: str) -> Start:
+    """Return where an experiment starts a model that has no parameter set of its own.
+
+    Parameters
+    ----------
+    sets
+        Parameters to try: those of the model's brake.
+    module
+        Module of that brake.
+
+    Raises
+    ------
+    ParameterError
+        When none does.
+    """
+    for par in sets:
+        for start in _cases(model, par, module):
+            return start
+    raise ParameterError(
+        f"there is no parameter set for a {model.name}, and no experiment starts one with those of "
+        "its brake: declare a bywire.CitedSet of that assembly"
+    )
+
+
+def _points(model: Model, par: ParameterSet) -> Iterator[Start]:
+    for loop in LOOPS.all().values():
+        if loop.assembly == model.name:
+            try:
+                point = loop.point(par, loop.at.default)
+            except InputError:  # a loop of other choices
+                continue
+            if type(point.model) is type(model):
+                yield Start(
+                    point.model,
+                    point.par,
+                    point.state,
+                    point.memory,
+                    point.stimulus,
+                    f"the operating point of the loop {loop.name}",
+                )
+
+
+def _cases(model: Model, par: ParameterSet, module: str = "") -> Iterator[Start]:
+    """Yield the starts of the experiments of a model, or of all experiments of a brake."""
+    for experiment in (EXPERIMENTS.of(module) if module else EXPERIMENTS.all()).values():
+        if not module and experiment.assembly != model.name:
+            continue
+        try:
+            cases = (experiment.preview or experiment.cases)(par, experiment.defaults, None)
+        except (InputError, AttributeError, TypeError):  # it wants other parameters, or a stimulus
+            continue
+        for case in cases:
+            if type(case.model) is type(model):
+                at = {n: float(v[0]) for n, v in case.stimulus(np.zeros(1)).items()}
+                yield Start(
+                    case.model,
+                    case.par,
+                    case.state,
+                    case.memory,
+                    zeros(case.model.Stimulus)._replace(**at),
+                    f"the start of the experiment {experiment.name}",
+                )
+                break
+
+
+# --- Models around a model: all that it is, recorded; its plant alone, under prescribed memory
+
+
+class Clock(NamedTuple):
+    """An integral that every model has."""
+
+    t: Annotated[float, Signal("s", "time")]
+
+
+@cache
+def _recorded(model: type[Model], state: type[NamedTuple], memory: type[NamedTuple]) -> Any:
+    """Return the signal tuple of all states, then of all of the memory."""
+    fields = {f"x_{name}": signal for name, signal in signals_of(state).items()}
+    fields |= {f"m_{name}": signal for name, signal in signals_of(memory).items()}
+    annotated: list[Any] = [(name, Annotated[float, signal]) for name, signal in fields.items()]
+    return NamedTuple("Recorded", annotated)
+
+
+class Probe(Wrapping):
+    """A model whose states and memory are recorded, and no energies.
+
+    Parameters
+    ----------
+    model
+        The model.
+    held
+        Whether the stimulus is the memory itself: then the plant runs without its controllers.
+    frictions
+        Whether there is dry friction.
+    """
+
+    def __init__(self, model: Model, held: bool, frictions: bool = True) -> None:
+        super().__init__(model)
+        self.held, self.rubs = held, frictions
+
+    @property
+    def Stimulus(self) -> type[NamedTuple]:
+        """Stimulus of the model, or its memory."""
+        return self.inner.Memory if self.held else self.inner.Stimulus
+
+    @property
+    def Flow(self) -> type[NamedTuple]:
+        """Nothing but time."""
+        return Clock
+
+    @property
+    def Output(self) -> type[NamedTuple]:
+        """All states and all of the memory."""
+        output: type[NamedTuple] = _recorded(type(self.inner), self.State, self.Memory)
+        return output
+
+    @property
+    def frictions(self) -> tuple[str, ...]:
+        """Frictions of the model, or none."""
+        return self.inner.frictions if self.rubs else ()
+
+    def tasks(self, par: Any) -> tuple[Task, ...]:
+        """Return the controllers, or the task that hands on what is prescribed."""
+        tasks = self.inner.tasks(par)
+        if not self.held:
+            return tasks
+        return (Task("prescribed", min(task.period for task in tasks), self._prescribed),)
+
+    def _prescribed(self, x: Any, m: Any, u: Any, par: Any) -> Any:
+        return u
+
+    def bounds(
+        self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]
+    ) -> tuple[Bounds, ...]:
+        """Return the bounds of the frictions, if there are any."""
+        return super().bounds(x, xe, memory, par, contact) if self.rubs else ()
+
+    def powers(self, *_: Any) -> Any:
+        """Return the rate of time."""
+        return Clock(1.0)
+
+    def output(self, x: Any, memory: Any, *_: Any) -> Any:
+        """Return all states and all of the memory."""
+        return self.Output(*x, *memory)
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """Memory over time, as the controllers of a run wrote it, to prescribe in other runs.
+
+    Parameters
+    ----------
+    start
+        Where that run started.
+    rows
+        By how much it differs from that of the start, at every sample time; shape (samples,
+        memories).
+    """
+
+    start: Start
+    rows: Array
+
+    def run(self, share: float = 1.0, step: float = 0.0, frictions: bool = True) -> Run:
+        """Return a run of the plant alone.
+
+        Parameters
+        ----------
+        share
+            How much of the memory's changes is prescribed.
+        step
+            Substep [s]; that of the start by default.
+        frictions
+            Whether there is dry friction.
+        """
+        memory = np.array([float(value) for value in self.start.memory])
+        rows = memory + share * self.rows
+        period, at = self.start.period, self.start
+
+        def prescribed(t: Array) -> Array:
+            row = np.rint(t / period).astype(int)
+            return np.asarray(rows[np.minimum(row, len(rows) - 1)])
+
+        return Run(
+            Probe(at.model, held=True, frictions=frictions),
+            at.par,
+            at.state,
+            at.memory,
+            prescribed,
+            (len(rows) - 1) * period,
+            step or at.step,
+            period,
+        )
+
+
+def drive_of(start: Start, share: float) -> Drive:
+    """Return what the controllers do in a run from a start, see `Start.run`."""
+    run = start.run(share)
+    probe = Run(
+        Probe(start.model, held=False),
+        run.par,
+        run.state,
+        run.memory,
+        run.stimulus,
+        run.duration,
+        run.step,
+        run.record,
+    )
+    trajectory = simulate(probe)
+    memory = trajectory.values[:, len(start.state) :]
+    return Drive(start, np.asarray(memory - memory[0]))
+
+
+def states(trajectory: Trajectory, names: Sequence[str]) -> Array:
+    """Return the recorded states of a probe, shape (rows, states)."""
+    return np.asarray(trajectory.values[:, : len(names)])
+
+
+# --- The trial
 
 LARGE = 0.5
 """amplitude of the stimulus in large runs, of the signals' usual magnitudes"""

@@ -9,6 +9,7 @@ import reprlib
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache, wraps
+from importlib import import_module
 from numbers import Real
 from types import UnionType
 from typing import Any, TypeVar, get_args
@@ -165,8 +166,10 @@ def _kind(part: str, known: Mapping[str, Any]) -> _Wanted | None:
     if name in _KINDS:
         return _KINDS[name]
     meant = known.get(name)
+    if meant is None:  # of a module that loads what it computes with when it is called
+        meant = getattr(sys.modules.get("bywire"), name, None)
     if meant is None and name.startswith("xr."):
-        meant = getattr(known.get("xr"), name[3:], None)
+        meant = getattr(import_module("xarray"), name[3:], None)
     kinds = get_args(meant) if isinstance(meant, UnionType) else (meant,)
     if meant is Any or not all(isinstance(k, type) for k in kinds):
         return None

@@ -1,9 +1,10 @@
 """Models by parts and wires: what follows from the elements is not written a second time.
 
-An assembly names its elements and writes down, once and in the order of the physics, what each of
-them feels. States, masses, balances, contacts, stored energies, plain losses and recorded signals
-follow from the elements. Causal on purpose: acausal connections would need index reduction and
-would fight the diagonal mass form of ``core.model``, which stays below this for those who want it.
+An assembly names its elements and writes down, once and in the order of the physics, what each
+of them feels. States, masses, balances, contacts, stored energies, plain losses and recorded
+signals follow from the elements. Causal on purpose: acausal connections would need index
+reduction and would fight the diagonal mass form of ``core.model``, which stays below this for
+those who want it.
 """
 
 from __future__ import annotations
@@ -17,12 +18,48 @@ from bywire.core.errors import ModelError, unknown_name
 from bywire.core.gathering import AnyPart, contacts, gather, stores
 from bywire.core.instants import Evaluated
 from bywire.core.model import Bounds, Matrix, Task
-from bywire.core.returned import filled, known
 from bywire.core.signals import zeros
 from bywire.core.subassembly import Sub
 from bywire.core.watching import Watching
-from bywire.core.wired import Instant, Wired, instant_of
-from bywire.core.wires import Port
+from bywire.core.wires import Instant, Port, Wired, instant_of
+
+
+def known(
+    model: Any, method: str, values: Mapping[str, Any], names: tuple[str, ...]
+) -> dict[str, Any]:
+    """Return what a method gives.
+
+    Raises
+    ------
+    ModelError
+        When it gives what is none of the names.
+    """
+    for name in values:
+        if name not in names:
+            raise ModelError(
+                f"{type(model).__name__}.{method}: {unknown_name('signal', name, names)}"
+            )
+    return dict(values)
+
+
+def filled(model: Any, method: str, kind: Any, values: Mapping[str, Any]) -> Any:
+    """Return a signal tuple of what a method and the parts give.
+
+    Raises
+    ------
+    ModelError
+        When a field is given by neither.
+    """
+    for name in kind._fields:
+        if name not in values:
+            raise ModelError(
+                f"{type(model).__name__}.{method} does not return {name!r}, and no part gives it: "
+                f"add it to what {method} returns"
+            )
+    return kind(**{name: values[name] for name in kind._fields})
+
+
+# --- Assemblies
 
 ParT = TypeVar("ParT")
 MemoryT = TypeVar("MemoryT")

@@ -1,40 +1,17 @@
-"""Messages in the words of who called: flags on the command line, arguments in Python.
+"""Messages in the words of their reader: flags of a command, or arguments of a Python function.
 
-Messages are written once, with the flags of the command. Where a program called, what it reads
-names the argument that stands for the flag.
+A message names an argument by `option`. Which flag stands for it, the declaration of the use case
+says; see `bywire.usecases`.
 """
 
 from __future__ import annotations
 
-import re
+import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-_ARGUMENTS = {
-    "set": "overrides",
-    "input": "inputs",
-    "output": "outputs",
-    "unknown": "unknowns",
-    "prior": "priors",
-    "estimate-start": "states",
-    "option": "options",
-    "map": "mapping",
-    "tolerance": "tolerances",
-    "out": "folder",
-    "force": "force=True",
-    "dither": "dither=True",
-    "schedule": "schedule=True",
-    "study": "bywire.trust, with count",
-}
-"""flags whose arguments are called otherwise"""
-_WORDS = re.compile(
-    r"(?P<command>\bbywire [a-z-]+(?: [^\s',;:)]+)*)"  # a command that is quoted stays one
-    r"|(?P<system>--system PATH, or )"
-    r"|(?<![\w-])--(?P<pair>set|input|option|prior) (?P<key>[\w.*]+)=(?P<value>[^\s,;)]+)"
-    r"|(?<![\w-])--(?P<text>side) (?P<side>[^\s,;]+)"
-    r"|(?<![\w-])--(?P<flag>[a-z]+(?:-[a-z]+)*)"
-)
 _commands: list[None] = []
+_flags: dict[str, str] = {}
 
 
 @contextmanager
@@ -52,24 +29,41 @@ def is_command_line() -> bool:
     return bool(_commands)
 
 
-def in_callers_words(text: str) -> str:
-    """Return a message with the arguments of Python's functions in place of flags, in a program.
+def name_flag(argument: str, flag: str) -> None:
+    """Declare which flag stands for an argument: the same one in every command.
+
+    Raises
+    ------
+    ValueError
+        When the argument has another flag in another command.
+    """
+    if _flags.setdefault(argument, flag) != flag:
+        raise ValueError(f"argument {argument!r} is {_flags[argument]} already, and not {flag}")
+
+
+def option(argument: str, value: str | bool | dict[str, str] | None = None) -> str:
+    """Return how the reader of a message writes an argument, with a value where one is given.
+
+    Parameters
+    ----------
+    argument
+        Name in the function's signature.
+    value
+        A word, ``True``, or a name with its value.
 
     Examples
     --------
-    >>> in_callers_words("say for which, with --set parameters=NAME, or leave out --over")
-    'say for which, with overrides={"parameters": "NAME"}, or leave out over'
+    >>> name_flag("overrides", "--set")
+    >>> option("overrides"), option("overrides", {"parameters": "NAME"}), option("force", True)
+    ('overrides', 'overrides={"parameters": "NAME"}', 'force=True')
+    >>> with command_line():
+    ...     option("overrides", {"parameters": "NAME"}), option("force", True)
+    ('--set parameters=NAME', '--force')
     """
-    return text if _commands or "--" not in text else _WORDS.sub(_argument, text)
-
-
-def _argument(match: re.Match[str]) -> str:
-    if match["command"]:
-        return match["command"]
-    if match["system"]:
-        return ""
-    if match["pair"]:
-        return f'{_ARGUMENTS[match["pair"]]}={{"{match["key"]}": "{match["value"]}"}}'
-    if match["text"]:
-        return f'{match["text"]}="{match["side"]}"'
-    return _ARGUMENTS.get(match["flag"], match["flag"].replace("-", "_"))
+    if is_command_line():
+        flag = _flags.get(argument, f"--{argument.replace('_', '-')}")
+        words = [f"{key}={each}" for key, each in value.items()] if isinstance(value, dict) else []
+        return " ".join([flag, *words, *([value] if isinstance(value, str) else [])])
+    if value is None:
+        return argument
+    return f"{argument}={value if value is True else json.dumps(value)}"

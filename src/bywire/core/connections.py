@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple
 from bywire.core.assembly import Assembly
 from bywire.core.gathering import contact_count
 from bywire.core.traced import Traced, names_in
-from bywire.core.wired import instant_of
+from bywire.core.wires import instant_of
 
 Kind = Literal["part", "wire", "task", "stimulus"]
 FRICTION = "friction"

@@ -25,7 +25,6 @@ from datetime import date, time
 from difflib import SequenceMatcher, get_close_matches
 from typing import Any
 
-from bywire.core.callers import in_callers_words
 from bywire.core.clean_text import shortened
 
 _SHOWN = 60  # characters of a value in a message
@@ -34,12 +33,12 @@ _BARE_KEY = re.compile(r"[\w-]+", re.ASCII)
 
 
 class BywireError(Exception):
-    """Base of all errors raised on purpose; its text is meant for the user, see `callers`."""
+    """Base of all errors raised on purpose; its text is meant for the user."""
 
     exit_status = 3
 
     def __str__(self) -> str:
-        return in_callers_words(shortened(super().__str__()))
+        return shortened(super().__str__())
 
 
 class InputError(BywireError):

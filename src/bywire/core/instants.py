@@ -11,8 +11,7 @@ from bywire.core.errors import ModelError, unknown_name
 from bywire.core.gathering import contact_count, contacts
 from bywire.core.parts import Part
 from bywire.core.subassembly import Sub
-from bywire.core.wired import Instant, instant_of, line
-from bywire.core.wires import Integral, Shown, Wire
+from bywire.core.wires import Instant, Integral, Shown, Wire, instant_of, line
 
 ParT = TypeVar("ParT")
 MemoryT = TypeVar("MemoryT")

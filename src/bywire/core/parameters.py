@@ -3,17 +3,23 @@
 A *leaf* is a number with a unit; its dotted name (``motor.R_m``) is the same in Python, in
 bench files, in recordings and on the command line. A *choice* is a field that selects
 equations (``gear.law = "directional"``); it takes part in what is compiled, never in a value.
+
+Studies and searches make thousands of sets a second that differ from one in the same few names.
 """
 
 from __future__ import annotations
 
+import inspect
 import math
+import re
 import typing
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from difflib import get_close_matches
 from functools import cache, cached_property, lru_cache
 from itertools import chain
+from operator import attrgetter
 from types import MappingProxyType
-from typing import Any, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt, MultipleOf
@@ -21,12 +27,195 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
-from bywire.core.errors import ModelError, ParameterError, place_of, unknown_name
+from bywire.core.errors import ModelError, ParameterError, place_of, quoted, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
-from bywire.core.refusals import refusals
-from bywire.core.replacement import KNOWN, Places, fields_of, read
-from bywire.core.units import Written
+from bywire.core.units import Written, split
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
+S = TypeVar("S", bound=BaseModel)
+
+KNOWN = "_known"
+"""where a set keeps by name what it holds, beside its fields"""
+
+
+def fields_of(node: BaseModel) -> dict[str, Any]:
+    """Return the fields of a set by name, in order, without what it has worked out beside them."""
+    kept, names = node.__dict__.copy(), _field_names(type(node))
+    kept.pop(KNOWN, None)
+    return kept if len(kept) == len(names) else {name: kept[name] for name in names}
+
+
+@cache
+def _field_names(cls: type[BaseModel]) -> tuple[str, ...]:
+    return tuple(cls.model_fields)
+
+
+def read(node: BaseModel, names: tuple[str, ...]) -> dict[str, Any]:
+    """Return what stands at dotted names."""
+    return dict(zip(names, _reader(names)(node), strict=True))
+
+
+@lru_cache(maxsize=256)
+def _reader(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
+    each = attrgetter(*names)
+    return each if len(names) > 1 else lambda node: (each(node),)
+
+
+class Places(NamedTuple):
+    """Where values of dotted names go: fields of a set itself, and places in its groups."""
+
+    fields: tuple[tuple[str, str], ...]
+    """field and dotted name"""
+    groups: tuple[tuple[str, Places], ...]
+    """field, and what goes into the group there"""
+
+    @classmethod
+    def of(cls, names: Sequence[str], prefix: str = "") -> Places:
+        """Return where values of names go that begin with the prefix of a group."""
+        own: list[tuple[str, str]] = []
+        groups: dict[str, list[str]] = {}
+        for name in names:
+            field, dot, _ = name.removeprefix(prefix).partition(".")
+            if dot:
+                groups.setdefault(field, []).append(name)
+            else:
+                own.append((field, name))
+        inner = ((group, cls.of(each, f"{prefix}{group}.")) for group, each in groups.items())
+        return cls(tuple(own), tuple(inner))
+
+    def filled(self, node: S, values: Mapping[str, Any]) -> S:
+        """Return a set with other values; of a set whose groups alone change, its rules are asked.
+
+        Raises
+        ------
+        ValueError
+            When a value or a rule does not fit; pydantic's `ValidationError` is one.
+        AssertionError
+            When a rule of an author says so.
+        """
+        fields = fields_of(node)
+        for name, inner in self.groups:
+            fields[name] = inner.filled(fields[name], values)
+        for name, dotted in self.fields:
+            fields[name] = values[dotted]
+        rules = None if self.fields else _rules(type(node))
+        if rules is None:
+            return type(node).model_validate(fields)
+        made = type(node).__new__(type(node))
+        made.__setstate__({**node.__getstate__(), "__dict__": fields})  # as a copy is made
+        for rule in rules:
+            made = getattr(made, rule)()
+        return made
+
+
+@cache
+def _rules(cls: type[BaseModel]) -> tuple[str, ...] | None:
+    """Return the methods by which a class judges a set of valid groups; None where it does more."""
+    known, groups = cls.__pydantic_decorators__, cls.model_fields.values()
+    judges = known.model_validators
+    does_more = (
+        known.validators
+        or known.field_validators
+        or known.root_validators
+        or cls.__pydantic_custom_init__
+        or cls.__pydantic_post_init__
+        or cls.__private_attributes__
+        or any(each.info.mode != "after" for each in judges.values())
+        or any(len(inspect.signature(getattr(cls, name)).parameters) != 1 for name in judges)
+        or any(each.metadata for each in groups if _is_group(each.annotation))
+    )
+    return None if does_more else tuple(judges)
+
+
+def _is_group(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+# --- What is said of values that are refused: one line each, in the user's words
+
+_BOOL, _TEXT = "it must be true or false", "it must be a text"
+_PLAIN_WORDS = {"bool_parsing": _BOOL, "bool_type": _BOOL, "string_type": _TEXT}
+
+
+def refusals(
+    error: ValidationError, owner: str, leaves: Mapping[str, Leaf], texts: Mapping[str, str]
+) -> list[str]:
+    """Return a line for every value that was refused.
+
+    Parameters
+    ----------
+    error
+        What pydantic found.
+    owner
+        Name of the class of the parameter set.
+    leaves
+        Its numbers by dotted name.
+    texts
+        How numbers were written, by dotted name, where they came as texts.
+    """
+    details: list[dict[str, Any]] = [dict(detail) for detail in error.errors()]
+    places = {detail["loc"][:-1] for detail in details}
+    # A table with a wrong node also counts as too short: the node alone is worth a line.
+    details = [d for d in details if not (_is_length(d) and d["loc"] in places)]
+    return [_explain(detail, owner, leaves, texts) for detail in details]
+
+
+def _explain(
+    detail: Mapping[str, Any], owner: str, leaves: Mapping[str, Leaf], texts: Mapping[str, str]
+) -> str:
+    name = ".".join(str(part) for part in detail["loc"])
+    value, kind = detail["input"], detail["type"]
+    if kind == "missing":
+        return f"{owner}: {name} is missing: give it a value"
+    if kind == "literal_error":
+        return _unknown_choice(name, value, detail["ctx"]["expected"])
+    leaf = leaves.get(name) or leaves.get(name.rpartition(".")[0])
+    if leaf is not None and kind != "value_error" and not _is_length(detail):
+        is_broken = leaf.is_whole and (kind.startswith("int") or kind == "multiple_of")
+        wanted = "a whole number, " if is_broken else ""
+        return _out_of_range(name, value, leaf, wanted, texts.get(name, ""))
+    if _is_length(detail):
+        return _wrong_count(name, detail, texts)
+    message = _PLAIN_WORDS.get(kind, str(detail["msg"]).removeprefix("Value error, "))
+    given = "" if isinstance(value, dict) else f", got {quoted(value)}"
+    return f"{name or owner}: {message}{given}"
+
+
+def _out_of_range(name: str, value: Any, leaf: Leaf, wanted: str, text: str) -> str:
+    symbol = leaf.unit.symbol
+    number, written = split(text)
+    if symbol == "rad" and written not in ("", symbol):  # drawings have angles in degrees
+        refused = f"{name} = {number} {written} is not admissible"
+        return f"{refused}: it must be {wanted}{leaf.range_in(written)}"
+    unit = "" if symbol == "1" else f" {symbol}"
+    got = "" if written in ("", symbol) else f", got {quoted(text)}"
+    return f"{name} = {value}{unit} is not admissible: it must be {wanted}{leaf.range_text}{got}"
+
+
+def _wrong_count(name: str, detail: Mapping[str, Any], texts: Mapping[str, str]) -> str:
+    """Return what is said of a table with too few or too many nodes."""
+    context, value = detail["ctx"], detail["input"]
+    short = detail["type"] == "too_short"
+    wanted = f"at least {context['min_length']}" if short else f"at most {context['max_length']}"
+    written = [texts.get(f"{name}.{k}", "") for k in range(len(value))]
+    got = quoted(", ".join(written)) if written and all(written) else quoted(value)
+    return f"{name}: {wanted} wanted, got {got}"
+
+
+def _is_length(detail: Mapping[str, Any]) -> bool:
+    return detail["type"] in ("too_short", "too_long")
+
+
+def _unknown_choice(name: str, value: Any, expected: str) -> str:
+    near = get_close_matches(quoted(value), re.findall(r"'[^']*'", expected), n=1, cutoff=0.6)
+    hint = f": did you mean {near[0]}?" if near else ""
+    return f"{name}: it must be {expected}, got {quoted(value)}{hint}"
+
+
+# --- Parameter sets
 
 T = TypeVar("T", bound="ParameterSet")
 

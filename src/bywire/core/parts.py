@@ -10,8 +10,7 @@ from typing import Any, Generic, Protocol, Self, TypedDict, TypeVar, Unpack, ove
 
 from bywire.core.errors import ModelError, unknown_name
 from bywire.core.signals import Signal, signal_in, signals_of
-from bywire.core.wired import F, Instant, P, U, Wired, X, instant_of
-from bywire.core.wires import Integral, Port, Shown, Wire
+from bywire.core.wires import F, Instant, Integral, P, Port, Shown, U, Wire, Wired, X, instant_of
 
 __all__ = ["OPTIONS", "Integral", "Part", "PartOptions", "Port", "Shown", "Wire"]
 

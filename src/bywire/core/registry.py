@@ -1,15 +1,17 @@
 """The registry: everything that has a name, of whatever kind, and where it is found.
 
-The room that knows a kind of thing declares the `Kind`; a file declares a thing. The general ones
-stand in a package of that room, those of a brake in the module or folder of its package that the
-kind names (``experiments``, ``loops``, ...), or in the brake's single file. So a new file is all
-that a new thing takes.
+The room that knows a kind of thing declares the `Kind`; a file declares a thing. The general
+ones stand in a package of that room, those of a brake in the module or folder of its package
+that the kind names (``experiments``, ``loops``, ...), or in the brake's single file. So a new
+file is all that a new thing takes.
 """
 
 from __future__ import annotations
 
+import ast
 import importlib
 import importlib.util
+import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -27,8 +29,56 @@ from bywire.core.brake import (
     modules_below,
     modules_of,
 )
-from bywire.core.declared import declared_at, declared_line
+from bywire.core.callers import is_command_line
 from bywire.core.errors import ModelError, UnknownNameError, unknown_name
+
+
+def declared_at(module: ModuleType, thing: object) -> str:
+    """Return file and line of what a module declares; the file alone where nobody knows the line.
+
+    Parameters
+    ----------
+    module
+        Module that holds it, by a name of its own or in a tuple; what it imports has no line there.
+    thing
+        Object, or class.
+    """
+    line = declared_line(module, thing)
+    file = module.__file__ or module.__name__
+    return f"{file}, line {line}" if line else file
+
+
+def declared_line(module: ModuleType, thing: object) -> int:
+    """Return the line on which a module declares a thing; 0 where nobody knows."""
+    try:
+        tree = ast.parse(inspect.getsource(module))
+    except (OSError, TypeError, SyntaxError):  # typed into a console, or changed since
+        return 0
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef) and vars(module).get(node.name) is thing:
+            return node.lineno
+        if isinstance(node, (ast.Assign, ast.AnnAssign)):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            held = [vars(module).get(each.id) for each in targets if isinstance(each, ast.Name)]
+            line = next((_line(node, value, thing) for value in held if value is not None), 0)
+            if line:
+                return line
+    return 0
+
+
+def _line(node: ast.Assign | ast.AnnAssign, held: object, thing: object) -> int:
+    """Return the line of a thing in an assignment whose name holds it; 0 where it does not."""
+    if held is thing:
+        return node.lineno
+    if type(held) is not tuple or not any(each is thing for each in held):
+        return 0
+    written = node.value
+    if isinstance(written, ast.Tuple) and len(written.elts) == len(held):
+        return written.elts[[each is thing for each in held].index(True)].lineno
+    return node.lineno
+
+
+# --- The registry
 
 
 class Named(Protocol):
@@ -120,7 +170,8 @@ class Kind(Generic[T]):
             if self.declared and not any(kind.of(brake.module) for kind in kinds)
         ]
         if self.declared and not files and "did you mean" not in str(error):
-            hints.append("that of a brake of your own takes --system PATH, or bywire.load_system")
+            loading = "--system PATH, or " * is_command_line() + "bywire.load_system"
+            hints.append(f"that of a brake of your own takes {loading}")
         return UnknownNameError("; ".join([str(error), *hints]).replace("?; ", "? "))
 
     def guess(self, name: str) -> T | None:

@@ -1,12 +1,13 @@
 """An assembly within another one: its names get a prefix, its equations never see it.
 
-What an assembly holds is evaluated where the holder is, by slices of the holder's state, memory and
-forces; its parameters stand in a group of the holder's. So the same assembly can be held twice.
+What an assembly holds is evaluated where the holder is, by slices of the holder's state, memory
+and forces; its parameters stand in a group of the holder's. So the same assembly can be held
+twice.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any, Generic, Self, TypeVar, overload
@@ -14,9 +15,49 @@ from typing import Any, Generic, Self, TypeVar, overload
 from bywire.core.errors import ModelError, unknown_name
 from bywire.core.model import Task
 from bywire.core.parts import parameters_at
-from bywire.core.seen import Seen
 from bywire.core.signals import Role, Signal, signals_of
-from bywire.core.wired import Instant, instant_of
+from bywire.core.wires import Instant, instant_of
+
+
+class Seen:
+    """What an assembly recorded within another one, by its own names.
+
+    Parameters
+    ----------
+    recording
+        The holder's: an xarray.Dataset, or what stands for one.
+    names
+        Names in there by own names.
+    place
+        What stands before its parts where those that are silent are named.
+    """
+
+    def __init__(self, recording: Any, names: Mapping[str, str], place: str) -> None:
+        self._recording = recording
+        self._names = {own: there for own, there in names.items() if there in recording}
+        every: Iterable[str] = getattr(recording, "silent", ())
+        self.silent = frozenset(
+            name.removeprefix(place) for name in every if name.startswith(place)
+        )
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __getitem__(self, name: str) -> Any:
+        return self._recording[self._names.get(name, name)]
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what a Dataset has: it is made when it is asked for."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        there = self._recording[list(self._names.values())]
+        return getattr(there.rename({there: own for own, there in self._names.items()}), name)
+
+
+# --- Subassemblies
 
 A = TypeVar("A")
 KINDS = ("State", "Memory", "Flow", "Output", "Stimulus")

@@ -14,7 +14,7 @@ import numpy as np
 from bywire.core.model import Model
 from bywire.core.parameters import leaf_table
 from bywire.core.traced import Traced, computed, names_in
-from bywire.core.wired import Instant, Wired
+from bywire.core.wires import Instant, Wired
 
 _NAN = float("nan")
 _PARAMETER = "."  # before the name of one, among names of signals

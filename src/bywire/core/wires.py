@@ -1,12 +1,232 @@
-"""Signals that the class of an assembly declares: wires, integrals, and what is only recorded."""
+"""Wires: signals that an assembly declares, and what its equations see at an instant."""
 
 from __future__ import annotations
 
-from typing import Any, Self, overload
+import inspect
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any, Generic, Self, TypeVar, overload
 
-from bywire.core.errors import ModelError
+from bywire.core.errors import ModelError, unknown_name
 from bywire.core.signals import Role, Signal
-from bywire.core.wired import Instant, instant_of, line
+
+X = TypeVar("X")
+U = TypeVar("U")
+F = TypeVar("F")
+P = TypeVar("P")
+
+
+class Wired(Generic[X, U, F, P]):
+    """A part at an instant: its state, input, contact forces and parameters.
+
+    Parameters
+    ----------
+    part
+        What is declared.
+    instant
+        Where the model is evaluated.
+    """
+
+    def __init__(self, part: Any, instant: Instant) -> None:
+        self._part, self._instant = part, instant
+        self._input: Any = None
+        self._varied: Any = None
+
+    @property
+    def x(self) -> X:
+        """State."""
+        return self._part.state_at(self._instant, ())  # type: ignore[no-any-return]
+
+    @property
+    def xe(self) -> X:
+        """State, value-only."""
+        return self._part.state_at(self._instant, None)  # type: ignore[no-any-return]
+
+    @property
+    def par(self) -> P:
+        """Parameters."""
+        if self._varied is not None:
+            return self._varied  # type: ignore[no-any-return]
+        return self._part.parameters(self._instant.par)  # type: ignore[no-any-return]
+
+    def vary(self, **values: Any) -> None:
+        """Let some of its parameters follow the state: what they are at this instant, by name.
+
+        In ``wire``, above what reads them. They may follow what is taken value-only (``xe``); what
+        ``mass`` and ``matrix`` read stays what it is.
+
+        Raises
+        ------
+        ModelError
+            When the element has no such parameter.
+        """
+        given: Any = self.par
+        for name in values:
+            if name not in type(given).model_fields:
+                where = f"{self._part.where}: {line()} varies an"
+                raise ModelError(f"{where} {unknown_name('parameter', name, dict(given))}")
+        # Between valid values; symbols could not be validated.
+        self._varied = type(given).model_construct(**{**dict(given), **values})
+
+    @property
+    def f(self) -> F:
+        """Contact forces."""
+        return self._part.forces_at(self._instant, self.par)  # type: ignore[no-any-return]
+
+    @property
+    def u(self) -> U:
+        """Input, as it was wired."""
+        if self._input is None:
+            self._instant.settle()
+        if self._input is None:
+            raise ModelError(
+                f"{self._part.where}: its input is read before it is wired: assign "
+                f"w.{self._part.name}.u = {self._part.kind}.Input(...) in wire, above that"
+            )
+        return self._input  # type: ignore[no-any-return]
+
+    @u.setter
+    def u(self, value: U) -> None:
+        wanted = getattr(self._part.element, "Input", None)
+        if wanted is None or not isinstance(value, wanted):
+            takes = "no input" if wanted is None else f"a {self._part.kind}.Input"
+            raise ModelError(
+                f"{self._part.where}: {line()} assigns a {type(value).__module__}."
+                f"{type(value).__name__} as its input, but it takes {takes}"
+            )
+        if self._input is not None:
+            raise ModelError(
+                f"{self._part.where}: {line()} assigns its input a second time: wire it once"
+            )
+        self._input = self._instant.marked(f"{self._part.name}.u", value)
+        self._instant.note(f"{self._part.name}.u")
+
+    def call(self, function: Callable[..., Any], **more: Any) -> Any:
+        """Return what a function of the element gives, its arguments taken by their names."""
+        return function(
+            *(
+                more[name] if name in more else self._argument(name, function)
+                for name in arguments(function)
+            )
+        )
+
+    def felt(self, function: Callable[..., Any]) -> dict[str, Any]:
+        """Return those arguments of a function of the element that are no parameters, by name."""
+        wanted = [name for name in arguments(function) if name in ("x", "xe", "u", "f")]
+        return {name: self._argument(name, function) for name in wanted}
+
+    def _argument(self, name: str, function: Callable[..., Any]) -> Any:
+        if name == "x":
+            return self._part.state_at(self._instant, self._part.fixed)
+        if name in ("xe", "u", "f", "par"):
+            return getattr(self, name)
+        if name in self._instant.shared:
+            return getattr(self._instant.par, name)
+        raise ModelError(
+            f"{self._part.where}: {self._part.kind}.{function.__name__} takes {name!r}, which no "
+            f"assembly knows: x, u, f and par are, and parameters that it names in shared "
+            f"({', '.join(self._instant.shared) or 'none now'})"
+        )
+
+
+@dataclass
+class Instant:
+    """Where and with what a model is evaluated.
+
+    Parameters
+    ----------
+    x, xe
+        State, and the same value-only.
+    shared
+        Groups of parameters that elements take by name.
+    contact
+        Contact forces by part, and by assembly within it.
+    lines
+        File and line in which every wire and input was set, where that is wanted.
+    mark
+        ``mark(name, value)``: what takes the place of every wire and input as it is set, where
+        connections are followed.
+    held
+        Assemblies within it, at the same instant.
+    forces
+        Contact forces in the order of the protocol; None where they are not known.
+    wiring
+        Wires it, once, as soon as something of it is read; None where that is done.
+    is_held
+        Whether another assembly holds it, and sets its ports.
+    ports
+        What ports carry that nobody sets; 0 by default.
+    """
+
+    x: Any
+    xe: Any
+    memory: Any
+    par: Any
+    shared: tuple[str, ...]
+    contact: Mapping[str, Any] = field(default_factory=dict)
+    reaction: tuple[float, ...] = ()
+    rate: Any = None
+    flow: Any = None
+    wires: dict[str, Any] = field(default_factory=dict)
+    parts: dict[str, Wired[Any, Any, Any, Any]] = field(default_factory=dict)
+    lines: dict[str, str] | None = None
+    mark: Callable[[str, Any], Any] | None = None
+    held: dict[str, Any] = field(default_factory=dict)
+    forces: tuple[float, ...] | None = None
+    wiring: Callable[[], None] | None = None
+    is_held: bool = False
+    ports: Mapping[str, Any] = field(default_factory=dict)
+
+    def settle(self) -> None:
+        """Wire the assembly unless that is done, or under way."""
+        wiring, self.wiring = self.wiring, None
+        if wiring is not None:
+            wiring()
+
+    def marked(self, name: str, value: Any) -> Any:
+        """Return a wire or an input as it is kept."""
+        return value if self.mark is None else self.mark(name, value)
+
+    def note(self, name: str) -> None:
+        """Remember where a signal was set."""
+        if self.lines is not None:
+            self.lines[name] = line()
+
+
+def instant_of(instance: Any, where: str) -> Instant:
+    """Return the instant at which an assembly is evaluated.
+
+    Raises
+    ------
+    ModelError
+        When it is not: its parts have values at an instant only.
+    """
+    instant = vars(instance).get("_instant")
+    if instant is None:
+        raise ModelError(
+            f"{where} has no value here: within wire and its like take it from w, elsewhere from "
+            "model.at(state, memory, par)"
+        )
+    return typing.cast(Instant, instant)
+
+
+@cache
+def arguments(function: Callable[..., Any]) -> tuple[str, ...]:
+    """Return the names of a function's arguments."""
+    return tuple(inspect.signature(function).parameters)
+
+
+def line() -> str:
+    """Return file and line of the equation that is being evaluated: the first beyond this room."""
+    frame = inspect.currentframe()
+    while frame is not None and frame.f_globals.get("__package__") == __package__:
+        frame = frame.f_back
+    return f"{frame.f_code.co_filename}, line {frame.f_lineno}," if frame else ""
+
+
+# --- What an assembly declares: wires, integrals, and what is only recorded
 
 
 class _Named:

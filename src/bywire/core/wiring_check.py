@@ -13,8 +13,7 @@ from bywire.core.errors import ModelError, UnitError
 from bywire.core.instants import Evaluated
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
-from bywire.core.wired import Instant, instant_of
-from bywire.core.wires import Wire
+from bywire.core.wires import Instant, Wire, instant_of
 
 AnyAssembly = Assembly[Any, Any]
 

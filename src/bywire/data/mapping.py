@@ -1,9 +1,28 @@
-"""What the columns of a measurement file mean: signals, units, signs, offsets, delays, instants."""
+"""What the columns of a measurement file mean, and mapping files (TOML) that say it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from bywire.core import units
+from bywire.core.errors import (
+    InputError,
+    ParameterError,
+    UnitError,
+    quoted,
+    unknown_of_few,
+)
+from bywire.core.quantities import Unit
+from bywire.core.section import Hint, Section
+from bywire.core.values import written
+from bywire.data.column_units import si_symbol, unit_of
+from bywire.data.text_encoding import ENCODINGS
+from bywire.data.toml_file import read_toml
 
 
 @dataclass(frozen=True)
@@ -107,3 +126,231 @@ class MeasurementMapping:
         """Every cell of a text table that says that nothing was measured."""
         every = (*self.missing, *(mark for s in self.signals.values() for mark in s.missing))
         return tuple(mark for mark in every if isinstance(mark, str))
+
+
+# --- Mapping files: strict about keys and values, and nothing is executed
+
+_SIGN = "it must be 1 or -1"
+_Column = Annotated[
+    str | Annotated[int, Field(ge=1, le=100_000)],
+    Hint("write its title in quotation marks, or its number: columns are counted from 1"),
+]
+_Rate = Annotated[float | None, Unit("Hz", 1e3), Field(gt=0)]
+_Instant = Annotated[float | None, Unit("s")]
+_Quoted = Annotated[str, Hint("write it in quotation marks")]
+_Missing = Annotated[
+    tuple[float | str, ...],
+    Hint('write texts and numbers, as ["NA", "OVLD", 9.9E37]'),
+]
+
+
+class TimeSection(Section):
+    """A table ``time``: the column of the instants, or their rate."""
+
+    column: _Column = ""
+    unit: _Quoted = ""
+    rate: _Rate = None
+    start: _Instant = None
+
+    @classmethod
+    def written_out(cls, content: Any) -> Any:
+        """Return the table that a column alone stands for."""
+        return {"column": content} if isinstance(content, (str, int)) else content
+
+
+class _Marked(Section):
+    """A section in which a mark of missing values need not be a list."""
+
+    missing: _Missing = ()
+
+    @classmethod
+    def written_out(cls, content: Any) -> Any:
+        """Return the table with its marks as a list."""
+        if not isinstance(content, Mapping) or isinstance(content.get("missing", []), list):
+            return content
+        return {**content, "missing": [content["missing"]]}
+
+
+class SignalSection(_Marked):
+    """A section ``[signals.NAME]``; offset and limits have the unit of the signal."""
+
+    column: _Column = ""
+    unit: _Quoted = ""
+    scale: Annotated[float | None, Unit("1")] = None
+    sign: Annotated[int, Field(ge=-1, le=1), Hint(_SIGN)] = 1
+    offset: Any = None
+    delay: Annotated[float, Unit("s")] = 0.0
+    limits: Any = None
+    label: _Quoted = ""
+    time: TimeSection | None = None
+    rate: _Rate = None
+
+
+class MappingFile(_Marked):
+    """A mapping file."""
+
+    format: _Quoted = ""
+    time: TimeSection | None = None
+    rate: _Rate = None
+    start: _Instant = None
+    signals: Annotated[Mapping[str, SignalSection], Field(default_factory=dict)]
+    decimal: Annotated[Literal["", ".", ","], Hint("it must be '.' or ','")] = ""
+    skip_lines: Annotated[int, Field(ge=0, le=10_000)] = 0
+    titles: Annotated[
+        bool | None, Hint("it must be true or false, whether the first row holds titles")
+    ] = None
+    encoding: _Quoted = ""
+
+
+def mapping_from(content: Mapping[str, Any]) -> MeasurementMapping:
+    """Return the mapping that tables of keys and values describe, as a mapping file holds them.
+
+    Raises
+    ------
+    UnknownNameError
+        For an unknown key, with the nearest known one.
+    UnitError
+        For a unit that is not known or does not fit.
+    ParameterError
+        For a value that is out of range.
+    """
+    file = MappingFile.read(content, "a mapping")
+    return MeasurementMapping(
+        {name: _signal(name, each) for name, each in file.signals.items()},
+        _clock(file.time, file.rate, file.start, ""),
+        file.format.strip(),
+        file.decimal,
+        file.skip_lines,
+        file.titles,
+        _encoding(file.encoding.strip().lower()),
+        _marks(file.missing),
+    )
+
+
+def _encoding(name: str) -> str:
+    encoding = {
+        "utf8": "utf-8",
+        "utf16": "utf-16",
+        "latin1": "latin-1",
+        "ansi": "cp1252",
+        "iso-8859-1": "latin-1",
+    }.get(name, name.replace("windows-", "cp"))
+    if encoding and encoding not in ENCODINGS:
+        raise unknown_of_few("encoding", encoding, ENCODINGS)
+    return encoding
+
+
+def _marks(missing: tuple[float | str, ...]) -> tuple[float | str, ...]:
+    """Return the numbers and texts that mark missing values."""
+    return tuple(mark.strip() if isinstance(mark, str) else mark for mark in missing)
+
+
+def _signal(name: str, section: SignalSection) -> SignalMapping:
+    where = f"[signals.{name}] "
+    unit = _unit(section.unit, where)
+    symbol = si_symbol(unit_of(unit)) if unit else ""
+    needs_unit = [key for key in ("offset", "limits") if key in section.given and not symbol]
+    if needs_unit:
+        raise UnitError(f"{where}{needs_unit[0]} needs to know what is measured: give its unit")
+    if section.scale == 0.0:
+        raise ParameterError(f"{where}scale = 0: every value would be the same")
+    if section.sign == 0:
+        raise ParameterError(f"{where}sign = 0: {_SIGN}")
+    number, column = _numbered(section.column)
+    return SignalMapping(
+        name=name,
+        column=column or name,
+        number=number,
+        unit=unit,
+        scale=section.scale,
+        sign=section.sign,
+        offset=0.0 if section.offset is None else _difference(section.offset, symbol, where),
+        delay=section.delay,
+        limits=None if section.limits is None else _limits(section.limits, symbol, where),
+        label=section.label.strip(),
+        clock=_clock(section.time, section.rate, None, where),
+        missing=_marks(section.missing),
+    )
+
+
+def _limits(pair: Any, symbol: str, where: str) -> tuple[float, float]:
+    if not isinstance(pair, list) or len(pair) != 2:
+        raise ParameterError(f'{where}limits = {quoted(pair)}: write two, as ["0 bar", "250 bar"]')
+    low, high = (written(value, symbol, f"{where}limits") for value in pair)
+    if not low < high:
+        raise ParameterError(f"{where}limits = {quoted(pair)}: the lower one first")
+    return low, high
+
+
+def _difference(value: Any, symbol: str, where: str) -> float:
+    """Return an offset; one in degrees Celsius would count from another zero."""
+    number = written(value, symbol, f"{where}offset")
+    unit = units.split(value)[1] if isinstance(value, str) else ""
+    if unit and units.has_own_zero(unit, symbol):
+        raise UnitError(f"{where}offset = {quoted(value)}: give the difference in {symbol}")
+    return number
+
+
+def _clock(
+    time: TimeSection | None, rate: float | None, start: float | None, where: str
+) -> Clock | None:
+    """Return the clock that a table ``time``, or ``rate`` and ``start`` beside it, are."""
+    time = time or TimeSection()
+    rate = time.rate if rate is None else rate
+    start = time.start if start is None else start
+    if not time.given and rate is None and start is None:
+        return None
+    number, column = _numbered(time.column)
+    if bool(column) == (rate is not None):
+        raise ParameterError(
+            f"{where}time.column or {where}rate: give one of them, as "
+            'time = { column = "t", unit = "ms" } or rate = "1 kHz"'
+        )
+    unit = _unit(time.unit, f"{where}time.")
+    if unit and si_symbol(unit_of(unit)) != "s":
+        raise UnitError(
+            f"{where}time.unit = {quoted(unit)} is no unit of time: write for instance 'ms'"
+        )
+    if column and start is not None:
+        raise ParameterError(f"{where}start goes with a rate: a column has its own instants")
+    return Clock(column, unit, rate or 0.0, start or 0.0, number)
+
+
+def _unit(text: str, where: str) -> str:
+    try:
+        if text:
+            unit_of(text.strip())
+    except UnitError as error:
+        raise UnitError(
+            f"{where}unit = {quoted(text)}: {error}: write for instance 'bar', or '1' for a pure "
+            "number"
+        ) from None
+    return text.strip()
+
+
+def _numbered(column: str | int) -> tuple[int, str]:
+    """Return the number of a column, 0 where its title is given, and its title or number."""
+    return (column, str(column)) if isinstance(column, int) else (0, column.strip())
+
+
+def read_mapping(path: str | Path) -> MeasurementMapping:
+    """Read a mapping file.
+
+    Parameters
+    ----------
+    path
+        TOML file with ``time`` or ``rate`` and a section ``[signals.NAME]`` for each signal.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read or is no TOML.
+    InputError
+        For anything in it that does not fit, with the file's name in front.
+    """
+    file = Path(path)
+    content = read_toml(file, "mapping")
+    try:
+        return mapping_from(content)
+    except InputError as error:
+        raise type(error)(f"{file}: {error}") from None

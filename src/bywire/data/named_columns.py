@@ -9,7 +9,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from bywire.core.callers import is_command_line
+from bywire.core.callers import is_command_line, option
 from bywire.core.errors import FileError, InputError, ParameterError, UnitError, unknown_name
 from bywire.core.quantities import display_unit
 from bywire.core.units import parse
@@ -24,9 +24,6 @@ from bywire.data.file_format import Progress
 from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
 from bywire.data.measurement import dataset_of, opened
 from bywire.data.room import room
-
-_ARGUMENTS = {"input": "inputs", "output": "outputs"}
-"""options of commands whose arguments in Python take a mapping"""
 
 _BRACKETS = "each with the unit of its own column in the brackets, or 1 for a pure number"
 
@@ -130,7 +127,7 @@ def renamed(data: xr.Dataset, named: NamedColumns) -> xr.Dataset:
         When instants are named, which signals in memory have already.
     """
     if named.time:
-        raise ParameterError("--time is for measurement files: leave it out")
+        raise ParameterError(f"{option('time')} is for measurement files: leave it out")
     for name, column in named.signals.items():
         if column not in data:
             raise unknown_name("signal", column, [str(each) for each in data.data_vars])
@@ -158,7 +155,7 @@ def _timed(meaning: MeasurementMapping, time: str) -> MeasurementMapping:
     if not time:
         return meaning
     try:
-        rate = parse(time, "Hz", "--time") if time[0].isdigit() and " " in time else 0.0
+        rate = parse(time, "Hz", option("time")) if time[0].isdigit() and " " in time else 0.0
     except InputError:
         rate = 0.0
     return replace(meaning, clock=Clock(rate=rate) if rate > 0.0 else Clock(column=time))
@@ -194,11 +191,11 @@ def _options(signals: Mapping[str, str], clock: str, named: NamedColumns | None)
         unit = ((named.units or {}).get(name) if named else None) or ""
         text = f"{column} [{display_unit(unit) or 'UNIT'}]"
         driven = named.driving.get(name) if named else None
-        group = "signals" if named is None else "output" if driven is None else "input"
+        group = "signals" if named is None else "outputs" if driven is None else "inputs"
         groups.setdefault(group, {})[driven or name] = text
     if named is not None and named.units is not None and not {*signals} & {*named.units}:
         any_column = "COLUMN [UNIT]"  # nothing is called as the model calls it
-        groups = {"input": {"STIMULUS": any_column}, "output": {"SIGNAL": any_column}}
+        groups = {"inputs": {"STIMULUS": any_column}, "outputs": {"SIGNAL": any_column}}
     of_command = is_command_line()
     texts = []
     for group, pairs in groups.items():
@@ -206,9 +203,9 @@ def _options(signals: Mapping[str, str], clock: str, named: NamedColumns | None)
             each = [t if t.startswith(f"{n} [") else f"{n}={t}" for n, t in pairs.items()]
             texts.append(f'--signals "{", ".join(each)}"' if of_command else f"signals={each}")
         elif of_command:
-            texts += [f'--{group} {name}="{text}"' for name, text in pairs.items()]
+            texts += [f'{option(group)} {name}="{text}"' for name, text in pairs.items()]
         else:
-            texts.append(f"{_ARGUMENTS[group]}={pairs}")
+            texts.append(f"{group}={pairs}")
     if clock:
         texts.append(f'--time "{clock} [s]"' if of_command else f"time='{clock} [s]'")
     return (" " if of_command else ", ").join(texts)

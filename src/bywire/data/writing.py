@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.core.arguments import checked
+from bywire.core.callers import option
 from bywire.core.errors import FileError, InputError
 from bywire.core.scratch import replacing
 from bywire.data.file_format import FileFormat, Progress, no_progress
@@ -103,7 +104,9 @@ def require_free(target: Path, *, overwrite: bool) -> None:
         if target.is_dir():
             raise FileError(f"{target} is a folder: name a file in it")
         if target.exists() and not overwrite:
-            raise FileError(f"{target} is there already: name another file, or use --force")
+            raise FileError(
+                f"{target} is there already: name another file, or use {option('force', True)}"
+            )
         if not target.parent.is_dir():
             raise FileError(f"cannot write {target}: there is no folder {target.parent}: make it")
 

@@ -16,9 +16,8 @@ from bywire.simulation.emission import indented, layout_of, leaf_namer, statemen
 from bywire.simulation.emit_single import EXPORTED, emit_single
 from bywire.simulation.engine import prepare
 from bywire.simulation.expressions import as_number, needed
-from bywire.simulation.graph import Graph
+from bywire.simulation.graph import Graph, Node
 from bywire.simulation.layout import Layout
-from bywire.simulation.operation import Node
 from bywire.simulation.program import Program
 from bywire.simulation.run import Run, initial_vector
 from bywire.simulation.schedule import Schedule

@@ -15,8 +15,7 @@ from bywire.core.leaf import Leaf
 from bywire.core.parameters import leaf_fields
 from bywire.core.signals import ranges_of, signals_of
 from bywire.export.exported import Exported
-from bywire.simulation.graph import Graph
-from bywire.simulation.operation import Node
+from bywire.simulation.graph import Graph, Node
 from bywire.simulation.stages import Stages
 
 Place = Literal[

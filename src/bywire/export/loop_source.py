@@ -9,7 +9,7 @@ import casadi as ca
 
 from bywire.analysis.linear.corners import beside_point
 from bywire.analysis.linear.linearize import closed_contacts, free_signals, smooth_point
-from bywire.analysis.linear.sampled_system import frames_of
+from bywire.analysis.linear.sampled_loops import frames_of
 from bywire.analysis.linear.smooth_functions import smooth_functions
 from bywire.analysis.loop import Loop, Point
 from bywire.core.errors import BywireError

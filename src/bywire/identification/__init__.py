@@ -1,17 +1,15 @@
 """From measurements to parameters: estimators, their confidence, and named methods."""
 
+from bywire.identification.confidence import MisfitWarning
 from bywire.identification.differentiation import differentiated
-from bywire.identification.driven import Driven
-from bywire.identification.equation import Equation
+from bywire.identification.equation import Equation, inverse_dynamics
 from bywire.identification.estimate import Estimate
+from bywire.identification.fitting.worth import Prediction, predict
 from bywire.identification.homogeneity import Disagreement, disagreements
-from bywire.identification.identifiability import MisfitWarning
-from bywire.identification.inverse_dynamics import inverse_dynamics
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.model_choice import Candidate, choose
 from bywire.identification.multistart import multistart
-from bywire.identification.output_error import Trial, initial_states, output_error, trial
-from bywire.identification.prediction import Prediction, predict
+from bywire.identification.output_error import Driven, Trial, initial_states, output_error, trial
 from bywire.identification.unknown import Unknown, parameters_of
 
 __all__ = [

@@ -10,8 +10,8 @@ import xarray as xr
 from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
+from bywire.identification.measured import require_signals
 from bywire.identification.output_error import even_interval
-from bywire.identification.records import require_signals
 
 _ORDER = 4
 _STENCIL = np.array([1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0]) / 60.0  # as convolve turns it

@@ -1,21 +1,30 @@
-"""One equation of a model over measured signals: its error, and the derivatives of that."""
+"""Equation error: an equation of motion with measured motions in it, solved for parameters."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 from threading import Lock
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
-from bywire.core.errors import ModelError, unknown_name
+from bywire.core.errors import ModelError, ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
-from bywire.identification.records import require_signals
+from bywire.identification.confidence import MisfitWarning, misfit, notes_of, uncertainty
+from bywire.identification.differentiation import low_passed
+from bywire.identification.estimate import Estimate, Part
+from bywire.identification.least_squares import Problem, estimate
+from bywire.identification.measured import require_signals
+from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
 from bywire.simulation.buffered_call import BufferedCall
 from bywire.simulation.symbols import SX, column, scalars
@@ -115,3 +124,276 @@ class EquationError:
                 self._calls[n] = BufferedCall(self._function.map(n))
             e, W = self._calls[n](columns.ravel(order="F"), np.tile(values, n))
             return e.copy(), W.reshape(n, len(values)).copy()
+
+
+# --- Inverse dynamics: solved at every instant
+# No run is needed, so that it is quick and takes any start; what it needs is that all of the
+# equation is measured or a derivative of what is measured. While the body moves, dry friction has
+# the value that its direction gives it; samples near a reversal tell nothing and are left out.
+
+_ROUNDS, _SETTLED = 50, 1e-12
+_DECIMATED = 0.8  # of half the new sample rate: what the decimation filter lets pass
+
+
+def inverse_dynamics(
+    equation: Equation,
+    par: ParameterSet,
+    unknowns: Sequence[Unknown],
+    data: xr.Dataset,
+    *,
+    bandwidth: float | None = None,
+    instruments: xr.Dataset | None = None,
+    weights: Array | None = None,
+) -> Estimate:
+    r"""Solve an equation of motion for parameters.
+
+    Least squares on :math:`e = m \dot x - balance - friction`; where e is affine in the unknowns
+    this is the linear regression :math:`e = W \pi - y` and needs no start. With instruments,
+    the estimate solves :math:`Z^T e = 0` with Z the derivatives of e along a simulated motion,
+    which no measurement noise has touched: it stays unbiased where noise gets into W.
+
+    Parameters
+    ----------
+    equation
+        What is solved.
+    par
+        Everything that is known.
+    unknowns
+        Parameters to estimate.
+    data
+        States, memories (what controllers put out) and the rate, under the model's names, over
+        ``time`` [s], evenly spaced; see ``differentiated``.
+    bandwidth
+        Frequency up to which the equation is trusted [Hz]: residuals are low-passed and decimated
+        to about twice that, so that they are independent. None for all samples as they are.
+    instruments
+        A simulation of the same experiment, filtered alike.
+    weights
+        How much each sample counts, the inverse of its variance up to a factor, shape (n,); all
+        alike by default.
+
+    Raises
+    ------
+    UnknownNameError
+        When the equation needs a signal that is not measured.
+    ParameterError
+        When too few samples move, or they do not tell the unknowns.
+    ModelError
+        When the model has no such state.
+    """
+    evaluate = EquationError(equation, par, unknowns)
+    interval = even_interval(data["time"].values)
+    keep = _thinned(data, equation, interval, bandwidth)
+    seen = evaluate.columns(data)
+    other = None if instruments is None else evaluate.columns(instruments)
+    root = np.ones(keep.size) if weights is None else np.sqrt(weights[keep])
+    values = np.array([u.start for u in unknowns])
+    scale = np.array([u.scale for u in unknowns])
+
+    def rows(columns: Array) -> tuple[Array, Array]:
+        e, W = evaluate(columns, values)
+        table = np.column_stack((e, W * scale))
+        if bandwidth is not None:
+            table = low_passed(table, interval, bandwidth)
+        return table[keep, 0] * root, table[keep, 1:] * root[:, None]
+
+    for _ in range(_ROUNDS):
+        e, W = rows(seen)
+        if len(e) <= len(values):
+            raise ParameterError(
+                f"{len(e)} samples move faster than {equation.slowest:g}: too few for "
+                f"{len(values)} unknowns; move more, or lower the slowest speed"
+            )
+        Z = W if other is None else rows(other)[1]
+        _require_told(W, unknowns)
+        if other is None:
+            change = np.linalg.lstsq(W, e, rcond=None)[0]
+        else:
+            change = np.linalg.solve(Z.T @ W, Z.T @ e)
+        values = values - change * scale
+        if np.abs(change).max() < _SETTLED * max(1.0, np.abs(values / scale).max()):
+            break
+    e, W = rows(seen)
+    Z = W if other is None else rows(other)[1]
+    sure = uncertainty(W, e, instruments=None if other is None else Z)
+    estimate = Estimate(
+        unknowns=tuple(unknowns),
+        values=values,
+        covariance=sure.covariance * np.outer(scale, scale),
+        singular_values=np.asarray(np.linalg.svd(W, compute_uv=False), dtype=float),
+        residuals=e / np.where(root > 0.0, root, 1.0),
+        freedom=sure.freedom,
+        colored=sure.colored,
+        parts=(
+            Part(
+                f"equation of {equation.state}",
+                "",
+                len(e),
+                equation.unit,
+                spread=float(np.std(W @ (values / scale) - e)),
+            ),
+        ),
+    )
+    if wrong := misfit(estimate):
+        warnings.warn(wrong, MisfitWarning, stacklevel=2)
+    return estimate.noted(notes_of(estimate))
+
+
+def _require_told(W: Array, unknowns: Sequence[Unknown]) -> None:
+    """Refuse data in which a combination of the unknowns leaves no trace."""
+    size = np.linalg.norm(W, axis=0)
+    silent = [u.label for u, s in zip(unknowns, size, strict=True) if s == 0.0]
+    if silent:
+        raise ParameterError(
+            f"the data does not tell {', '.join(silent)}: nothing that it acts on moves; "
+            "excite it, or take it as known"
+        )
+    _, s, V = np.linalg.svd(W / size, full_matrices=False)  # U would have samples squared
+    if s[-1] < 1e-10 * s[0]:
+        together = [u.label for u, v in zip(unknowns, V[-1], strict=True) if abs(v) > 0.1]
+        raise ParameterError(
+            f"the data tells only a combination of {', '.join(together)}: take one of them as "
+            "known, or excite them apart"
+        )
+
+
+def _thinned(
+    data: xr.Dataset, equation: Equation, interval: float, bandwidth: float | None
+) -> NDArray[np.int64]:
+    """Return the samples that count: decimated, away from reversals and from the ends."""
+    count = data.sizes["time"]
+    every = 1
+    margin = 0
+    if bandwidth is not None:
+        every = max(int(_DECIMATED / (2.0 * bandwidth * interval)), 1)
+        margin = min(int(1.0 / (bandwidth * interval)), count // 20)
+    index = np.arange(3 * margin, count - 3 * margin, every)
+    if equation.state in equation.model.frictions:
+        slow = np.abs(data[equation.state].values) <= equation.slowest
+        mixed = np.ones(2 * margin + 1)  # what the filter mixes
+        near = np.convolve(slow, mixed, mode="same") > 0.5
+        index = index[~near[index]]
+    return index
+
+
+# --- Steady motion: averaged over windows, so that what reversals do stays outside
+# A filter mixes what lies within its reach, and near a reversal dry friction takes any value; a
+# mean over a window has no reach beyond it.
+
+_FEWEST = 4  # samples of a window
+
+
+@dataclass(frozen=True)
+class Window:
+    """Samples of steady motion.
+
+    ``rows``: which samples; ``motion``: number of the motion, from one reversal to the next, that
+    they belong to.
+    """
+
+    rows: slice
+    motion: int
+
+
+def windows(
+    omega: Array, interval: float, slowest: float, margin: float, length: float
+) -> list[Window]:
+    """Return windows within the motions of a signal.
+
+    ``omega``: speed, shape (n,); ``interval``: sample time [s]; ``slowest``: speed that a motion
+    keeps; ``margin``: time left out at either end of a motion [s]; ``length``: time of a window
+    [s].
+    """
+    way = np.where(np.abs(omega) > slowest, np.sign(omega), 0.0)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0.0], way, [0.0]))))
+    skip, size = round(margin / interval), max(round(length / interval), _FEWEST)
+    steady, motion = [], 0
+    for begin, end in pairwise(edges):
+        count = (end - begin - 2 * skip) // size
+        if way[begin] == 0.0 or count < 1:
+            continue
+        steady += [
+            Window(slice(begin + skip + k * size, begin + skip + (k + 1) * size), motion)
+            for k in range(int(count))
+        ]
+        motion += 1
+    return steady
+
+
+@dataclass(frozen=True)
+class Motions:
+    """What was measured of one body, and the windows of it that count.
+
+    ``data``: states, memories and the rate of the equation, over ``time`` [s]; ``windows``: where
+    they are averaged.
+    """
+
+    data: xr.Dataset
+    windows: Sequence[Window]
+
+    def means(self, values: Array) -> Array:
+        """Return means over the windows, shape (windows, ...)."""
+        return np.array([values[w.rows].mean(axis=0) for w in self.windows])
+
+
+def motions(data: xr.Dataset, speed: str, slowest: float, margin: float, length: float) -> Motions:
+    """Return a measurement with its windows; see :func:`windows`."""
+    interval = even_interval(data["time"].values)
+    return Motions(data, windows(data[speed].values, interval, slowest, margin, length))
+
+
+def window_residuals(
+    equation: Equation, par: ParameterSet, unknowns: Sequence[Unknown], moved: Motions
+) -> Problem:
+    """Return the equation's error, averaged over windows, as a problem of least squares."""
+    error = EquationError(equation, par, unknowns)
+    rows = np.concatenate([np.arange(w.rows.start, w.rows.stop) for w in moved.windows])
+    size = [w.rows.stop - w.rows.start for w in moved.windows]
+    starts = np.concatenate(([0], np.cumsum(size)[:-1]))
+    columns = error.columns(moved.data)[:, rows]
+
+    def evaluate(values: Array) -> tuple[Array, Array]:
+        e, W = error(columns, values)
+        each = np.array(size, dtype=float)
+        return np.add.reduceat(e, starts) / each, np.add.reduceat(W, starts) / each[:, None]
+
+    return Problem(tuple(unknowns), evaluate)
+
+
+def steady_dynamics(parts: Sequence[Problem], unknowns: Sequence[Unknown], advice: str) -> Estimate:
+    """Solve the averaged equations of several bodies for what they share.
+
+    Every part counts by its own scatter, which a first fit tells.
+
+    ``parts``: as ``window_residuals`` gives them, all of the same unknowns; ``advice``: which
+    experiment would tell more.
+
+    Raises
+    ------
+    ParameterError
+        When there is too little motion, or nothing is told.
+    """
+    weights = np.ones(len(parts))
+    try:
+        for _ in range(2):
+            best = estimate(Problem(tuple(unknowns), partial(_weighted, parts, weights)))
+            values = {u.label: u.start for u in unknowns} | dict(
+                zip(best.names, best.values.tolist(), strict=True)
+            )
+            final = np.array([values[u.label] for u in unknowns])
+            weights = np.array([1.0 / _scatter(p.evaluate(final)[0]) for p in parts])
+        return estimate(Problem(tuple(unknowns), partial(_weighted, parts, weights)))
+    except ParameterError as error:
+        raise ParameterError(f"{error}: {advice}") from None
+
+
+def _weighted(parts: Sequence[Problem], weights: Array, values: Array) -> tuple[Array, Array]:
+    rows = [part.evaluate(values) for part in parts]
+    return (
+        np.concatenate([w * e for w, (e, _) in zip(weights, rows, strict=True)]),
+        np.vstack([w * W for w, (_, W) in zip(weights, rows, strict=True)]),
+    )
+
+
+def _scatter(e: Array) -> float:
+    return max(float(np.sqrt(np.mean(e**2))), 1e-300)

@@ -4,30 +4,272 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, Literal
 
 import numpy as np
 
+from bywire.bench.step_error import NO_ESTIMATE, of_difference
 from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError, SolverError
 from bywire.core.typing import Array
-from bywire.identification.confidence import uncertainty
-from bywire.identification.estimate import Estimate, Kept
-from bywire.identification.homogeneity import between_records
-from bywire.identification.identifiability import (
+from bywire.core.units import difference_unit, shown
+from bywire.identification.confidence import (
     MisfitWarning,
     advice,
     misfit,
     notes_of,
+    uncertainty,
     untold,
 )
-from bywire.identification.leftover import Part
-from bywire.identification.loss import Loss, bread, influence, of_data_alone
-from bywire.identification.problem import Problem, cost_of, with_priors
-from bywire.identification.step_share import with_step_share
+from bywire.identification.estimate import Estimate, Kept, Part
+from bywire.identification.homogeneity import between_records
+from bywire.identification.unknown import Unknown
 
-__all__ = ["Loss", "Problem", "Solution", "estimate", "solve", "with_priors"]
+Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
 
+_LEAST = 1e-2  # mean slope of the influence
+
+
+def rho(z: Array, loss: Loss) -> Array:
+    r"""Return a loss and its first two derivatives by the squared residual.
+
+    Parameters
+    ----------
+    z
+        Squared residuals, those of size one where the noise is as assumed, shape (n,).
+    loss
+        ``linear`` :math:`z`; ``soft_l1`` :math:`2(\sqrt{1+z}-1)`; ``huber`` :math:`z` up to one,
+        :math:`2\sqrt z-1` beyond; ``cauchy`` :math:`\ln(1+z)`.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (3, n), as ``scipy.optimize.least_squares`` wants it.
+    """
+    ones = np.ones_like(z)
+    if loss == "linear":
+        return np.stack((z, ones, 0.0 * ones))
+    if loss == "soft_l1":
+        root = np.sqrt(1.0 + z)
+        return np.stack((2.0 * (root - 1.0), 1.0 / root, -0.5 / root**3))
+    if loss == "huber":
+        root = np.sqrt(np.maximum(z, 1.0))
+        inner = z <= 1.0
+        return np.stack(
+            (np.where(inner, z, 2.0 * root - 1.0), 1.0 / root, np.where(inner, 0.0, -0.5 / root**3))
+        )
+    return np.stack((np.log1p(z), 1.0 / (1.0 + z), -1.0 / (1.0 + z) ** 2))
+
+
+def of_data_alone(loss: Loss, apart: int) -> Any:
+    """Return the loss for SciPy; the last rows, what is known beforehand, count by their squares.
+
+    Parameters
+    ----------
+    apart
+        Number of these rows.
+    """
+    if loss == "linear" or not apart:
+        return loss
+
+    def mixed(z: Array) -> Array:
+        return np.hstack((rho(z[:-apart], loss), rho(z[-apart:], "linear")))
+
+    return mixed
+
+
+def influence(r: Array, loss: Loss) -> tuple[Array, Array]:
+    r"""Return :math:`\psi(r) = r \rho'(r^2)` and its derivative by r, each of shape (n,).
+
+    Half the loss of :math:`z = r^2` is minimized: :math:`\psi` is its derivative by r.
+
+    References
+    ----------
+    P. J. Huber, Robust Statistics, 1981, section 3.2.
+    """
+    _, first, second = rho(r**2, loss)
+    return r * first, first + 2.0 * r**2 * second
+
+
+def bread(slopes: Array, unknowns: int) -> float:
+    r"""Return what divides an M-estimate's scores, :math:`E[\psi'] / K`.
+
+    :math:`K = 1 + (p/n) \operatorname{var}(\psi') / E[\psi']^2` corrects for few residuals; the
+    covariance is :math:`K^2 \, [\sum \psi^2 / (n-p)] / E[\psi']^2 \, (J^T J)^{-1}`.
+
+    Parameters
+    ----------
+    slopes
+        Derivatives of the influence by the residual, shape (n,).
+    unknowns
+        p.
+
+    References
+    ----------
+    P. J. Huber, Robust Statistics, 1981, section 7.6.
+    """
+    # A redescending loss whose residuals are mostly outliers has no minimum worth a name.
+    mean = max(float(slopes.mean()), _LEAST)
+    return mean / (1.0 + unknowns / slopes.size * float(slopes.var()) / mean**2)
+
+
+# --- The problem: unknowns, their residuals, and what is known beforehand
+
+Evaluate = Callable[[Array], tuple[Array, Array]]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Residuals as a function of unknowns.
+
+    Parameters
+    ----------
+    unknowns
+        What is varied; p of them.
+    evaluate
+        ``evaluate(values) -> (residuals, jacobian)``, shapes (n,) and (n, p), weighted so that
+        residuals are of size one where the noise is as assumed.
+    apart
+        Last rows that are independent of all others and taken to be weighted rightly.
+    instrument
+        Whether the Jacobian is that of a model which the measured inputs' noise does not drive,
+        while it drives that of the residuals. Where their product vanishes, the estimate is then
+        free of the bias that the least sum of squares has.
+    silent
+        Why nothing may depend on an unknown, by its name: what is switched off.
+    parts
+        Which residuals belong together, in their order; all of them by default.
+    finer
+        The same as ``evaluate`` in half the steps of a simulation; None where nothing is simulated.
+    resolved
+        Share of the cost, and of the unknowns, below which a search only follows the roughness of
+        the residuals or of a Jacobian by differences.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    evaluate: Evaluate
+    apart: int = 0
+    instrument: bool = False
+    silent: Mapping[str, str] = field(default_factory=dict)
+    parts: tuple[Part, ...] = ()
+    finer: Evaluate | None = None
+    resolved: float = 0.0
+
+    def held(self, index: int) -> Problem:
+        """Return the problem with one unknown held at its start."""
+        value = self.unknowns[index].start
+        rest = self.unknowns[:index] + self.unknowns[index + 1 :]
+
+        def without(whole: Evaluate, values: Array) -> tuple[Array, Array]:
+            r, J = whole(np.insert(values, index, value))
+            return r, np.delete(J, index, axis=1)
+
+        finer = None if self.finer is None else partial(without, self.finer)
+        return replace(self, unknowns=rest, evaluate=partial(without, self.evaluate), finer=finer)
+
+
+def with_priors(problem: Problem, values: Array) -> tuple[Array, Array]:
+    """Return residuals and Jacobian with one more row for every prior."""
+    r, J = problem.evaluate(values)
+    rows = [(k, u.prior) for k, u in enumerate(problem.unknowns) if u.prior is not None]
+    if not rows:
+        return r, J
+    more = np.array([(values[k] - mean) / deviation for k, (mean, deviation) in rows])
+    slopes = np.zeros((len(rows), len(values)))
+    for row, (k, (_, deviation)) in enumerate(rows):
+        slopes[row, k] = 1.0 / deviation
+    return np.concatenate((r, more)), np.vstack((J, slopes))
+
+
+def cost_of(problem: Problem, values: Array, loss: Loss = "linear") -> float:
+    """Return half the sum of the residuals' losses, priors included."""
+    r, _ = with_priors(problem, values)
+    data = r.size - sum(u.prior is not None for u in problem.unknowns)
+    return 0.5 * float(np.sum(rho(r[:data] ** 2, loss)[0]) + np.sum(r[data:] ** 2))
+
+
+# --- What the step of a simulation does to estimates: their first-order shift in half steps
+# At the minimum the weighted residuals r are orthogonal to their derivatives J. With the residuals
+# r' of half the step they are not, and one Gauss-Newton step leads to the minimum there,
+# dx = -J^+ (r' - r): three quarters of the error of the whole step, at second order.
+
+_SMALL = 1e-6  # of an unknown's scale: less matters to nobody
+
+
+def with_step_share(
+    problem: Problem, best: Estimate, J: Array, loss: Loss
+) -> tuple[Estimate, tuple[str, ...]]:
+    """Return an estimate with the errors that its values have from the step, and what exceeds.
+
+    Parameters
+    ----------
+    problem
+        With residuals in half steps; without, nothing is simulated and nothing is said.
+    best
+        The estimate at the minimum.
+    J
+        Derivatives of the residuals per unknown's scale there, priors included, shape (n, p).
+    loss
+        How large residuals count.
+
+    Returns
+    -------
+    Estimate
+        With ``step_errors`` and what the step changes of each part; unknowns at a bound are taken
+        to stay there.
+    tuple of str
+        Unknowns whose error from the step exceeds the half width of their 95 % interval, or that
+        half steps cannot be run.
+    """
+    if problem.finer is None:
+        return best, ()
+    count = best.residuals.size
+    try:
+        finer = problem.finer(best.values)[0]
+        difference = np.zeros(len(J))
+        difference[:count] = finer - best.residuals
+    except (*NO_ESTIMATE, ValueError) as error:  # a ValueError: other rows count in half steps
+        return best, (f"what the step does to the estimates is not known: {error}",)
+    weights = np.ones(len(J))
+    measured = count - problem.apart
+    weights[:measured] = np.sqrt(np.maximum(influence(best.residuals[:measured], loss)[1], 0.0))
+    bounds = best.at_bounds()
+    free = [k for k, u in enumerate(best.unknowns) if u.label not in bounds]
+    shift = np.zeros(len(best.unknowns))
+    rows = weights[:, None] * J[:, free]
+    shift[free] = np.linalg.lstsq(rows, weights * difference)[0]
+    scale = np.array([u.scale for u in best.unknowns])
+    errors = of_difference(0.5) * np.abs(shift) * scale
+    known = replace(best, step_errors=errors, parts=tuple(_parts(best.parts, difference)))
+    return known, () if known.is_exact else tuple(_exceeding(best, errors))
+
+
+def _parts(parts: Iterable[Part], difference: Array) -> Iterator[Part]:
+    """Yield the parts of the residuals with the size of what the step changes of them."""
+    begin = 0
+    for part in parts:
+        rows = difference[begin : begin + part.count]
+        rms = float(np.sqrt(np.mean(rows**2))) if rows.size else 0.0
+        yield replace(part, numerical=rms * (part.noise or 1.0))
+        begin += part.count
+
+
+def _exceeding(best: Estimate, errors: Array) -> list[str]:
+    half = 0.5 * np.diff(best.intervals(), axis=1).ravel()
+    return [
+        f"{u.label} is off by about {shown(float(f'{error:.2g}'), difference_unit(u.unit))} from "
+        "the step of the simulation, more than its 95 % interval reaches, "
+        f"{shown(float(f'{reach:.2g}'), difference_unit(u.unit))}: "
+        "take a smaller step"
+        for u, error, reach in zip(best.unknowns, errors, half, strict=True)
+        if error > max(reach, _SMALL * u.scale)
+    ]
+
+
+# --- Estimation
 
 NO_TRIAL = (SolverError, ParameterError)
 """what a trial ends with whose values the model, or its parameters' own rules, do not take"""

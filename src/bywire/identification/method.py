@@ -159,7 +159,7 @@ class Method:
     unknowns
         Names of the parameters that it can find.
     several
-        Whether data may hold several records, see ``bywire.identification.records``: each is
+        Whether data may hold several records, see ``bywire.identification.measured``: each is
         evenly spaced, and the method splits them.
     gaps
         Whether it takes data in which samples are missing (NaN).

@@ -17,9 +17,8 @@ import xarray as xr
 
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
-from bywire.identification.confidence import autoregression
+from bywire.identification.confidence import MisfitWarning, autoregression, misfit
 from bywire.identification.estimate import Estimate
-from bywire.identification.identifiability import MisfitWarning, misfit
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.unknown import Unknown
 

@@ -7,27 +7,179 @@ are the exact ones of the run, friction and contacts included.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError, SolverError, unknown_name
-from bywire.core.model import Model
+from bywire.core.model import Model, Task
 from bywire.core.parameters import ParameterSet
-from bywire.core.signals import signals_of, zeros
+from bywire.core.signals import Signal, signals_of, zeros
 from bywire.core.typing import Array
-from bywire.identification.leftover import Part
-from bywire.identification.moved_run import Start, moved_run, start_slopes
-from bywire.identification.problem import Problem
-from bywire.identification.records import require_signals
+from bywire.identification.estimate import Part
+from bywire.identification.least_squares import Problem
+from bywire.identification.measured import require_signals
 from bywire.identification.unknown import Unknown
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
+
+Start = Callable[[Mapping[str, float]], tuple[Any, Any]]
+"""``start(values) -> (state, memory)``: where a run begins with parameters, and with what is
+called ``start.NAME``, changed"""
+
+_SHIFT = 1e-6  # of an unknown's scale: for differences of the start
+_AFTERWARDS = ("initial.", "stimulus.")  # what no start depends on
+
+
+@checked
+def moved_run(run: Run, values: Mapping[str, float], start: Start | None = None) -> Run:
+    """Return a run with unknowns changed.
+
+    Parameters
+    ----------
+    run
+        The run.
+    values
+        By name: parameters; ``initial.STATE`` replaces, ``stimulus.NAME`` adds, ``start.NAME``
+        goes to the start.
+    start
+        Where the run begins with other values; by default where it does.
+
+    Raises
+    ------
+    ParameterError
+        When the values are not admissible together.
+    """
+    fixed = {n[8:]: v for n, v in values.items() if n.startswith("initial.")}
+    shift = {n[9:]: v for n, v in values.items() if n.startswith("stimulus.")}
+    rest = {n: v for n, v in values.items() if not n.startswith(_AFTERWARDS)}
+    par = {n: v for n, v in rest.items() if not n.startswith("start.")}
+    state, memory = (run.state, run.memory) if start is None else start(rest)
+    if shift:
+        fields, inner = run.model.Stimulus._fields, run.stimulus
+        add = np.array([shift.get(name, 0.0) for name in fields])
+        run = replace(run, stimulus=lambda t: inner(t) + add)
+    return replace(run, par=run.par.replace(par), state=state._replace(**fixed), memory=memory)
+
+
+def start_slopes(
+    start: Start, run: Run, unknowns: Sequence[Unknown], values: Mapping[str, float]
+) -> tuple[Array, Array]:
+    """Return derivatives of the initial state and memory, shapes (states, p) and (memories, p).
+
+    By central differences, one-sided at the end of a range: equilibria are smooth, and computed
+    to rounding. What ``initial.STATE`` replaces does not move.
+
+    Parameters
+    ----------
+    start
+        Where the run begins.
+    run
+        Begins there.
+    unknowns
+        Of the run; p of them.
+    values
+        By name.
+    """
+    rest = {n: v for n, v in values.items() if not n.startswith(_AFTERWARDS)}
+    fields = run.model.State._fields
+    slopes = np.zeros((len(fields) + len(run.memory), len(unknowns)))
+
+    def at(name: str, shift: float) -> tuple[float, Array]:
+        try:
+            state, memory = start({**rest, name: rest[name] + shift})
+        except ParameterError:
+            shift, (state, memory) = 0.0, start(rest)
+        return shift, np.array([*state, *memory], dtype=float)
+
+    for k, u in enumerate(unknowns):
+        if u.name in rest:
+            (a, low), (b, high) = (at(u.name, way * _SHIFT * u.scale) for way in (-1.0, 1.0))
+            slopes[:, k] = (high - low) / (b - a) if b > a else 0.0
+    fixed = [fields.index(u.name[8:]) for u in unknowns if u.name.startswith("initial.")]
+    slopes[fixed] = 0.0
+    return slopes[: len(fields)], slopes[len(fields) :]
+
+
+# --- A model under measured inputs alone: no controller, no energy balance
+
+
+class NoPower(NamedTuple):
+    """No energy is booked."""
+
+    none: Annotated[float, Signal("W", "no power")]
+
+
+class Driven(Model):
+    """A model whose inputs were measured; a subclass has ``name``, ``State`` and ``Input``.
+
+    Besides them it gives ``mass`` and ``balance``, which gets an ``Input`` as its memory; what it
+    shows are its states unless it has an ``Output`` and ``output`` of its own. Inputs hold for
+    ``par.T_s``, the sample time, or for what ``period`` returns.
+    """
+
+    Flow: ClassVar = NoPower
+    Memory: ClassVar[Any] = NoPower  # these three are set where a subclass names its own types
+    Stimulus: ClassVar[Any] = NoPower
+    Output: ClassVar[Any] = NoPower
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Take the inputs for stimuli and for what is held, and the states for outputs."""
+        super().__init_subclass__(**options)
+        for kind, source in (("Memory", "Input"), ("Stimulus", "Input"), ("Output", "State")):
+            if source in vars(cls) and kind not in vars(cls):
+                setattr(cls, kind, vars(cls)[source])
+
+    def period(self, par: Any) -> float:
+        """Return for how long an input is held [s]."""
+        return float(par.T_s)
+
+    def tasks(self, par: Any) -> tuple[Task, ...]:
+        """Return the one that holds a sample."""
+        return (Task("held", self.period(par), lambda x, m, u, par: u),)
+
+    @abstractmethod
+    def mass(self, xe: Any, par: Any) -> Any:
+        """Return the factor of each state's derivative, a State."""
+
+    @abstractmethod
+    def balance(self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]) -> Any:
+        """Return the smooth right-hand side, a State; ``memory`` are the inputs."""
+
+    def powers(
+        self,
+        x: Any,
+        xe: Any,
+        rate: Any,
+        memory: Any,
+        par: Any,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+    ) -> NoPower:
+        """Return none."""
+        return NoPower(0.0 * x[0])
+
+    def output(
+        self,
+        x: Any,
+        memory: Any,
+        par: Any,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+        flow: Any,
+    ) -> Any:
+        """Return the states."""
+        return x
+
+
+# --- Residuals of output error
 
 Between = Literal["held", "linear"]
 """what measured inputs do between samples"""

@@ -7,17 +7,174 @@ have to hold it about 95 times in 100.
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+import os
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import as_completed
+from contextlib import closing
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bywire.bench.computation import functions_digest
+from bywire.core.copies import processes_with_brakes
+from bywire.core.errors import BywireError, ParameterError
+from bywire.core.model import ASSEMBLIES
+from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Progress
+from bywire.identification.confidence import MisfitWarning
 from bywire.identification.method import Effort, Method
-from bywire.identification.simulated_experiments import Outcome, experiments
+from bywire.identification.unknown import parameters_of, scattered
+from bywire.simulation.job_store import JobStore
+
+_TRIES = 20
+_KILLED = "what was finished is kept where there is an output folder, and the same command goes on"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one simulated experiment gave.
+
+    Parameters
+    ----------
+    seed
+        Of its noise and of its start.
+    values, deviations, low, high
+        By label: estimate, its standard deviation, and the 95 % interval, SI.
+    units
+        SI unit by label.
+    failed_checks
+        Names of the method's checks that did not hold.
+    kept
+        Labels that the data did not tell.
+    error
+        Why nothing was identified; empty where something was.
+    """
+
+    seed: int
+    values: Mapping[str, float]
+    deviations: Mapping[str, float]
+    low: Mapping[str, float]
+    high: Mapping[str, float]
+    units: Mapping[str, str]
+    failed_checks: tuple[str, ...] = ()
+    kept: tuple[str, ...] = ()
+    error: str = ""
+
+
+def displaced(par: ParameterSet, names: Sequence[str], spread: float, seed: int) -> ParameterSet:
+    """Return parameters with some of them up to ``spread`` off, so that a search has to move.
+
+    Raises
+    ------
+    ParameterError
+        When no admissible set is found around this one.
+    """
+    unknowns = parameters_of(par, [n for n in names if n in par.leaves()])
+    if not unknowns or spread == 0.0:
+        return par
+    for values in scattered(unknowns, _TRIES + 1, spread, seed)[1:]:
+        try:
+            return par.replace({u.name: float(v) for u, v in zip(unknowns, values, strict=True)})
+        except ParameterError:
+            continue
+    raise ParameterError(f"no admissible parameters within {100 * spread:g} % of these: lower it")
+
+
+def experiments(
+    method: Method,
+    par: Any,
+    options: Any,
+    seeds: Iterable[int],
+    effort: Effort,
+    *,
+    processes: int | None = 1,
+    store: Path | None = None,
+    progress: Progress | None = None,
+) -> tuple[Outcome, ...]:
+    """Simulate and identify one experiment per seed; the arguments are those of ``trust``."""
+    chosen = replace(effort, threads=1, store=None, progress=None)
+    wanted = list(dict.fromkeys(seeds))
+    key = _key(method, par, options, chosen)
+    jobs = JobStore(store)
+    done = {o.seed: o for o in _finished(jobs, key) if o.seed in set(wanted)}
+    missing = [seed for seed in wanted if seed not in done]
+    identify = partial(experiment, method, par, options, chosen)
+    with closing(_outcomes(identify, missing, processes or os.cpu_count() or 1)) as outcomes:
+        for outcome in outcomes:
+            done[outcome.seed] = outcome
+            jobs.append({"key": key, **asdict(outcome)})
+            if progress is not None:
+                progress("experiments", len(done) / len(wanted))
+    return tuple(done[seed] for seed in wanted)
+
+
+def experiment(method: Method, par: Any, options: Any, effort: Effort, seed: int) -> Outcome:
+    """Simulate one experiment and identify it from a start that is off."""
+    try:
+        data = method.synthetic(par, options, seed)
+        start = par if par is None else displaced(par, method.unknowns, effort.spread, seed)
+        with warnings.catch_warnings():  # a check of the method counts it
+            warnings.simplefilter("ignore", MisfitWarning)
+            identified = method.identify(data, start, options, replace(effort, seed=seed))
+    except BywireError as error:
+        return Outcome(seed, {}, {}, {}, {}, {}, error=str(error))
+    values: dict[str, float] = {}
+    deviations, low, high = dict(values), dict(values), dict(values)
+    units: dict[str, str] = {}
+    for estimate in identified.estimates.values():
+        values |= dict(zip(estimate.names, estimate.values.tolist(), strict=True))
+        deviations |= dict(zip(estimate.names, estimate.deviations.tolist(), strict=True))
+        units |= {u.label: u.unit for u in estimate.unknowns}
+        ends = estimate.intervals()
+        low |= dict(zip(estimate.names, ends[:, 0].tolist(), strict=True))
+        high |= dict(zip(estimate.names, ends[:, 1].tolist(), strict=True))
+    kept = tuple(k.unknown.label for e in identified.estimates.values() for k in e.kept)
+    checks = tuple(check.name for check in identified.checks if not check.holds)
+    return Outcome(seed, values, deviations, low, high, units, checks, kept)
+
+
+def _outcomes(
+    identify: Callable[[int], Outcome], seeds: Sequence[int], processes: int
+) -> Generator[Outcome, None, None]:
+    if processes < 2 or len(seeds) < 2:
+        yield from map(identify, seeds)
+        return
+    with processes_with_brakes(min(processes, len(seeds)), _KILLED) as pool:
+        jobs = [pool.submit(identify, seed) for seed in seeds]
+        yield from (job.result() for job in as_completed(jobs))
+
+
+def _key(method: Method, par: Any, options: Any, effort: Effort) -> str:
+    values = "" if par is None else par.model_dump_json()
+    model = ASSEMBLIES.find(method.assembly) if method.assembly else None
+    name = f"{method.name}{method.key}"
+    computed = functions_digest(
+        (method.identify, method.synthetic, method.truth, model),
+        "bywire.identification",
+        with_equations=True,
+    )
+    text = f"{name} {values} {options.model_dump_json()} {effort.starts} {effort.spread} {computed}"
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _finished(store: JobStore, key: str) -> Iterator[Outcome]:
+    """Yield the finished experiments of a study."""
+    for row in store.rows():
+        try:
+            if row.pop("key") == key:
+                row |= {name: tuple(row[name]) for name in ("failed_checks", "kept")}
+                yield Outcome(**row)
+        except (ValueError, KeyError, TypeError):
+            continue
+
+
+# --- Trust
 
 _BIAS = 3.0  # standard errors of the mean
 _COVERED = (0.90, 0.99)

@@ -1,4 +1,4 @@
-"""Life projected: Heun's steps over many stops, what happens between stops never skipped.
+"""Life projected: rates of slow states, and Heun's steps over many stops.
 
 Within a step the states go on stop by stop with rates that are held, so that an adjuster acts
 exactly where it does; the runs are made at the ends of steps alone.
@@ -8,19 +8,127 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from bywire.core.errors import ParameterError
+from bywire.bench.bench import Bench
+from bywire.bench.ensemble import changed
+from bywire.bench.side_by_side import key_figures_of
+from bywire.core.errors import ParameterError, RunError
 from bywire.core.typing import Array, Progress, silent
 from bywire.core.units import shown
-from bywire.life.declaration import Values
-from bywire.life.plan import LifePlan
-from bywire.life.rates import Rates, rates
+from bywire.life.declaration import Effects, StopConditions, Values
+from bywire.life.life_file import CONDITION, LifePlan
 from bywire.studies.distribution import Distribution
+
+
+@dataclass(frozen=True)
+class Rates:
+    """How slow states change per stop.
+
+    Parameters
+    ----------
+    z
+        Slow states that were held [SI].
+    effects
+        What each stop of the population does.
+    warnings
+        What the runs warned of.
+    """
+
+    z: Values
+    effects: Effects
+    warnings: tuple[str, ...] = field(default=(), repr=False)
+
+    @cached_property
+    def mean(self) -> Values:
+        """Mean change of each slow state per stop [SI]."""
+        return {name: float(np.mean(change)) for name, change in self.effects.changes.items()}
+
+
+def rates(plan: LifePlan, z: Values) -> Rates:
+    """Return what the plan's population of stops does to slow states that are held meanwhile.
+
+    Raises
+    ------
+    InputError
+        When the brake cannot be set up with these states.
+    RunError
+        When a run fails, or a stop lacks a key figure that wear is computed from.
+    KeyboardInterrupt
+        When interrupted.
+    """
+    figures, warnings = stop_figures(plan, z)
+    given = plan.life.effects(figures, conditions(plan), z, plan.bench.par, plan.wear)
+    return Rates(z, given, warnings)
+
+
+def stop_figures(plan: LifePlan, z: Values) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """Return key figures of the population's stops by name, shape (stops,), and warnings."""
+    which, places = plan.different
+    figures, warnings = simulated(plan, z, which)
+    return {name: values[places] for name, values in figures.items()}, warnings
+
+
+def simulated(
+    plan: LifePlan, z: Values, which: Sequence[int]
+) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """Return key figures of some stops of the population, and what their runs warned of.
+
+    What slow states change nothing of is simulated once.
+    """
+    follows = plan.life.follows(z, plan.bench.par, plan.wear)
+    key = (tuple(follows.items()), tuple(which))
+    if key not in plan.known:
+        plan.known[key] = _simulated(plan, follows, which)
+    figures, warnings = plan.known[key]
+    return dict(figures), warnings
+
+
+def _simulated(
+    plan: LifePlan, follows: Mapping[str, float], which: Sequence[int]
+) -> tuple[dict[str, Array], tuple[str, ...]]:
+    made = key_figures_of([_stop_bench(plan, follows, k) for k in which])
+    known = {figure.name: figure for figure in made.figures}
+    for name in plan.life.figures:
+        lacking = np.flatnonzero(~np.isfinite(known[name].values))
+        if lacking.size:
+            stop = ", ".join(f"{n} = {v[which[lacking[0]]]:g}" for n, v in plan.population.items())
+            raise RunError(
+                f"a stop{stop and f' with {stop} (in SI)'} has no {name}: "
+                + known[name].told(lacking[0])
+            )
+    warnings = dict.fromkeys(text for texts in made.warnings for text in texts)
+    return {name: np.asarray(known[name].values) for name in plan.life.figures}, tuple(warnings)
+
+
+def conditions(plan: LifePlan) -> Mapping[str, Array]:
+    """Return the conditions of every stop of the population by name [SI], shape (stops,)."""
+    given = plan.population
+    return {
+        name: np.broadcast_to(
+            np.asarray(given.get(f"{CONDITION}{name}", getattr(plan.conditions, name)), float),
+            (plan.count,),
+        )
+        for name in StopConditions.model_fields
+    }
+
+
+def _stop_bench(plan: LifePlan, follows: Mapping[str, float], k: int) -> Bench:
+    """Return a stop of the population with what follows from slow states that are held."""
+    drawn = {
+        name: values[k].item()
+        for name, values in plan.population.items()
+        if not name.startswith(CONDITION)
+    }
+    return changed(plan.bench, {**drawn, **follows})
+
+
+# --- The projection: what happens between stops is never skipped
 
 CONFIDENCE = 0.95
 """of the interval of a life"""
@@ -238,3 +346,45 @@ def _falls(plan: LifePlan, held: Rates, limit: str) -> Array:
         for k in range(plan.count)
     ]
     return now - np.array([life.left(z, par, wear)[limit] for z in each])
+
+
+# --- Stops run one by one, each with the slow states that the one before left: brute force
+
+
+def one_by_one(plan: LifePlan, stops: int, progress: Progress = silent) -> dict[str, Array]:
+    """Return the slow states after each of some stops [SI], shape (stops + 1,) each.
+
+    The population's stops follow one another, again and again. A projection steps over them: this
+    says how far it is to be trusted.
+
+    Parameters
+    ----------
+    plan
+        What wears, and by which stops.
+    stops
+        How many to run, >= 1.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Raises
+    ------
+    RunError
+        When a run fails, or a stop lacks a key figure that wear is computed from.
+    KeyboardInterrupt
+        When interrupted.
+    """
+    life, par, wear, count = plan.life, plan.bench.par, plan.wear, plan.count
+    z = life.begin(par, wear)
+    figures, _ = stop_figures(plan, z)  # of the stops before the first, for its heat
+    path: list[Values] = [z]
+    for n in range(stops):
+        k = n % count
+        made, _ = simulated(plan, z, [k])
+        for name, value in made.items():
+            figures[name][k] = value[0]
+        each = life.effects(figures, conditions(plan), z, par, wear)
+        changed = {name: z[name] + float(change[k]) for name, change in each.changes.items()}
+        z = life.between({**z, **changed}, each.readings, par, wear)
+        path.append(z)
+        progress("one by one", (n + 1) / stops)
+    return {name: np.array([each[name] for each in path]) for name in life.states}

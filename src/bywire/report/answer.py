@@ -7,17 +7,14 @@ import json
 import math
 import os
 import sys
-import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from bywire.core.arguments import require_kinds
-from bywire.core.callers import in_callers_words
 from bywire.report.document import Document, FigureBlock, TableBlock
 from bywire.report.result_folder import ResultFolder, result_folder
+from bywire.report.tables import Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,17 +62,17 @@ class Answer(ABC):
         return shown
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """Return the tables of the page as pandas frames, by caption or section."""
-        import pandas as pd
+        """Return the tables of the page as pandas frames, by caption or section.
 
+        Numbers are in the units that ``frame.attrs["units"]`` has by column; a column whose rows
+        differ in them is followed by one that says them.
+        """
         frames: dict[str, pd.DataFrame] = {}
         for section in self.document().page:
             for block in section.blocks:
                 if isinstance(block, TableBlock):
                     name = block.caption.rstrip(".") or section.title
-                    headings = [column.heading for column in block.table.columns]
-                    rows = [[cell.content for cell in row] for row in block.table.rows]
-                    frames.setdefault(name, pd.DataFrame(rows, columns=headings))
+                    frames.setdefault(name, frame_of(block.table))
         return frames
 
     def write(self, folder: str | Path) -> list[Path]:
@@ -102,26 +99,27 @@ class Answer(ABC):
         return fragment_html(self.document(), [f"Warning: {text}." for text in self.warnings])
 
 
-Asked = ParamSpec("Asked")
-Given = TypeVar("Given", bound=Answer)
+def frame_of(table: Table) -> pd.DataFrame:
+    """Return a table as a pandas frame; see `Answer.tables`."""
+    import pandas as pd
 
-
-def use_case(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
-    """Have a function warn of what its answer warns of, so that nothing coarse passes in silence.
-
-    Arguments of another kind than its signature says are refused before it begins. Commands take
-    warnings, notes and failures from the answer, and print each in its place.
-    """
-
-    @wraps(function)
-    def warned(*args: Asked.args, **kwargs: Asked.kwargs) -> Given:
-        require_kinds(function, args, kwargs)
-        answer = function(*args, **kwargs)
-        for text in (*answer.warnings, *answer.notes, *answer.failures):
-            warnings.warn(in_callers_words(text), AnswerWarning, stacklevel=2)
-        return answer
-
-    return warned
+    headings: list[str] = []
+    columns: list[list[object]] = []
+    units: dict[str, str] = {}
+    for k, column in enumerate(table.columns):
+        cells = [row[k] for row in table.rows]
+        headings.append(column.heading)
+        columns.append([cell.content for cell in cells])
+        known = {cell.unit for cell in cells if cell.unit}
+        if len(known) == 1:
+            units[column.heading] = known.pop()
+        elif known:
+            headings.append(f"{column.heading} unit")
+            columns.append([cell.unit for cell in cells])
+    frame = pd.DataFrame(dict(enumerate(columns)))
+    frame.columns = pd.Index(headings)
+    frame.attrs["units"] = units
+    return frame
 
 
 def write_document(document: Document, folder: Path) -> list[Path]:
@@ -163,7 +161,7 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
         if document.record:
             document.facts  # noqa: B018 - made while copies draw
     if document.is_paged:
-        from bywire.report.files import save_figure
+        from bywire.report.drawing import save_figure
         from bywire.report.page import write_page
 
         for block in figures:
@@ -182,7 +180,7 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
 
 
 def _record(document: Document, place: ResultFolder, names: list[str]) -> None:
-    from bywire.report.files import write_bytes
+    from bywire.report.drawing import write_bytes
 
     shown = with_files(document, [place.folder / name for name in names])
     write_bytes(place.scratch / document.record, (json.dumps(shown, indent=2) + "\n").encode())

@@ -17,13 +17,10 @@ from bywire.core.errors import ParameterError
 from bywire.core.registry import Kind, instances
 from bywire.report.bode import Response, bode
 from bywire.report.energy_balance import ledger_bars
-from bywire.report.hysteresis_loop import hysteresis_loop
-from bywire.report.overlaid_traces import overlaid_traces
-from bywire.report.step_marks import StepFacts, step_limits
-from bywire.report.step_response import step_response
-from bywire.report.stribeck_curve import stribeck_curve
+from bywire.report.friction_figures import hysteresis_loop, stribeck_curve
+from bywire.report.overlaid import overlaid_traces
+from bywire.report.step_response import StepFacts, step_limits, step_response, tracking
 from bywire.report.time_traces import time_traces
-from bywire.report.tracking import tracking
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,8 +14,8 @@ from matplotlib.ticker import MultipleLocator, NullFormatter
 from bywire.analysis.loop_curves import LoopCurve
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.line_role import Role
-from bywire.report.sensitivity import MOST_S, MOST_T
+from bywire.report.loop_curves import MOST_S, MOST_T
+from bywire.report.panels import Role
 
 _LOWEST = -60.0  # what is drawn, dB
 _COLORS = (style.GRAY, style.BLUE, style.VERMILLION)

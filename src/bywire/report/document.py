@@ -1,4 +1,4 @@
-"""A result, written once: the blocks that terminal, JSON object, HTML page and files are made of.
+"""A result, written once: the blocks that terminal, JSON, HTML page and files are made of.
 
 A `Document` loads no plotting: its figures are drawn when a page or a file wants them.
 """
@@ -17,7 +17,25 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from bywire.report.picture import Picture
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure that was drawn elsewhere.
+
+    Parameters
+    ----------
+    png, svg
+        Its files.
+    axes
+        Where its axes lie; see `bywire.report.drawing.axes_of`.
+    """
+
+    png: bytes
+    svg: bytes
+    axes: str
+
+
+# --- Blocks
 
 
 @dataclass(frozen=True)
@@ -218,7 +236,7 @@ class Document:
         What a reader must know first: the first words on a terminal and of the JSON object.
     changes
         What the user changed, which a terminal shows first and the JSON object has by name; None
-        where nothing can be. A page has it where its sections put it (`bywire.report.changes`).
+        where nothing can be. A page has it where its sections put it (`bywire.report.subject`).
     """
 
     title: str

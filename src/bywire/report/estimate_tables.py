@@ -10,7 +10,7 @@ from bywire.identification.estimate import Estimate
 from bywire.identification.method import Check, Identified
 from bywire.identification.trust import Trust
 from bywire.identification.unknown import Unknown
-from bywire.report.tables import Cell, Column, Table
+from bywire.report.tables import Cell, Column, Table, amount_cell
 from bywire.report.wording import amount, clean, in_display_unit, unit_text
 
 
@@ -121,7 +121,7 @@ def check_table(checks: Sequence[Check]) -> Table:
         rows.append(
             (
                 Cell(clean(check.name)),
-                Cell(amount(check.value, check.unit)),
+                amount_cell(check.value, check.unit),
                 Cell(limit),
                 verdict,
                 Cell(clean(check.note)),
@@ -144,7 +144,7 @@ def figure_table(identified: Identified) -> Table:
     return Table(
         (Column("result"), Column("value", numeric=True)),
         tuple(
-            (Cell(clean(name)), Cell(amount(value, unit, 5)))
+            (Cell(clean(name)), amount_cell(value, unit, 5))
             for name, (value, unit) in identified.figures.items()
         ),
     )
@@ -159,7 +159,7 @@ def trust_table(trust: Trust) -> Table:
         rows.append(
             (
                 Cell(clean(recovered.label)),
-                Cell(amount(recovered.truth, recovered.unit)),
+                amount_cell(recovered.truth, recovered.unit),
                 Cell(str(recovered.count)),
                 Cell(f"{recovered.bias_in_errors:+.2f}"),
                 Cell(f"{100 * recovered.coverage:.1f} % ({100 * low:.0f} to {100 * high:.0f} %)"),

@@ -1,8 +1,24 @@
-"""Scripts within a page: without what is for those who change them."""
+"""Scripts within a page: what of them it holds, and what its policy says of them."""
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import re
+
+
+def admitted(text: str) -> str:
+    """Return the source expression that admits this very text and no other.
+
+    Examples
+    --------
+    >>> admitted("")
+    "'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='"
+    """
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+# --- Scripts without what is for those who change them
 
 _COMMENT = r"/\*.*?\*/\s*|^//[^\n]*\n|[ \t]+//[^\n]*$"
 _LEFT_OUT = re.compile(rf"{_COMMENT}|^[ \t]+", re.DOTALL | re.MULTILINE)

@@ -13,7 +13,7 @@ from bywire.bench.bench import Bench
 from bywire.bench.result import Result
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.line_role import Role
+from bywire.report.panels import Role
 from bywire.report.readable_axis import scale_of
 from bywire.report.wording import in_display_unit
 

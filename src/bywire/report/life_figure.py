@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.decimation import decimate
-from bywire.report.line_role import Role
+from bywire.report.panels import Role
 from bywire.report.wording import in_display_unit
 
 _HEIGHT = 1.15  # of a panel [inch]

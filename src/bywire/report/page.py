@@ -25,10 +25,8 @@ from bywire.report.document import (
     Section,
     flat_blocks,
 )
-from bywire.report.files import write_bytes
-from bywire.report.inline_figure import inline_figures
-from bywire.report.inline_script import bare
-from bywire.report.policy import admitted
+from bywire.report.drawing import inline_figures, write_bytes
+from bywire.report.inline_script import admitted, bare
 from bywire.report.result_folder import listed
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import clean

@@ -1,20 +1,34 @@
-"""What the panels of stacked time traces show, also where no brake declares them."""
+"""What lines mean and panels show, also where no brake declares them; loads no plotting."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bywire.core.arguments import checked
 from bywire.core.registry import Kind, instances
-from bywire.report.line_role import Role
 from bywire.report.wording import clean
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+class Role(Enum):
+    """What a line means; the same meaning looks the same in every figure."""
+
+    MAIN = "main"
+    SECOND = "second"
+    SET_POINT = "set point"
+    MEASURED = "measured"
+    SIMULATED = "simulated"
+    LIMIT = "limit"
+
+
+# --- Panels
 
 _NO_PANEL = ("E_", "W_", "t_", "noise_")  # beginnings of names: what only accumulates, and noise
 _LINES = 2  # of a panel, set points apart: one look for each

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.rates import STILL, rates
-from bywire.report.tables import Table, text_table
+from bywire.analysis.linear.linear_model import STILL, LinearModel, rates
+from bywire.report.tables import Cell, Table, text_table
 
 _SAME = 1e-9  # of half the sampling frequency
 
@@ -24,11 +23,15 @@ def rate_table(model: LinearModel) -> Table:
         size = abs(s)
         if s.imag < -1e-9 or size < STILL:  # the other of a pair; what does not move
             continue
+        values = (s.real, s.imag, size / 2.0 / np.pi, -s.real / size)
+        units = ("1/s", "rad/s", "Hz", "1")
         figures = [
-            f"{figure:.4g}" for figure in (s.real, s.imag, size / 2.0 / np.pi, -s.real / size)
+            Cell(f"{value:.4g}", value=value, unit=unit)
+            for value, unit in zip(values, units, strict=True)
         ]
         if model.period and abs(s.imag * model.period / np.pi - 1.0) < _SAME:
-            figures[2:] = [f"{model.nyquist:.4g} (f_s/2)", "-"]
+            half = Cell(f"{model.nyquist:.4g} (f_s/2)", value=model.nyquist, unit="Hz")
+            figures[2:] = [half, Cell("-", value=np.nan, unit="1")]
         rows.append(figures)
     heading = ("real [1/s]", "imaginary [rad/s]", "frequency [Hz]", "damping ratio")
     return text_table(heading, rows)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from bywire.core.copies import may_copy, processes
-from bywire.report.picture import Picture
+from bywire.report.document import Picture
 
 if TYPE_CHECKING:
     from bywire.report.document import FigureBlock
@@ -31,7 +31,7 @@ def drawn_side_by_side(blocks: Sequence[FigureBlock]) -> Iterator[None]:
     if len(blocks) <= FEW or cores == 1 or not may_copy():
         yield
         return
-    from bywire.report import files, inline_figure  # noqa: F401 - loaded once, for all copies
+    from bywire.report import drawing  # noqa: F401 - loaded once, for all copies
 
     _blocks[:] = blocks
     with processes(min(cores, len(blocks)), list, is_copied=True) as pool:
@@ -48,8 +48,7 @@ def drawn_side_by_side(blocks: Sequence[FigureBlock]) -> Iterator[None]:
 
 
 def _picture(k: int) -> Picture:
-    from bywire.report.files import figure_bytes
-    from bywire.report.inline_figure import axes_of
+    from bywire.report.drawing import axes_of, figure_bytes
 
     figure = _blocks[k].figure
     png, svg = (figure_bytes(figure, kind) for kind in ("png", "svg"))

@@ -1,30 +1,64 @@
-"""How every figure looks: colors, line styles by meaning, axes, legends.
+"""How every figure looks: colors, line styles by meaning, axes, scales.
 
-Nothing here changes matplotlib's global state, and pyplot is never imported. Matplotlib itself is
-loaded with the first figure that is drawn: it takes half as long as a short command.
+Nothing here changes matplotlib's global state, and pyplot is never imported. Matplotlib itself
+is loaded with the first figure that is drawn: it takes half as long as a short command.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bywire.bench.kpis.smoothing import smoothed
 from bywire.core.quantities import display_unit
 from bywire.core.typing import Array
 from bywire.report.channel import Channel
-from bywire.report.decimation import decimate
-from bywire.report.line_role import Role
-from bywire.report.ripple import inside
-from bywire.report.wording import clean, duration, unit_text
+from bywire.report.decimation import COLUMNS, decimate
+from bywire.report.panels import Role
+from bywire.report.wording import clean, duration, in_display_unit, unit_text
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+
+FASTEST = 3 * COLUMNS
+"""points of a thinned line beyond which most pixel columns hold a whole wave of the ripple"""
+
+
+def is_band(shown: Channel) -> bool:
+    """Return whether a line through all samples fills an area."""
+    kept = len(decimate(shown.time, shown.values)[0])
+    return FASTEST < kept < len(shown.values)
+
+
+def averaging_time(time: Array) -> float:
+    """Return 1, 2 or 5 times a power of ten [s], at least one pixel column wide.
+
+    Examples
+    --------
+    >>> averaging_time(np.array([0.0, 50.0]))
+    0.1
+    """
+    column = float(time[-1] - time[0]) / COLUMNS
+    decade = 10.0 ** math.floor(math.log10(column))
+    return round(next(k * decade for k in (1.0, 2.0, 5.0, 10.0) if k * decade >= column), 12)
+
+
+def inside(shown: Channel) -> tuple[Channel, float] | None:
+    """Return the moving average and its averaging time [s] where a line fills an area."""
+    if not is_band(shown) or not bool(np.all(np.isfinite(shown.values))):
+        return None
+    width = averaging_time(shown.time)
+    return replace(shown, values=smoothed(shown.time, shown.values, width)), width
+
+
+# --- Colors, lines and axes
 
 # Okabe and Ito, "Color universal design", 2008: told apart with any kind of color vision.
 BLUE = "#0072B2"
@@ -255,3 +289,43 @@ def _fitting_columns(labels: Sequence[str]) -> int:
         if ems * TEXT_SIZE / 72.0 <= WIDTH - 0.8:
             return columns
     return 1
+
+
+# --- Colors of lines that belong to values of a varied quantity, and their scale
+
+Color = tuple[float, float, float, float]
+
+_COLORS = "cividis"  # made for any kind of color vision
+_BRIGHTEST = 0.9  # of the color map: what is brighter cannot be seen on white
+
+
+def value_color(values: Sequence[float], k: int) -> Color:
+    """Return the color of one of some values."""
+    low, high = min(values), max(values)
+    share = (values[k] - low) / (high - low) if high > low else 0.0
+    import matplotlib as mpl
+
+    return mpl.colormaps[_COLORS](_BRIGHTEST * share)
+
+
+def value_scale(
+    figure: Figure, panels: list[Axes], name: str, unit: str, values: Sequence[float]
+) -> None:
+    """Put the scale of a varied quantity beside the panels.
+
+    Parameters
+    ----------
+    name, unit, values
+        Quantity, its SI unit and its values.
+    """
+    import matplotlib as mpl
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
+
+    low, high = in_display_unit(np.array([min(values), max(values)]), unit)[0]
+    colors = mpl.colormaps[_COLORS].resampled(256)
+    shown = ListedColormap(colors(np.linspace(0.0, _BRIGHTEST, 256)))
+    norm = Normalize(low, high)
+    bar = figure.colorbar(ScalarMappable(norm, shown), ax=panels, aspect=40, pad=0.02)
+    bar.ax.tick_params(labelsize=TEXT_SIZE)
+    bar.set_label(axis_label(name, unit), fontsize=TEXT_SIZE)

@@ -1,17 +1,221 @@
-"""What an analysis is made of, and the sections that every report of one has."""
+"""What an analysis is made of: parameters, what a user changed, sections of every report."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
 
 from bywire.bench.bench import Bench
+from bywire.bench.bench_file import flattened
+from bywire.bench.bench_source import experiment_of
+from bywire.bench.option_names import OPTION
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.parameters import ParameterSet
-from bywire.report.changes import bench_changes, changes_block, set_changes
+from bywire.core.errors import InputError
+from bywire.core.field_notes import field_notes
+from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.provenance import Cited
 from bywire.report.document import Change, Details, Paragraph, Section, TableBlock
-from bywire.report.parameter_rows import parameter_rows
-from bywire.report.tables import parameter_table
+from bywire.report.tables import ParameterRow, parameter_table, text_table, value_text
+from bywire.report.wording import range_text
+
+OVERRIDDEN = "override"
+"""provenance of a value that differs from the cited one"""
+
+
+def parameter_rows(
+    parameters: ParameterSet, provenance: Mapping[str, Cited] | None = None
+) -> list[ParameterRow]:
+    """Return one row per value of a parameter set, in its order.
+
+    Parameters
+    ----------
+    parameters
+        Values as they were used.
+    provenance
+        Cited values by dotted name; a value that differs from its citation is marked as an
+        override and the cited one is named.
+    """
+    leaves = leaf_fields(type(parameters))
+    notes = field_notes(type(parameters))
+    rows = []
+    for name, value in parameters.flat().items():
+        leaf = leaves.get(name)
+        kind, where = _origin((provenance or {}).get(name), value)
+        rows.append(
+            ParameterRow(
+                name=name,
+                value=value,
+                unit="1" if leaf is None else leaf.unit.symbol,
+                range=notes[name] if leaf is None else range_text(leaf),
+                kind=kind,
+                where=where,
+            )
+        )
+    return rows
+
+
+def _origin(cited: Cited | None, value: object) -> tuple[str, str]:
+    """Return kind and place of a value."""
+    if cited is None:
+        return "", ""
+    if cited.value != value:
+        origin = ", ".join(filter(None, (cited.kind, cited.where)))
+        return OVERRIDDEN, f"cited: {cited.value} in SI ({origin})"
+    return cited.kind, cited.where
+
+
+# --- Changes: of a parameter set, of an experiment's options and stimulus, of the run
+
+_OWN = "the experiment's own"
+_UNSET = "not set"
+_SIMULATION = {"step": "s", "record": "s", "seed": "1", "engine": "1"}
+"""unit of each setting of a run, by its name in [simulation]"""
+
+
+def bench_changes(bench: Bench) -> tuple[Change, ...]:
+    """Return everything that a bench sets to something else than its source and its experiment."""
+    return (
+        *set_changes(bench.parameters, bench.par),
+        *_assembly_change(bench),
+        *_option_changes(bench),
+        *_stimulus_changes(bench),
+        *_simulation_changes(bench),
+    )
+
+
+def set_changes(parameters: str, par: ParameterSet) -> tuple[Change, ...]:
+    """Return the values that differ from those of a parameter set, in its order."""
+    cited = PARAMETER_SETS.find(parameters)
+    origins = {name: _origin_of(each) for name, each in cited.values.items()}
+    return value_changes(par, cited.parameters().flat(), parameters, origins=origins)
+
+
+def value_changes(
+    now: ParameterSet,
+    before: Mapping[str, object],
+    of: str,
+    prefix: str = "",
+    origins: Mapping[str, str] | None = None,
+) -> tuple[Change, ...]:
+    """Return the values that differ from others.
+
+    Parameters
+    ----------
+    now
+        The values in use.
+    before
+        What they would be, by name.
+    of
+        What these belong to, as `Change` has it.
+    prefix
+        What stands before the names.
+    origins
+        Where the values before come from, by name; nothing by default.
+    """
+    leaves, values = leaf_fields(type(now)), now.flat()
+    units = {name: leaves[name].unit.symbol if name in leaves else "1" for name in values}
+    return tuple(
+        Change(
+            prefix + name,
+            value_text(value, units[name]),
+            value_text(before.get(name), units[name]),
+            of,
+            (origins or {}).get(name, ""),
+        )
+        for name, value in values.items()
+        if value != before.get(name)
+    )
+
+
+def defaults_of(name: str) -> str:
+    """Return what the default values of an experiment, or of a study, are called."""
+    return f"the defaults of {name}"
+
+
+def changes_block(
+    changes: Sequence[Change], parameters: str, defaults: str = "", varied: Sequence[str] = ()
+) -> TableBlock | Paragraph:
+    """Return a table of changes, or that there are none.
+
+    Parameters
+    ----------
+    changes
+        What was changed.
+    parameters
+        Name of the parameter set; empty where there is none.
+    defaults
+        Name of the experiment or study whose options are in use; empty where there are none.
+    varied
+        Quantities that take several values.
+    """
+    if changes:
+        rows = [(each.name, each.now, each.before, each.where or each.of) for each in changes]
+        heads = ("changed", "value", "instead of", "source")
+        return TableBlock(text_table(heads, rows), "What was changed.")
+    unchanged = ", ".join(
+        filter(
+            None,
+            [
+                f"all parameters are those of {parameters}" if parameters else "",
+                f"all options are those of {defaults}" if defaults else "",
+            ],
+        )
+    )
+    if varied:
+        return Paragraph(f"Only {', '.join(varied)} varied; apart from that, {unchanged}.")
+    return Paragraph(f"Nothing was changed: {unchanged}.")
+
+
+def _assembly_change(bench: Bench) -> Iterator[Change]:
+    if bench.assembly:
+        own = PARAMETER_SETS.find(bench.parameters).assembly
+        yield Change("assembly", bench.assembly, own, bench.parameters, "the model of the set")
+
+
+def _option_changes(bench: Bench) -> Iterator[Change]:
+    """Yield the options that are not what they would be without being set."""
+    chosen = bench.definition
+    following = {} if chosen.following is None else chosen.following(bench.par)
+    defaults = chosen.defaults.replace(following).flat()
+    of = defaults_of(chosen.name)
+    yield from value_changes(bench.chosen_options, defaults, of, OPTION)
+    for name, value in bench.options.items():
+        if isinstance(value, str) and value == defaults.get(name):  # it may name a signal
+            before = _unset(bench, name)
+            if before != value:
+                yield Change(OPTION + name, value, before, of)
+
+
+def _unset(bench: Bench, option: str) -> str:
+    """Return what an option that names a signal would be if it alone were not set."""
+    others = {name: value for name, value in bench.options.items() if name != option}
+    try:
+        unset = experiment_of(bench.experiment, bench.parameters, bench.assembly, others)
+    except InputError:
+        return _UNSET
+    return str(unset.defaults.flat().get(option, _UNSET))
+
+
+def _stimulus_changes(bench: Bench) -> Iterator[Change]:
+    for name, value in flattened(bench.stimulus).items():
+        yield Change(f"stimulus.{name}", str(value), _OWN, defaults_of(bench.experiment))
+
+
+def _simulation_changes(bench: Bench) -> Iterator[Change]:
+    defaults = {each.name: each.default for each in fields(Bench)}
+    for name, unit in _SIMULATION.items():
+        value, before = getattr(bench, name), defaults[name]
+        if value != before:
+            text = _OWN if before is None else value_text(before, unit)
+            now = value_text(value, unit)
+            yield Change(f"simulation.{name}", now, text, defaults_of("runs"))
+
+
+def _origin_of(cited: Cited) -> str:
+    return ", ".join(filter(None, (cited.kind, cited.where)))
+
+
+# --- Subjects
 
 
 @dataclass(frozen=True)

@@ -21,18 +21,31 @@ class Cell:
     Parameters
     ----------
     value
-        Number, in the unit that the text says, or whatever else a table of data wants; the text
-        where there is none.
+        Number, or whatever else a table of data wants; the text where there is none.
+    unit
+        Unit of a number, SI unless the text says another one; ``"1"`` of a pure number.
     """
 
     text: str
     verdict: Verdict = "none"
     value: object = None
+    unit: str = ""
 
     @property
     def content(self) -> object:
         """What a table of data holds."""
         return self.text if self.value is None else self.value
+
+
+def amount_cell(value: float | None, unit: str, digits: int = 4) -> Cell:
+    """Return the cell of a number in an SI unit; NaN stands for none."""
+    return Cell(amount(value, unit, digits), value=math.nan if value is None else value, unit=unit)
+
+
+def measured_cell(value: float | None, unit: str, error: float, digits: int = 4) -> Cell:
+    """Return the cell of a number in the digits that its error leaves; see `amount_cell`."""
+    text = measured_amount(value, unit, error, digits)
+    return Cell(text, value=math.nan if value is None else value, unit=unit)
 
 
 @dataclass(frozen=True)
@@ -165,8 +178,8 @@ def kpi_table(rows: Iterable[KpiRow]) -> Table:
         tuple(
             (
                 Cell(clean(row.name)),
-                Cell(measured_amount(row.value, row.unit, row.error)),
-                *((Cell(error_text(row.value, row.unit, row.error, row.converges)),) * estimated),
+                measured_cell(row.value, row.unit, row.error),
+                *((_error_cell(row),) * estimated),
                 *((Cell(clean(row.limit) or "-"), OUTCOMES[row.outcome]) * limited),
                 *((Cell(clean(row.stated) or "-"),) * stated),
                 *((Cell(clean(row.where) or "-"),) * placed),
@@ -175,6 +188,11 @@ def kpi_table(rows: Iterable[KpiRow]) -> Table:
             for row in listed
         ),
     )
+
+
+def _error_cell(row: KpiRow) -> Cell:
+    text = error_text(row.value, row.unit, row.error, row.converges)
+    return Cell(text, value=row.error, unit=row.unit)
 
 
 def reproduction_table(rows: Iterable[ReproductionRow]) -> Table:
@@ -194,7 +212,7 @@ def reproduction_table(rows: Iterable[ReproductionRow]) -> Table:
                 Cell(clean(row.id)),
                 Cell(clean(row.kind)),
                 Cell(_stated(row)),
-                Cell(amount(row.computed, row.unit)),
+                amount_cell(row.computed, row.unit),
                 Cell(_tolerance(row)),
                 _judged(row.agrees, "yes", "no"),
                 Cell(clean(row.note)),
@@ -219,7 +237,7 @@ def verdict_table(rows: Iterable[ReproductionRow]) -> Table:
                 Cell(clean(row.id)),
                 Cell(clean(row.kind)),
                 Cell(_stated(row)),
-                Cell(amount(row.computed, row.unit)),
+                amount_cell(row.computed, row.unit),
                 _judged(row.agrees, "agrees", "disagrees"),
             )
             for row in rows
@@ -251,11 +269,11 @@ def parameter_table(rows: Iterable[ParameterRow]) -> Table:
 
 
 def text_table(heading: Sequence[str], rows: Iterable[Sequence[object]]) -> Table:
-    """Return a table of plain text."""
-    return Table(
-        tuple(Column(clean(name)) for name in heading),
-        tuple(tuple(Cell(clean(cell)) for cell in row) for row in rows),
+    """Return a table of plain text, and of cells that there are already."""
+    cells = (
+        (each if isinstance(each, Cell) else Cell(clean(each)) for each in row) for row in rows
     )
+    return Table(tuple(Column(clean(name)) for name in heading), tuple(map(tuple, cells)))
 
 
 OUTCOMES: dict[str, Cell] = {

@@ -3,33 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
-from bywire.bench.bench_text import PATHS
+from bywire.bench.bench_file import PATHS
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.pairs import changes, named, read_count
 from bywire.server.contents import Contents
 from bywire.server.place import Place, require_inside
+from bywire.usecases.declare import Kind
 
 _LONGEST = 20_000  # characters of a field
-
-Kind = Literal[
-    "text",
-    "whole",
-    "lines",
-    "pairs",
-    "changes",
-    "names",
-    "flag",
-    "choice",
-    "file",
-    "files",
-    "thing",
-    "things",
-]
-Fits = Callable[[Mapping[str, Any], Place], object]
 
 
 @dataclass(frozen=True)
@@ -57,9 +42,6 @@ class Field:
         Of a whole number that is left out, and of a flag.
     least
         Of a whole number.
-    fits
-        Raises `InputError` where what was asked does not fit what is asked in fields before it.
-        Called where the field is filled in.
     """
 
     name: str
@@ -71,7 +53,6 @@ class Field:
     is_required: bool = False
     default: int | None = None
     least: int = 0
-    fits: Fits | None = None
 
     def read(self, given: Any, place: Place) -> Any:
         """Return what a form gave, checked; paths as they stand in the folder.

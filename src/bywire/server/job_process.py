@@ -81,7 +81,7 @@ def _compute(order: Mapping[str, Any]) -> None:
     from bywire.core.callers import command_line
     from bywire.core.unneeded import silence_matplotlib
     from bywire.report.answer import AnswerWarning, load_matplotlib, write_document
-    from bywire.server.task_registry import tasks
+    from bywire.server.task import tasks
 
     silence_matplotlib()
     load_matplotlib()
@@ -94,7 +94,7 @@ def _compute(order: Mapping[str, Any]) -> None:
         if getattr(answer, "status", "") == "interrupted":
             raise KeyboardInterrupt
         document = answer.document()
-        files = [] if task.is_file else write_document(document, out)
+        files = [] if task.form.is_file else write_document(document, out)
         others = [str(w.message) for w in caught if not issubclass(w.category, AnswerWarning)]
         said = [*others, *answer.warnings, *answer.notes, *answer.failures, *document.remarks]
         tell(

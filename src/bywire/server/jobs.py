@@ -59,14 +59,14 @@ class Job:
 
     def shown(self, place: Place) -> dict[str, Any]:
         """Return what pages are told of it."""
-        is_inside = not self.task.is_file
+        is_inside = not self.task.form.is_file
         page = "report.html" if self.reports else ""
         page = str(self.result.get("page", page))
         label, share = self.progress
         return {
             "number": self.number,
             "task": self.task.name,
-            "title": self.task.title,
+            "title": self.task.form.title,
             "subject": self.task.said_of(self.asked),
             "state": self.state,
             "label": label,
@@ -113,7 +113,7 @@ class Jobs:
             if len(active) >= MOST:
                 raise RefusedError(429, f"{MOST} jobs wait already: cancel some, or wait")
             same = [each.out for each in active if each.task is task and each.asked == asked]
-            out = out or (same[0] if task.begun and same else self._folder(task, asked))
+            out = out or (same[0] if task.case.holds and same else self._folder(task, asked))
             if any(each.out == out for each in active):
                 raise RefusedError(
                     409, f"{task.said_of(asked)} is being computed: wait, or cancel it"
@@ -130,8 +130,6 @@ class Jobs:
 
     def begun(self, task: Task, asked: Mapping[str, Any]) -> Path | None:
         """Return the folder that holds what is asked already, to go on in it; None for none."""
-        if task.begun is None:
-            return None
         return task.begun(asked, self._place, self._place.folders(_name(task, asked)))
 
     def all(self) -> list[Job]:
@@ -175,13 +173,13 @@ class Jobs:
             job.ended.wait(2.0 * _PATIENCE)
 
     def _folder(self, task: Task, asked: Mapping[str, Any]) -> Path:
-        if task.is_kept:
+        if task.form.is_kept:
             return self._place.same_folder(task.said_of(asked))
         return self._place.fresh_folder(_name(task, asked))
 
     def _run(self, job: Job) -> None:
         # A page that somebody waits for is made at once: two studies would hold it up for hours.
-        with nullcontext() if job.task.is_file else self._turn:
+        with nullcontext() if job.task.form.is_file else self._turn:
             try:
                 self._compute(job)
             except OSError as error:
@@ -250,6 +248,6 @@ def _end(job: Job, last: Mapping[str, Any], status: int) -> None:
         how = f"signal {signal.Signals(-status).name}" if status < 0 else f"status {status}"
         job.message, job.state = (
             f"its process ended by {how}, perhaps for want of memory: ask for less, or run the "
-            f"command 'bywire {job.task.command or job.task.name}' in a terminal",
+            f"command 'bywire {job.task.command}' in a terminal",
             "failed",
         )

@@ -14,7 +14,7 @@ from bywire.server.field import is_file_name
 from bywire.server.jobs import Job, Jobs
 from bywire.server.place import Place
 from bywire.server.refusal import RefusedError
-from bywire.server.task_registry import tasks
+from bywire.server.task import tasks
 
 
 class LivePages:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from glob import escape
 from pathlib import Path, PurePosixPath
 
+from bywire.core.callers import is_command_line
 from bywire.core.errors import FileError
 from bywire.core.scratch import claim
 from bywire.server.refusal import RefusedError
@@ -211,7 +212,10 @@ def place_of(folder: Path) -> Place:
         When it is no folder.
     """
     if not folder.is_dir():
-        raise FileError(f"{folder} is no folder: name the one to serve with --folder")
+        raise FileError(
+            f"{folder} is no folder: name the one to serve with "
+            f"{'--folder' if is_command_line() else 'folder'}"
+        )
     return Place(folder.resolve())
 
 

@@ -22,7 +22,7 @@ from bywire.server.refusal import RefusedError
 from bywire.server.service import Service
 from bywire.server.shown_bench import shown_bench
 from bywire.server.studies import how_far
-from bywire.server.task_registry import tasks
+from bywire.server.task import tasks
 from bywire.server.uploads import uploaded
 
 Route = Callable[[Service, Request, str], Reply]
@@ -90,7 +90,7 @@ def _live(service: Service, request: Request, rest: str) -> Reply:
 
 
 def _task(service: Service, request: Request, rest: str) -> Reply:
-    known = [each.name for each in tasks().values() if each.summary]
+    known = [each.name for each in tasks().values() if each.form.is_listed]
     if rest not in known:
         raise RefusedError(404, f"there is no task {quoted(rest)}: known are {', '.join(known)}")
     with service.reading:
@@ -141,7 +141,7 @@ def _begin(service: Service, request: Request, rest: str) -> Reply:
     del rest
     said = request.form()
     name, form = said.get("task"), said.get("form")
-    known = [each.name for each in tasks().values() if not each.is_file]
+    known = [each.name for each in tasks().values() if not each.form.is_file]
     if not isinstance(name, str) or name not in known:
         raise unknown_name("task", str(name), known)
     if not isinstance(form, dict):

@@ -14,6 +14,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from bywire.core.arguments import checked
+from bywire.core.callers import is_command_line
 from bywire.core.errors import FileError, ParameterError, unknown_name
 from bywire.server.address import HERE, PORT
 from bywire.server.field import is_file_name
@@ -76,7 +77,7 @@ def opened(
     """
     place, bench = _asked(str(subject), str(folder))
     if not 0 <= port < 65536:
-        raise ParameterError(f"--port {port} is not admissible: it must be 0 to 65535")
+        raise ParameterError(f"{_flag('port')} {port} is not admissible: it must be 0 to 65535")
     try:
         handler = type("FolderHandler", (Handler,), {})
         server = _Server((HERE, port), handler)
@@ -92,7 +93,7 @@ def opened(
         except OSError as error:
             raise FileError(
                 f"{place.root}: {error.strerror or error}: name a folder that you may write to "
-                "with --folder, and make room there"
+                f"with {_flag('folder')}, and make room there"
             ) from None
 
 
@@ -164,8 +165,8 @@ def _asked(subject: str, folder: str) -> tuple[Place, str]:
     if subject and Path(subject).is_dir():
         if folder and Path(folder).resolve() != Path(subject).resolve():
             raise ParameterError(
-                f"{subject} and --folder {folder} are two folders, and but one is served, with all "
-                f"below it: bywire serve {subject}, or bywire serve {folder}"
+                f"{subject} and {_flag('folder')} {folder} are two folders, and but one is "
+                f"served, with all below it: bywire serve {subject}, or bywire serve {folder}"
             )
         return place_of(Path(subject)), ""
     if not is_file_name(subject):
@@ -177,14 +178,22 @@ def _asked(subject: str, folder: str) -> tuple[Place, str]:
         raise FileError(f"{subject} is no file: name a bench file, an experiment or a folder")
     place = place_of(Path(folder) if folder else file.parent)
     if not file.is_relative_to(place.root):
-        raise FileError(f"{subject} is not in {place.root}: name the folder of both with --folder")
+        raise FileError(
+            f"{subject} is not in {place.root}: name the folder of both with {_flag('folder')}"
+        )
     return place, place.named(file)
+
+
+def _flag(argument: str) -> str:
+    return f"--{argument}" if is_command_line() else argument
 
 
 def _taken(port: int, error: OSError) -> ParameterError:
     if error.errno == errno.EADDRINUSE:
         return ParameterError(
             f"port {port} is taken, perhaps by another 'bywire serve': use the link that it "
-            "printed, or --port 0 for any free one"
+            f"printed, or {_flag('port')} 0 for any free one"
         )
-    return ParameterError(f"port {port}: {error.strerror or error}: try --port 0 for any free one")
+    return ParameterError(
+        f"port {port}: {error.strerror or error}: try {_flag('port')} 0 for any free one"
+    )

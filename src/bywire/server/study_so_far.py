@@ -2,16 +2,60 @@
 
 from __future__ import annotations
 
+import math
+import time
+import warnings
 from collections.abc import Iterator
-from typing import Any
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from bywire.core.errors import BywireError
+from bywire.core.typing import Progress
+from bywire.server.contents import REPORT
+from bywire.server.telling import tell
 
-from bywire.api.study_tables import figure_text, percent
-from bywire.studies.findings import Findings
+if TYPE_CHECKING:
+    from bywire.studies.findings import Findings
 
+_ESTIMATE, _REPORT = 1.0, 5.0  # s of computing between two of each at least
+_SHARE = 5.0  # and this many times what one took
 _BINS = 30
 _MOST = 4  # figures of a study without requirements
+
+
+class StudyProgress:
+    """Tells what a study shows so far, now and then: between its chunks, which go on after it."""
+
+    def __init__(self, folder: Path, progress: Progress) -> None:
+        self._folder, self._progress = folder, progress
+        self._pauses = {self._estimate: _ESTIMATE, self._report: _REPORT}
+        self._next = dict.fromkeys(self._pauses, -math.inf)  # the first chunk is shown at once
+
+    def __call__(self, label: str, share: float) -> None:
+        """Be the progress of the study."""
+        self._progress(label, share)
+        for tell_it, pause in self._pauses.items():
+            begin = time.monotonic()
+            if 0.0 < share < 1.0 and begin > self._next[tell_it]:
+                with warnings.catch_warnings(), suppress(BywireError):  # too few cases yet: the
+                    warnings.simplefilter("ignore")  # last report says what is wrong
+                    tell_it()
+                end = time.monotonic()
+                self._next[tell_it] = end + max(pause, _SHARE * (end - begin))
+                self._progress(label, share)
+
+    def _estimate(self) -> None:
+        from bywire.api.run_study import kept_study
+
+        tell(so_far=so_far(kept_study(self._folder).findings))
+
+    def _report(self) -> None:
+        from bywire.usecases.study_report import study_report
+
+        written = study_report(self._folder).write(self._folder)
+        if any(path.suffix == REPORT for path in written):
+            tell(report=True)
 
 
 def so_far(findings: Findings) -> list[dict[str, Any]]:
@@ -38,6 +82,8 @@ def so_far(findings: Findings) -> list[dict[str, Any]]:
 
 
 def _judged(findings: Findings) -> Iterator[tuple[str, str]]:
+    from bywire.api.study_tables import percent
+
     confidence = f"{100.0 * findings.plan.confidence:g} %"
     for each in findings.judgments:
         share = each.share
@@ -52,6 +98,8 @@ def _judged(findings: Findings) -> Iterator[tuple[str, str]]:
 
 
 def _spread(findings: Findings) -> Iterator[tuple[str, str]]:
+    from bywire.api.study_tables import figure_text
+
     for each in findings.spreads[:_MOST]:
         mean = figure_text(findings, each.name, each.mean)
         sd = figure_text(findings, each.name, each.sd, is_difference=True)
@@ -59,6 +107,10 @@ def _spread(findings: Findings) -> Iterator[tuple[str, str]]:
 
 
 def _bars(findings: Findings, name: str) -> dict[str, Any]:
+    import numpy as np
+
+    from bywire.api.study_tables import figure_text
+
     values = findings.figure(name)
     known = values[np.isfinite(values)]
     if not known.size:

@@ -1,4 +1,4 @@
-"""What can be computed from a page: fields that a form has, and the public function they go to."""
+"""What can be computed from a page: every use case with a form."""
 
 from __future__ import annotations
 
@@ -6,58 +6,48 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+from bywire.bench.bench_file import PATHS
 from bywire.core.errors import InputError, unknown_name
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.server.field import Field
+from bywire.server.contents import Contents
+from bywire.server.field import Field, is_file_name
 from bywire.server.place import Place, shortened
 from bywire.server.refusal import RefusedError
+from bywire.server.study_so_far import StudyProgress
+from bywire.usecases import use_cases
+from bywire.usecases.declare import Argument, Form, UseCase
 
 
 @dataclass(frozen=True)
 class Task:
-    """Something that is computed in a process of its own.
+    """A use case as pages ask for it, computed in a process of its own.
 
     Parameters
     ----------
-    name
-        By which forms and results call it.
-    title, action
-        Heading of its form, and what its button says.
+    case, form
+        The use case, and its form as declared.
     fields
-        Of its form.
-    compute
-        ``compute(asked, out, progress)``: calls the public function. ``out`` is the folder in
-        which the result is written.
-    subject
-        Field whose value the result's folder is named after.
-    summary
-        What it does, in a line: with one, it has a page of its own that the start page leads to.
-    command
-        What the same is called in a terminal, behind ``bywire``; its name by default.
-    is_kept
-        Whether the same subject goes on in the same folder.
-    begun
-        ``begun(asked, place, folders)``: returns which of the folders of its subject holds what is
-        asked, unfinished perhaps: then it is gone on with; None for none.
-    is_file
-        Whether ``out`` is a file that the task itself writes.
+        Of the form, in their order.
     """
 
-    name: str
-    title: str
-    action: str
+    case: UseCase
+    form: Form
     fields: tuple[Field, ...]
-    compute: Callable[[Mapping[str, Any], Path, Progress], Answer]
-    subject: str = "bench"
-    summary: str = ""
-    command: str = ""
-    is_kept: bool = False
-    begun: Callable[[Mapping[str, Any], Place, Sequence[Path]], Path | None] | None = None
-    is_file: bool = False
+
+    @property
+    def name(self) -> str:
+        """By which forms and results call it."""
+        return self.form.name or self.command
+
+    @property
+    def command(self) -> str:
+        """What is typed behind ``bywire`` for the same."""
+        return self.case.commands[0].words
 
     def read(self, form: Mapping[str, Any], place: Place) -> dict[str, Any]:
         """Return what a form gave, checked.
@@ -76,34 +66,163 @@ class Task:
                 raise unknown_name(f"field of {self.name!r}", name, known)
         asked: dict[str, Any] = {}
         for field in self.fields:
-            with _beside(field, place):
+            with _beside(field.name, place):
                 asked[field.name] = field.read(form.get(field.name), place)
-        for field in self.fields:
-            if field.fits is not None and asked[field.name]:
-                with _beside(field, place):
-                    field.fits(asked, place)
+        self._require_fitting(self._from_anywhere(asked, place), place)
         return asked
+
+    def compute(self, asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
+        """Call the function; ``out`` is the folder, or file, of the result."""
+        shown = StudyProgress(out, progress) if self.form.is_kept else progress
+        answer: Answer = self.case.call(self._filled_in(asked), out=out, progress=shown)
+        return answer
+
+    def begun(self, asked: Mapping[str, Any], place: Place, folders: Sequence[Path]) -> Path | None:
+        """Return which folder holds what is asked, unfinished perhaps, to continue there."""
+        if self.case.holds is None:
+            return None
+        read = self.case.read(self._from_anywhere(asked, place))
+        return next((each for each in folders if self.case.holds(each, read)), None)
 
     def said_of(self, asked: Mapping[str, Any]) -> str:
         """Return what lists of jobs call it by."""
-        subject = asked[self.subject]
+        subject = asked[self.form.subject]
         return ", ".join(subject) if isinstance(subject, list) else str(subject)
 
     def stem(self, asked: Mapping[str, Any]) -> str:
         """Return what the folder of its result is called by."""
-        subject = asked[self.subject]
+        subject = asked[self.form.subject]
         if isinstance(subject, list):
             return shortened("-".join(Path(each).stem for each in subject))
         return shortened(Path(str(subject)).stem)
 
+    def _arguments(self) -> list[Argument]:
+        """Return the arguments behind the fields."""
+        known = {argument.name: argument for argument in self.case.arguments}
+        return [known[field.name] for field in self.fields]
+
+    def _filled_in(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what was filled in: a field that is empty stands for the default."""
+        filled = {name: value for name, value in asked.items() if value not in ("", None, [], {})}
+        for each in self._arguments():
+            if each.ask.ticked and filled.pop(each.name, False):
+                filled[each.name] = each.ask.ticked
+        return filled
+
+    def _from_anywhere(self, asked: Mapping[str, Any], place: Place) -> dict[str, Any]:
+        """Return what was filled in, with files as they are found from any working folder."""
+        found = self._filled_in(asked)
+        for each in self._arguments():
+            value = found.get(each.name)
+            if value is None:
+                continue
+            if each.kind == "changes":
+                found[each.name] = {
+                    key: str(place.root / text) if key.rpartition(".")[2] in PATHS else text
+                    for key, text in value.items()
+                }
+            elif each.kind == "thing":
+                found[each.name] = _path_of(value, place)
+            elif each.kind == "things":
+                found[each.name] = [_run_of(name, place) for name in value]
+        return found
+
+    def _require_fitting(self, given: Mapping[str, Any], place: Place) -> None:
+        """Refuse what the use case refuses, beside the field that the error is about.
+
+        That is the first field up to which, with all behind it left out, the error is the same.
+        """
+        try:
+            self.case.read(given)
+        except InputError as error:
+            filled = [field.name for field in self.fields if field.name in given]
+            required = [field.name for field in self.fields if field.is_required]
+            for count, name in enumerate(filled, 1):
+                kept = {n: given[n] for n in given if n in required or n in filled[:count]}
+                if count == len(filled) or self._error_of(kept) == str(error):
+                    with _beside(name, place):
+                        raise
+
+    def _error_of(self, given: Mapping[str, Any]) -> str:
+        try:
+            self.case.read(given)
+        except InputError as error:
+            return str(error)
+        return ""
+
+
+@cache
+def tasks() -> Mapping[str, Task]:
+    """Return every task by its name."""
+    found = [_task_of(case, case.form) for case in use_cases().values() if case.form is not None]
+    return {task.name: task for task in sorted(found, key=lambda task: task.name)}
+
+
+def _task_of(case: UseCase, form: Form) -> Task:
+    labeled = {a.name: a for a in case.arguments if a.ask.label}
+    return Task(case, form, tuple(_field(labeled[name]) for name in form.fields or labeled))
+
+
+def _field(argument: Argument) -> Field:
+    ask, default = argument.ask, argument.default
+    kind = "flag" if ask.ticked else argument.kind
+
+    def offered(there: Contents) -> Sequence[str]:
+        return [name for part in ask.offered for name in getattr(there, part)]
+
+    return Field(
+        argument.name,
+        ask.label,
+        kind,
+        "" if ask.ticked else ask.help,
+        _words_of(argument),
+        offered if ask.offered else None,
+        is_required=argument.is_required or argument.is_many,
+        default=int(default) if isinstance(default, int) and (default or kind == "whole") else None,
+        least=ask.least or 0,
+    )
+
+
+def _words_of(argument: Argument) -> Callable[[], Sequence[str]] | None:
+    """Return what tells all that is known by name."""
+    words, kinds = argument.ask.words, argument.ask.known
+    if kinds:
+        return lambda: _names(*kinds)
+    if not words:
+        return None
+    return words if callable(words) else lambda: words
+
+
+def _names(*kinds: str) -> list[str]:
+    from bywire.api.overview import overview
+
+    things = overview().things
+    return sorted({name for kind in kinds for name in things[kind]})
+
+
+def _path_of(name: str, place: Place) -> Path:
+    """Return where a file of the folder is, from anywhere; other names stay."""
+    return place.root / name if is_file_name(name) else Path(name)
+
+
+def _run_of(name: str, place: Place) -> Path:
+    """Return where a run is; a result goes before an experiment of its name."""
+    from bywire.bench.bench_source import names_experiment
+    from bywire.bench.result_folder import is_result_folder
+
+    path = place.root / name
+    if path.is_dir() and (is_result_folder(path) or not names_experiment(name)):
+        return path
+    return _path_of(name, place)
+
 
 @contextmanager
-def _beside(field: Field, place: Place) -> Iterator[None]:
+def _beside(field: str, place: Place) -> Iterator[None]:
     """Have what is refused say which field it stands beside, with paths as the folder has them."""
     try:
         yield
     except RefusedError as refused:
-        raise RefusedError(refused.status, refused.text, field.name) from None
+        raise RefusedError(refused.status, refused.text, field) from None
     except InputError as error:
         said = str(error).replace(f"{place.root}{os.sep}", "")
-        raise RefusedError(422, said, field.name) from None
+        raise RefusedError(422, said, field) from None

@@ -1,13 +1,19 @@
-"""Unilateral contacts: forces of a group as a small linear complementarity problem."""
+"""Unilateral contacts: which are closed, their forces as a small complementarity problem."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from itertools import combinations
 from typing import Any
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
-from bywire.simulation.symbols import SX
+from bywire.core.errors import SolverError
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet
+from bywire.simulation.symbols import SX, column, depends, nonlinear, scalars, symbol_tuple
 
 
 def active_stiffness(C: Any, d: Any) -> Any:
@@ -76,3 +82,178 @@ def _largest(cases: list[tuple[Any, Any]]) -> Any:
         best = ca.if_else(better, value, best)
         best_slack = ca.fmax(slack, best_slack)
     return best
+
+
+# --- The contacts of a model: overlaps, stiffness of those that are closed, whether they fit
+
+
+def contact_forces(model: Model, par: ParameterSet, x: Any) -> Any:
+    """Return the forces of all contacts at an instant: what is recorded, not what acts in a step.
+
+    Those of a substep belong to its middle; recorded as they are, they would be half a substep old.
+    """
+    overlap = gaps(model, par, x, x)
+    return stiffness(model, par, overlap, exact=True) @ overlap
+
+
+def _groups(model: Model, par: ParameterSet, exact: bool) -> list[tuple[Any, slice, bool]]:
+    """Return compliances, place among all contacts, and whether the pass takes them as open."""
+    matrices, groups, at = model.compliance(par), [], 0
+    rarely = model.usually_open or (False,) * len(matrices)
+    for C, rare in zip(matrices, rarely, strict=True):
+        if not C:
+            continue
+        rows = SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C)))
+        groups.append((rows, slice(at, at + len(C)), rare and not exact))
+        at += len(C)
+    return groups
+
+
+def stiffness(model: Model, par: ParameterSet, d: Any, exact: bool) -> Any:
+    """Return the block-diagonal stiffness of the active subsets of all groups, shape (n, n).
+
+    Parameters
+    ----------
+    d
+        Overlaps of all n contacts, shape (n,).
+    exact
+        False: contacts that are usually open are taken as open.
+    """
+    blocks = [
+        SX(*rows.shape) if is_open else active_stiffness(rows, d[place])
+        for rows, place, is_open in _groups(model, par, exact)
+    ]
+    return ca.diagcat(*blocks) if blocks else SX(0, 0)
+
+
+def gaps(model: Model, par: ParameterSet, x: Any, xe: Any) -> Any:
+    """Return all overlaps at a state, see `overlaps`."""
+    return overlaps(model, par)(x, xe)
+
+
+def overlaps(model: Model, par: ParameterSet) -> Callable[[Any, Any], Any]:
+    """Return all overlaps as affine functions of x whose coefficients can be hoisted.
+
+    Returns
+    -------
+    callable
+        Of the state and of where geometry is taken, shape (nx,) each; gives shape (n,).
+
+    Raises
+    ------
+    SolverError
+        When they are not affine in the state.
+    """
+    n = len(model.State._fields)
+    state, fixed = SX.sym("x_", n), SX.sym("xe_", n)
+    groups = model.gap(symbol_tuple(model.State, state), symbol_tuple(model.State, fixed), par)
+    gap = column([d for group in groups for d in group])
+    if any(nonlinear(gap, state)):
+        raise SolverError(f"{model.name}: the overlaps of contacts must be affine in the state")
+    slope = ca.jacobian(gap, state)
+    rest = ca.substitute(gap, state, SX.zeros(n))
+
+    def at(x: Any, xe: Any) -> Any:
+        moved, steep = ca.substitute([rest, slope], [fixed], [xe])
+        return steep @ x + moved
+
+    return at
+
+
+def violations(model: Model, par: ParameterSet, d: Any, F: Any, exact: bool) -> list[Any]:
+    """Return what is positive where a contact set does not fit the midpoint that came out.
+
+    Forces of the assumed set that push, and overlaps outside it that they close, are the solution:
+    there is only one. Cheaper than to choose the set once more.
+
+    Parameters
+    ----------
+    d, F
+        Overlaps and forces of all contacts, shape (n,) each.
+    exact
+        As in `stiffness`.
+    """
+    violated: list[Any] = []
+    for rows, place, is_open in _groups(model, par, exact):
+        overlap, force = d[place], ca.densify(F[place])
+        closed = rows @ force
+        for k in range(overlap.shape[0]):
+            lack = overlap[k] - closed[k]
+            # Where a force pushes, the lack is zero but for rounding.
+            wrong = ca.if_else(force[k] > 0, 0, ca.fmax(lack, -force[k]))
+            violated.append(overlap[k] if is_open else wrong)
+    return violated
+
+
+# --- Whether the step resolves the contacts: stiff, lightly damped ones rebound wrongly
+# Contact begins and ends with a substep, each time a little early or late. For a contact without
+# damping that swings at omega on its bodies, the rebound is then up to 3 % faster or slower than
+# the approach at h omega = 0.5, 11 % at 1, 25 % at 1.5, and 2.2 times faster at 4, though every
+# substep settles. Damping of about half the critical one or more keeps it bounded.
+
+SAFE, DAMPED = 1.0, 0.5  # h omega, and damping ratio
+# What a contact gives may bend with its force: then every slope counts, not only that at the start.
+LOADS = (0.0, *(10.0 ** (0.5 * k) for k in range(-6, 15)))  # N or N m
+
+
+def contact_jacobians(model: Model, par: ParameterSet, x: Any, m: Any, p: Any) -> Any:
+    """Return the function (x, m, p) -> Jacobians of dx/dt, contacts open and all closed.
+
+    Where the balance is not linear in the contact forces, closed at each of ``LOADS``.
+    """
+    groups = [C for C in model.compliance(par) if C]
+    K = ca.diagcat(*(_stiffness(C) for C in groups)) if groups else SX(0, 0)
+    force = SX.sym("contact_", K.shape[0])
+    state = symbol_tuple(model.State, x)
+    f = column(model.balance(state, state, symbol_tuple(model.Memory, m), par, scalars(force)))
+    gap = column([d for group in model.gap(state, state, par) for d in group])
+    rate = f / column(model.mass(state, par))
+    opened = ca.substitute(ca.jacobian(rate, x), force, SX.zeros(force.shape[0]))
+    through = ca.jacobian(rate, force) @ K @ ca.jacobian(gap, x)
+    loads = LOADS if depends(through, force) else LOADS[:1]
+    closed = [opened + ca.substitute(through, force, load * SX.ones(force.shape)) for load in loads]
+    return ca.Function("contact_jacobians", [x, m, p], [opened, *closed])
+
+
+def _stiffness(C: Any) -> Any:
+    return ca.inv(SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C))))
+
+
+def unresolved(
+    opened: NDArray[np.float64], closed: Sequence[NDArray[np.float64]], step: float
+) -> list[str]:
+    """Return what is wrong with a step for the closed contacts of each case; empty for nothing.
+
+    Parameters
+    ----------
+    opened, closed
+        Jacobians of dx/dt [1/s], shape (cases, nx, nx) each, closed at one load or several.
+    step
+        Substep [s].
+    """
+    texts = [""] * len(opened)
+    for J in closed:
+        # Without contacts nothing changes by closing them, and nothing need be decomposed.
+        changed = (opened != J).any((1, 2)) & np.isfinite(opened + J).all((1, 2))
+        cases = [k for k in np.flatnonzero(changed) if not texts[k]]
+        for k, text in zip(cases, _too_fast(opened[cases], J[cases], step), strict=True):
+            texts[k] = text
+    return texts
+
+
+def _too_fast(opened: NDArray[np.float64], closed: NDArray[np.float64], step: float) -> list[str]:
+    modes = np.linalg.eigvals(closed)
+    omega = np.abs(modes)
+    likely = (modes.imag != 0.0) & (-modes.real < DAMPED * omega) & (step * omega > SAFE)
+    texts = [""] * len(modes)
+    for k in np.flatnonzero(likely.any(axis=1)):
+        fastest = np.abs(np.linalg.eigvals(opened[k]).imag).max(initial=0.0)
+        swings = likely[k] & (np.abs(modes[k].imag) > 1.2 * fastest)
+        if swings.any():
+            swinging = omega[k][swings][0]
+            texts[k] = (
+                f"a closed contact swings at {swinging / (2 * np.pi):.4g} Hz, too fast for steps "
+                f"of {step * 1e6:g} us: rebounds may be wrong; take steps of at most "
+                f"{SAFE / swinging * 1e6:.2g} us, a softer contact, or more damping"
+            )
+    return texts

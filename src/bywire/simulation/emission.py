@@ -6,9 +6,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 from bywire.simulation.expressions import COSTLY, PLAIN_C, Dialect, Namer, text
-from bywire.simulation.graph import Graph
+from bywire.simulation.graph import Graph, Node, Operation
 from bywire.simulation.layout import Layout
-from bywire.simulation.operation import Node, Operation
 from bywire.simulation.stages import STATE, Stages
 
 # plan: first frame, end frame, whether the end is recorded, substeps a frame, frames a stimulus

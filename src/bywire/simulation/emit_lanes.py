@@ -1,21 +1,272 @@
 """Kernel of an ensemble: as many cases side by side as the processor's vectors hold.
 
-Where the substep of a model is short it waits for chains of operations as long as it computes. Then
-two vectors are carried on in turn, statement by statement: each computes while the other waits.
+Where the substep of a model is short it waits for chains of operations as long as it computes.
+Then two vectors are carried on in turn, statement by statement: each computes while the other
+waits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from bywire.simulation.c_runtime import LANES
-from bywire.simulation.emission import indented, leaf_count
-from bywire.simulation.emit_rare import most_tries, rare_substep
-from bywire.simulation.lane_repeats import repeated_lanes, repeated_results, settling_function
-from bywire.simulation.lane_statements import Lanes
+from bywire.simulation.emission import (
+    branching_statements,
+    indented,
+    layout_of,
+    leaf_count,
+    leaf_namer,
+    midpoints,
+    statements,
+    unread,
+)
+from bywire.simulation.emit_rare import most_tries, rare_roots, rare_substep
+from bywire.simulation.expressions import VECTOR_C, as_number, condition, needed
+from bywire.simulation.graph import Node
 from bywire.simulation.layout import Layout
-from bywire.simulation.operation import Node
-from bywire.simulation.stages import Stages
+from bywire.simulation.modes import modes
+from bywire.simulation.stages import STATE, Stages
+
+
+class Lanes:
+    """Statements of every stage, in vectors: of one of some that take turns.
+
+    ``at``: which one of ``turns``.
+    """
+
+    def __init__(self, stages: Stages, at: int = 0, turns: int = 1) -> None:
+        self.at, self.turns, self.mark = at, turns, "ab"[at] if turns > 1 else ""
+        self.stages, self.graph, self.level = stages, stages.graph, stages.level()
+        self.layout: Layout = layout_of(stages)
+        skipped = unread(stages)
+        self.results = {
+            f"{kind}{k}": node
+            for kind in ("x", "d", "r")
+            for k, node in enumerate(stages.fast[kind])
+            if f"{kind}{k}" not in skipped
+        }
+        self.products = stages.quadrature.products
+        self.flag = stages.fast["flag"][0]
+        self.pass_roots = [*self.results.values(), *self.products, self.flag]
+        self.coefficients = [c for pairs in stages.quadrature.combinations for c, _ in pairs]
+        self.carried = midpoints(
+            self.graph, needed(self.graph, self.pass_roots, lambda n: self.level[n] < 2)
+        )
+        self.name = leaf_namer(self.graph, self._leaf, self._value, "SET({})")
+        self.mode = modes(self.graph, self.pass_roots, self.level).without(self.carried)
+        judged = self._read_by([self.flag, stages.fast["doubtful"][0]])
+        self._judged = [n for n in self.mode.rest if n in judged]
+        self._later = [n for n in self.mode.rest if n not in judged]
+
+    def _read_by(self, roots: Iterable[Node]) -> frozenset[Node]:
+        """Return the operations that roots need, however often they are computed."""
+        return frozenset(needed(self.graph, roots, lambda _: False))
+
+    def _leaf(self, kind: str, index: int) -> str:
+        if kind == "p":
+            return f"P[{self.row(index)}]"
+        if kind == "u":
+            return f"U{self.mark}[{index}]"
+        return "h" if kind == "h" else f"{kind}{index}{self.mark}"
+
+    def row(self, index: int) -> int:
+        """Return which vector in memory is the one of an entry."""
+        return index * self.turns + self.at
+
+    def marked(self, *names: str) -> list[str]:
+        """Return the names of variables that every vector has for itself."""
+        return [f"{name}{self.mark}" for name in names]
+
+    def _value(self, node: Node) -> str:
+        name = f"y{self.carried[node]}" if node in self.carried else f"v{node}"
+        return f"{name}{self.mark}"
+
+    def block(self, roots: Sequence[Node], below: int) -> list[str]:
+        """Return the statements that results need, apart from what is computed less often."""
+        order = needed(self.graph, roots, lambda n: self.level[n] < below)
+        return self.lines(order)
+
+    def lines(self, order: Sequence[Node], later: Sequence[Node] = ()) -> list[str]:
+        """Return the statements of nodes; ``later``: those that read them, too."""
+        return branching_statements(self.graph, order, self.name, "const V ", VECTOR_C, later)
+
+    def number(self, node: Node) -> str:
+        """Return the text of a result."""
+        return as_number(self.graph, node, self.name, VECTOR_C)
+
+    def once(self) -> list[str]:
+        """Return the statements of what depends on parameters alone."""
+        ticks = [n for task in self.stages.ticks for n in task]
+        roots = [*self.pass_roots, *self.coefficients, *ticks, *self.stages.output]
+        order = needed(self.graph, roots, lambda _: False)
+        return self.lines([n for n in order if self.level[n] == 0])
+
+    def framed(self) -> list[str]:
+        """Return the statements of what changes with the ticks."""
+        roots = [*self.pass_roots, *self.coefficients]
+        order = needed(self.graph, roots, lambda n: self.level[n] == 0)
+        own = frozenset(self.mode.values)
+        return self.lines([n for n in order if self.level[n] == 1 and n not in own])
+
+    def mode_state(self) -> list[str]:
+        """Return the declarations of what changes with the mode alone, and of the mode."""
+        if not self.mode.atoms:
+            return []
+        values = [f"V {self.name(n)} = SET(0.0);" for n in self.mode.values]
+        return [*values, *(f"B b{n} = (B){{0}};" for n in self.mode.atoms), "int fresh = 1;"]
+
+    def judged(self) -> list[str]:
+        """Return the statements of what tells whether one pass serves a substep.
+
+        What hangs on the mode is renewed with it.
+        """
+        mode = self.mode
+        rest = self.lines(self._judged, self._later)
+        if not mode.atoms:
+            return rest
+        changed = " | ".join(f"(n{n} ^ b{n})" for n in mode.atoms)
+        truth = [condition(self.graph, n, self.name, VECTOR_C) for n in mode.atoms]
+        renewed = statements(self.graph, mode.values, self.name, "", VECTOR_C)
+        return [
+            *self.lines(mode.first),
+            *(f"const B n{n} = {text};" for n, text in zip(mode.atoms, truth, strict=True)),
+            f"if (__builtin_expect(fresh | ANY({changed}), 0)) {{",
+            "  fresh = 0;",
+            *(f"  b{n} = n{n};" for n in mode.atoms),
+            *(f"  {line}" for line in renewed),
+            "}",
+            *rest,
+        ]
+
+    def sums(self) -> list[str]:
+        """Return the statements of the integrands, each added to its sum as soon as it is there."""
+        lines, rest = [], self._later
+        for k, product in enumerate(self.products):
+            read = self._read_by([product])
+            order, rest = [n for n in rest if n in read], [n for n in rest if n not in read]
+            lines += [*self.lines(order, rest), f"s{k}{self.mark} += {self.number(product)};"]
+        return lines
+
+    def finished(self, is_summed: bool = True) -> list[str]:
+        """Return the statements of the results that the flag does not need.
+
+        ``is_summed``: whether those of `sums` are there.
+        """
+        there = self._read_by(self.products if is_summed else ())
+        wanted = self._read_by(self.results.values()) - there
+        return self.lines([n for n in self._later if n in wanted])
+
+
+# --- Lanes whose substep one ordinary pass does not serve, beside others that it does
+# They raise a flag, and are settled one by one. The other lanes' results and integrands are
+# computed after that, for all lanes alike; what the settled ones have instead is then put in its
+# place.
+
+
+def repeated_lanes(t: Lanes) -> list[str]:
+    """Return, in one piece, what becomes of lanes that raise their flag."""
+    flagged, is_rare, settled = t.marked("flagged", "is_rare", "settled")
+    return [
+        f"const B {flagged} = {condition(t.graph, t.flag, t.name, VECTOR_C)};\n"
+        f"      const int {is_rare} = ANY({flagged});\n"
+        f"      V new{t.mark}[{len(t.results)}], before{t.mark}[{max(len(t.products), 1)}];\n"
+        f"      B {settled};\n"
+        f"      if (__builtin_expect({is_rare}, 0)) {{\n"
+        f"        {indented(_handed_over(t), 8)}\n"
+        "      }",
+    ]
+
+
+def repeated_results(t: Lanes) -> list[str]:
+    """Return the statements that take over the results where lanes were settled.
+
+    Of these, the integrands of the pass are taken from the sums again.
+    """
+    new, before, settled = t.marked("new", "before", "settled")
+    return [
+        *(f"{name} = {new}[{k}];" for k, name in enumerate(t.marked(*t.results))),
+        *(f"{s} = SELECT({settled}, {before}[{k}], {s});" for k, s in enumerate(_sums(t))),
+        f"(void){before}; (void){settled};",
+    ]
+
+
+def settling_function(t: Lanes) -> str:
+    """Return the C function that settles the flagged lanes one by one.
+
+    It works on copies: a vector whose lanes are addressed would live in memory everywhere. Of a
+    lane that is not in doubt the velocities of the ordinary pass are known.
+    """
+    stages, nx = t.stages, t.layout.length["x"]
+    targets = {name: k for k, name in enumerate(t.results)}
+    places = [f"{kind}{k}" for kind in STATE for k in range(t.layout.length[kind])]
+    given = [f"ms[{k}] = m[{j}][l];" for j, k in enumerate(_memory(t))]
+    given += [f"o[{v}] = n[{targets[f'x{v}']}][l];" for v in stages.velocities]
+    taken = [
+        f"n[{k}] = SELECT(ONLY(l), SET(o[{places.index(name)}]), n[{k}]);"
+        for name, k in targets.items()
+    ]
+    added = [f"q[{j}][l] += o[{places.index(name)}];" for j, name in enumerate(_flows(t))]
+    return f"""static RARE void settle_lanes(B flagged, B doubtful, const double *c, double h,
+    const V *m, const V *old, V *n, V *q, V *counters, int64_t *tried) {{
+  double ms[{max(t.layout.length["m"], 1)}], xs[{nx}], ds[{nx}], o[RESULTS];
+  EACH_LANE(l, flagged) {{
+    for (int k = 0; k < {nx}; ++k) {{ xs[k] = old[k][l]; ds[k] = old[{nx} + k][l]; }}
+    {indented(given, 4)}
+    cuts made;
+    counters[0][l] += located(c + l * (CONSTANTS + 1), h, ms, xs, ds, !LANE(doubtful, l), o, &made);
+    counters[1][l] += 1.0;
+    counters[2][l] += made.tries;
+    *tried += made.tries;
+    {indented(taken + added, 4)}
+  }}
+  (void)m; (void)q;
+}}
+"""
+
+
+def _handed_over(t: Lanes) -> list[str]:
+    """Return the statements that hand a substep with flagged lanes to ``settle_lanes``."""
+    old = t.marked(*(f"{kind}{k}" for kind in ("x", "d") for k in range(t.layout.length[kind])))
+    flow = t.marked(*_flows(t))
+    memory = t.marked(*(f"m{k}" for k in _memory(t)))
+    failures, repeats, tries = t.marked("failures", "repeats", "tries")
+    flagged, c = t.marked("flagged", "c")
+    doubtful = condition(t.graph, t.stages.fast["doubtful"][0], t.name, VECTOR_C)
+    nothing = ["SET(0.0)"]
+    arrays = {"old": old, "memory": memory or nothing, "flow": flow or nothing}
+    new, before, settled = t.marked("new", "before", "settled")
+    return [
+        *t.finished(is_summed=False),
+        *(f"{new}[{k}] = {t.number(n)};" for k, n in enumerate(t.results.values())),
+        f"{settled} = {flagged};",
+        *(f"{before}[{k}] = {name};" for k, name in enumerate(_sums(t))),
+        *(f"V {name}[] = {{{', '.join(values)}}};" for name, values in arrays.items()),
+        f"V count[] = {{{failures}, {repeats}, {tries}}};",
+        f"settle_lanes({flagged}, {doubtful}, {c}, h_, memory, old, {new}, flow, count, &tried);",
+        *(f"{name} = flow[{k}];" for k, name in enumerate(flow)),
+        f"{failures} = count[0];",
+        f"{repeats} = count[1];",
+        f"{tries} = count[2];",
+    ]
+
+
+def _memory(t: Lanes) -> list[int]:
+    """Return the entries of the memory that a rare pass reads."""
+    read = t.graph.read_by(rare_roots(t.stages))
+    return [k for k in range(t.layout.length["m"]) if t.graph.leaf("m", k) in read]
+
+
+def _flows(t: Lanes) -> list[str]:
+    """Return the integrals that signals read; the others stay as they are."""
+    read = t.graph.read_by(t.stages.output)
+    return [f"q{k}" for k in range(t.layout.length["q"]) if t.graph.leaf("q", k) in read]
+
+
+def _sums(t: Lanes) -> list[str]:
+    return t.marked(*(f"s{k}" for k in range(len(t.products))))
+
+
+# --- The kernel
 
 SIGNATURE = """int bw_lanes(void) { return TURNS * W; }
 

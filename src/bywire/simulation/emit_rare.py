@@ -1,9 +1,10 @@
 """C text of what is rare: a substep that one ordinary pass does not serve.
 
-Its functions stand alone and compute for any length of a step what does not follow from parameters
-alone. A substep in which a velocity with dry friction changes its sign is cut where it passes zero:
-friction jumps there, and with it the acceleration. Within each part every velocity keeps its sign;
-what has come to zero rests or moves on in the next part, as its bounds decide.
+Its functions stand alone and compute for any length of a step what does not follow from
+parameters alone. A substep in which a velocity with dry friction changes its sign is cut where
+it passes zero: friction jumps there, and with it the acceleration. Within each part every
+velocity keeps its sign; what has come to zero rests or moves on in the next part, as its bounds
+decide.
 """
 
 from __future__ import annotations
@@ -12,13 +13,276 @@ from collections.abc import Collection
 
 from bywire.simulation.emission import indented, leaf_namer, statements
 from bywire.simulation.expressions import as_number, needed
-from bywire.simulation.graph import Graph
+from bywire.simulation.graph import Graph, Node
 from bywire.simulation.layout import ATTEMPTS, CAP, CLOSE, EDGE, NEAR, STILL, most_cuts
-from bywire.simulation.operation import Node
 from bywire.simulation.quadrature import Levels
-from bywire.simulation.rare_text import CUT, PROJECTION
 from bywire.simulation.set_valued import FITTING, NEVER, NOTHING, RESIDUAL
 from bywire.simulation.stages import STATE, Stages
+
+# The same as ``set_valued.project_exact``, which says why, in a loop: that is a tenth of the code.
+PROJECTION = """
+// Solve S w = b of the rows that move, by elimination on the diagonal; where none does, nothing.
+static inline void with_signs(const double *S, const double *c, const double *low,
+    const double *high, const int *sign, double *w) {
+  double A[SETS][SETS], b[SETS], inverse[SETS];
+  int at[SETS], n = 0;
+  for (int k = 0; k < SETS; ++k) {
+    w[k] = 0.0;
+    if (sign[k]) at[n++] = k;
+  }
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) A[i][j] = S[at[i] * SETS + at[j]];
+    b[i] = c[at[i]] + (sign[at[i]] > 0 ? low[at[i]] : high[at[i]]);
+  }
+  for (int k = 0; k < n; ++k) {
+    inverse[k] = 1.0 / A[k][k];
+    for (int i = k + 1; i < n; ++i) {
+      const double factor = A[i][k] * inverse[k];
+      for (int j = k + 1; j < n; ++j) A[i][j] -= factor * A[k][j];
+      b[i] -= factor * b[k];
+    }
+  }
+  for (int k = n - 1; k >= 0; --k) {
+    double sum = 0.0;
+    for (int j = k + 1; j < n; ++j) sum += A[k][j] * w[at[j]];
+    w[at[k]] = (b[k] - sum) * inverse[k];
+  }
+}
+
+// By how much velocities miss the conditions, as a share of what their rows add up.
+static inline double misfit(const double *S, const double *c, const double *low,
+    const double *high, const double *w) {
+  double total = 0.0;
+  for (int k = 0; k < SETS; ++k) {
+    const double inverse = 1.0 / S[k * SETS + k];
+    double others = 0.0, parts = fabs(c[k]);
+    for (int j = 0; j < SETS; ++j) {
+      const double part = j == k ? 0.0 : S[k * SETS + j] * w[j];
+      others += part;
+      parts += fabs(part);
+    }
+    const double z = c[k] - others, above = z + low[k], below = z + high[k];
+    const double row = ((above > 0.0 ? above : 0.0) + (below < 0.0 ? below : 0.0)) * inverse;
+    total += fabs(row - w[k]) / (parts * inverse + 1e-300);
+  }
+  return total;
+}
+
+enum { GUESSES = 4 }; // a row's sign follows from the others' velocities, so often at most
+
+// Take signs that rows give each other in turn, if they fit; else try every combination, and take
+// the one that fits best. Return whether it fails.
+static APART int project(const double *posed, double *w, double *force) {
+  const double *S = posed, *c = S + SETS * SETS, *low = c + SETS, *high = low + SETS;
+  double best = NEVER, tried[SETS];
+  int sign[SETS], k = 0;
+  memset(w, 0, SETS * sizeof(double));
+  for (int turn = 0; turn < GUESSES && best > FITTING; ++turn) {
+    best = 0.0;
+    for (int i = 0; i < SETS; ++i) {
+      double z = c[i];
+      for (int j = 0; j < SETS; ++j) z -= j == i ? 0.0 : S[i * SETS + j] * w[j];
+      sign[i] = (z + low[i] > 0.0) - (z + high[i] < 0.0);
+      best += !sign[i] && low[i] >= high[i];
+    }
+    with_signs(S, c, low, high, sign, w);
+    best += misfit(S, c, low, high, w);
+  }
+  if (best <= FITTING) k = -1;
+  else {
+    best = NEVER;
+    memset(w, 0, SETS * sizeof(double));
+    memset(sign, 0, sizeof(sign));
+  }
+  while (k >= 0) {
+    with_signs(S, c, low, high, sign, tried);
+    double total = misfit(S, c, low, high, tried);
+    for (int i = 0; i < SETS; ++i) total += !sign[i] && low[i] >= high[i];
+    if (total < best) {
+      best = total;
+      memcpy(w, tried, sizeof(tried));
+    }
+    for (k = SETS - 1; k >= 0; --k) { // 0, 1, -1, the last row first
+      sign[k] = sign[k] ? (sign[k] > 0 ? -1 : 0) : 1;
+      if (sign[k]) break;
+    }
+  }
+  const double left = misfit(S, c, low, high, w) * NOTHING;
+  for (int i = 0; i < SETS; ++i) w[i] += left;
+  for (int i = 0; i < SETS; ++i) {
+    double sum = 0.0;
+    for (int j = 0; j < SETS; ++j) sum += S[i * SETS + j] * w[j];
+    const double held = sum - c[i] > low[i] ? sum - c[i] : low[i];
+    force[i] = held < high[i] ? held : high[i];
+  }
+  return best > RESIDUAL;
+}
+"""
+
+# A pass gives o: x, d, r, q, jump, doubt. Where the ordinary one is in doubt, the exact one is
+# repeated from its own increment until its contact sets reproduce.
+CUT = """
+static APART int settle(const double *c, double h, const double *m, const double *x, double *d,
+    double *o) {
+  fast_pass(c, h, m, x, d, o);
+  if (o[DOUBT] == 0.0) return 0;
+  for (int pass = 0; pass < CAP; ++pass) {
+    exact_pass(c, h, m, x, d, o);
+    if (o[DOUBT] == 0.0) return 0;
+    memcpy(d, o + NX, NX * sizeof(double));
+  }
+  return 1;
+}
+
+// Where a substep was cut: length of each part but the last, and which velocity is zero at its end;
+// and how many parts were tried.
+typedef struct { int count, which[CUTS], tries; double length[CUTS]; } cuts;
+
+// Which velocity is the first to change its sign within a part, -1 if none does, and when.
+static inline int first_turn(const double *x, const double *o, double *share) {
+  int first = -1;
+  *share = 1.0;
+  for (int k = 0; k < VELOCITIES; ++k) {
+    const double v = x[velocity[k]], w = o[velocity[k]];
+    if (v * w * o[JUMP + k] < 0.0 && v / (v - w) <= *share) {
+      *share = v / (v - w);
+      first = k;
+    }
+  }
+  return first;
+}
+
+// A part of length t; last: half increments of a whole substep h, from which it is predicted.
+static inline int part(const double *c, double h, double t, const double *m, const double *x,
+    const double *last, double *d, double *o) {
+  for (int k = 0; k < NX; ++k) d[k] = last[k] * (t / h);
+  return settle(c, t, m, x, d, o);
+}
+
+// Where a velocity that goes from v to w within a part of length t is zero, on the parabola that
+// has the mean slope before over an earlier length h, too.
+static inline double zero_of(double v, double w, double t, double before, double h) {
+  const double mean = (w - v) / t, linear = -v / mean;
+  const double bend = before != 0.0 ? 2.0 * (mean - before) / (t + h) : 0.0;
+  const double slope = mean + bend * (linear - 0.5 * t);
+  const double zero = linear - 0.5 * bend * linear * (linear - t) / slope;
+  return zero > 0.0 && zero < t ? zero : linear;
+}
+
+// Shorten a part of length *t to the first instant at which a velocity is zero: by the parabola
+// through three lengths, within what is known to lie before and behind. Before, o is that of *t in
+// the velocities, behind in everything. Return which velocity it is, -1 if velocities alone were
+// known and its friction turns out not to jump; failed: that part did not settle.
+static APART int locate(const double *c, double h, double *t, const double *m, const double *x,
+    const double *last, int known, double *o, int *failed, int *tries) {
+  double d[NX], share, low = 0.0, high = *t;
+  const double first = EDGE * *t, final = (1.0 - EDGE) * *t;
+  int which = first_turn(x, o, &share), turns = velocity[which];
+  double P = 0.0, at_P = x[turns], Q = *t, at_Q = o[turns];
+  double N = zero_of(at_P, at_Q, Q, 2.0 * last[turns] / h, h);
+  double change = fabs(at_P - at_Q), before = 0.0, was[RESULTS];
+  for (int n = 1;; ++n) { // what is left of the last attempt is of the length that is returned
+    N = fmin(fmax(N, first), final);
+    *failed = part(c, h, N, m, x, last, d, o);
+    ++*tries;
+    if (known && o[JUMP + which] == 0.0) return -1;
+    const int other = VELOCITIES > 1 ? first_turn(x, o, &share) : -1;
+    if (other >= 0 && other != which && n < ATTEMPTS) { // another one is earlier
+      which = other, turns = velocity[which];
+      low = 0.0, high = N;
+      P = 0.0, at_P = x[turns], Q = N, at_Q = o[turns], N = N * share;
+      change = fabs(at_P - at_Q), before = 0.0;
+      continue;
+    }
+    const double at_N = o[turns];
+    if (fabs(at_N) <= CLOSE * change || N <= first || N >= final || N == P || N == Q
+        || n == ATTEMPTS) break;
+    if (at_N * x[turns] > 0.0) low = N; else high = N;
+    const double slope = (at_N - at_P) / (N - P) + (at_N - at_Q) / (N - Q)
+        - (at_Q - at_P) / (Q - P);
+    const double next = N - at_N / slope;
+    const int is_near = fabs(at_N) <= NEAR * change && next > first && next < final;
+    if (is_near && before > 0.0) { // the rest on the line through two attempts
+      const double share = (next - N) / (N - before);
+#ifdef TURNS // lanes: where compilers know what that means
+      #pragma omp simd
+#endif
+      for (int k = 0; k < JUMP; ++k) o[k] += share * (o[k] - was[k]);
+      N = next;
+      break;
+    }
+    memcpy(was, o, sizeof(was));
+    before = N;
+    if (fabs(P - next) > fabs(Q - next)) P = N, at_P = at_N; else Q = N, at_Q = at_N;
+    N = next > low && next < high ? next : 0.5 * (low + high);
+  }
+  *t = N;
+  return which;
+}
+
+// Half the increment behind a zero of what had a before it: less by the jump of friction, which
+// opposes the other direction, and nothing where it holds.
+static inline double turned_back(double a, double j) {
+  return copysign(fmax(fabs(a) - j, 0.0), a);
+}
+
+// At the end of a part of length t of a substep h that was cut, from speeds x: what is zero there
+// in o, and last, half increments from which the next part is predicted.
+static inline void rest(const double *x, int which, double t, double h, double *o, double *last) {
+  for (int k = 0; k < NX; ++k) last[k] = o[NX + k] * (h / t);
+  for (int k = 0; k < VELOCITIES; ++k) {
+    const int v = velocity[k]; // bodies that are alike stop at once
+    if (k != which && fabs(o[v]) >= STILL * fabs(x[v])) continue;
+    o[v] = 0.0;
+    last[v] = turned_back(last[v], o[JUMP + k] * (h / t));
+  }
+}
+
+// A substep, repeated until it settles, and cut where velocities pass zero. known: o holds
+// velocities of the whole substep, which has settled, from an ordinary pass.
+static APART int located(const double *c, double h, const double *m, const double *x,
+    const double *d, int known, double *o, cuts *made) {
+  double at[NX], last[NX], guess[NX], sum[FLOWS + 1], left = h, share;
+  int failed = 0, before = 0;
+  memcpy(at, x, sizeof(at));
+  memcpy(last, d, sizeof(last));
+  memset(sum, 0, sizeof(sum));
+  for (int k = 0; k < VELOCITIES; ++k) o[JUMP + k] = known;
+  made->tries = 0;
+  for (made->count = 0;; known = 0, ++made->count) {
+    if (!known) failed = part(c, h, left, m, at, last, guess, o), ++made->tries;
+    const int turns = first_turn(at, o, &share) >= 0;
+    if (!turns && !known) break;
+    if (made->count == CUTS) { // there is no end to it
+      for (int k = 0; k < VELOCITIES; ++k)
+        if (at[velocity[k]] * o[velocity[k]] * o[JUMP + k] < 0.0) o[velocity[k]] = 0.0;
+      failed = 1;
+      break;
+    }
+    double t = left;
+    const int which = turns ? locate(c, h, &t, m, at, last, known, o, &failed, &made->tries) : -1;
+    if (which < 0) { // then once more, knowing nothing
+      --made->count;
+      continue;
+    }
+    before |= failed;
+    rest(at, which, t, h, o, last);
+    memcpy(at, o, sizeof(at));
+    for (int k = 0; k < FLOWS; ++k) sum[k] += o[FLOW + k] * (t / h);
+    made->which[made->count] = which;
+    made->length[made->count] = t;
+    left -= t;
+  }
+  if (made->count) {
+    for (int k = 0; k < NX; ++k) o[NX + k] *= h / left;
+    for (int k = 0; k < FLOWS; ++k) o[FLOW + k] = sum[k] + o[FLOW + k] * (left / h);
+  }
+  return failed | before;
+}
+"""
+
+
+# --- What depends on the model
 
 _TRIES = 200_000
 APART = "__attribute__((noinline))"  # but fast: what is cold is compiled to be short
@@ -53,7 +317,7 @@ def most_tries(stages: Stages) -> int:
 
 
 def rare_header(stages: Stages) -> str:
-    """Return what the C text of `rare_text` is told of a model."""
+    """Return what the C text that is the same for every model is told of a model."""
     nx, nr, nq = (len(stages.exact[kind]) for kind in ("x", "r", "q"))
     velocities = stages.velocities
     return f"""#define APART {APART}

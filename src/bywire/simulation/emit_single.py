@@ -9,7 +9,14 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
-from bywire.simulation.branches import branch, branched
+from bywire.simulation.branches import (
+    Remembered,
+    branch,
+    branched,
+    declarations,
+    remembered,
+    renewal,
+)
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
     PLAN,
@@ -24,11 +31,9 @@ from bywire.simulation.emission import (
 )
 from bywire.simulation.emit_rare import most_tries, rare_substep
 from bywire.simulation.expressions import Namer, as_number, condition, needed
-from bywire.simulation.graph import Graph
+from bywire.simulation.graph import Graph, Node
 from bywire.simulation.layout import Layout
 from bywire.simulation.modes import Modes, modes
-from bywire.simulation.operation import Node
-from bywire.simulation.remembered import Remembered, declarations, remembered, renewal
 from bywire.simulation.stages import STATE, Stages
 
 SIGNATURE = """{} bw_run(const double *restrict p, double h, const double *restrict u,

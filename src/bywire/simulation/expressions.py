@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from bywire.simulation.graph import Graph
-from bywire.simulation.operation import Node
+from bywire.simulation.graph import Graph, Node
 
 Namer = Callable[[Node], str]
 

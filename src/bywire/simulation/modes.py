@@ -11,8 +11,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from bywire.simulation.expressions import needed
-from bywire.simulation.graph import Graph
-from bywire.simulation.operation import Node
+from bywire.simulation.graph import Graph, Node
 from bywire.simulation.quadrature import Levels
 
 _COMPARISONS = frozenset({"lt", "le", "eq", "ne"})

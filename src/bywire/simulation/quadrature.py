@@ -11,8 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
-from bywire.simulation.graph import Graph
-from bywire.simulation.operation import Node
+from bywire.simulation.graph import Graph, Node
 
 Terms = dict[Node | None, Node]  # product (None: the number one) -> coefficient
 _MOST = 4  # terms that multiplying out may give; beyond, the product stays as it is

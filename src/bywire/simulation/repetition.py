@@ -11,20 +11,158 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import StepError
+from bywire.core.errors import ParameterError, StepError
 from bywire.core.interrupts import thread_pool
-from bywire.core.typing import Array
+from bywire.core.typing import Array, Complex
 from bywire.simulation.advance import require_finite
 from bywire.simulation.case_kernels import lane_kernel
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.engine import prepare
-from bywire.simulation.lane_queue import Lanes
 from bywire.simulation.layout import Layout
+from bywire.simulation.native import Request
 from bywire.simulation.run import Run, initial_vector, selected
 from bywire.simulation.schedule import Schedule
-from bywire.simulation.window import Stimuli, advance_window, given_rows, one_by_one
 
-Complex = NDArray[np.complex128]
+Stimuli = Callable[[NDArray[np.int64], int, int], Array]
+"""``stimuli(cases, first, last)``: these rows of some cases, shape (cases, last - first, nu)"""
+Advance = Callable[[Array, Array, Array, Array, int], None]
+"""``advance(parameters, stimulus, vectors, rows, frames)``: all tasks run at the first instant"""
+
+CHUNK = 10_000
+"""substeps after which an interrupt is looked for: tens of milliseconds compiled, a second without
+a compiler"""
+
+
+def advance_window(
+    advance: Advance,
+    schedule: Schedule,
+    p: Array,
+    u: Callable[[int, int], Array],
+    vector: Array,
+    values: Array,
+) -> None:
+    """Run one window in parts, which take little memory; renews vector and values in place."""
+    every, held = schedule.record_frames, schedule.stimulus_frames
+    # All tasks run at the beginning of a part, as at the beginning of a run.
+    common = math.lcm(every, *schedule.task_frames)
+    size = max(CHUNK // (schedule.substeps * common), 1) * common
+    for first in range(0, schedule.frames, size):
+        last = min(first + size, schedule.frames)
+        part = np.empty((values.shape[0], (last - first) // every, values.shape[2]))
+        advance(p, u(first // held, last // held), vector, part, last - first)
+        values[:, first // every : last // every] = part
+
+
+def given_rows(stimuli: Array | Stimuli, count: int, schedule: Schedule) -> Stimuli:
+    """Return what gives rows of the stimulus, whether they exist or are made.
+
+    Raises
+    ------
+    ParameterError
+        When the shape does not fit.
+    """
+    if callable(stimuli):
+        return stimuli
+    every, rows = stimuli, schedule.frames // schedule.stimulus_frames
+    if every.shape[:2] != (count, rows):
+        raise ParameterError(f"stimuli: shape ({count}, {rows}, nu) is wanted, got {every.shape}")
+    return lambda cases, first, last: every[cases, first:last]
+
+
+def one_by_one(run: Run, schedule: Schedule, selection: NDArray[np.int32]) -> Advance:
+    """Serve without a compiler: one lane, slowly."""
+    engine = prepare(run.model, run.par).engine("auto")
+
+    def advance(p: Array, u: Array, vector: Array, values: Array, frames: int) -> None:
+        column = vector[:, 0].copy()
+        stimulus = np.ascontiguousarray(u[:, :, 0])
+        request = Request(schedule, np.ascontiguousarray(p[:, 0]), stimulus, selection)
+        engine.advance(request, column, 0, frames, values[0])
+        vector[:, 0] = column
+
+    return advance
+
+
+# --- Cases that share the lanes in turn: where one has ended, the next one begins
+
+
+class Lanes:
+    """Cases side by side, window after window.
+
+    Parameters
+    ----------
+    queue
+        Cases that wait, shared by all who take from it.
+    width
+        Number of lanes.
+    matrix, starts
+        Parameters and state vectors of all cases at their start, shapes (parameters, cases) and
+        (entries, cases).
+
+    Attributes
+    ----------
+    columns, vector
+        The same of the cases in the lanes, shapes (parameters, lanes) and (entries, lanes).
+    case
+        Which case each lane holds, shape (lanes,).
+    seen
+        By lane whose case has not ended, the figures of all its windows. Other lanes run along
+        unread, for a vector has no shorter form.
+    """
+
+    def __init__(self, queue: deque[int], width: int, matrix: Array, starts: Array) -> None:
+        self._queue, self._matrix, self._starts = queue, matrix, starts
+        self.columns = np.empty((matrix.shape[0], width))
+        self.vector = np.empty((starts.shape[0], width))
+        self.case: NDArray[np.int64] = np.zeros(width, dtype=np.int64)
+        self.seen: dict[int, list[Complex]] = {}
+        for lane in range(width):
+            if not self._took(lane) and self.seen:
+                self._load(lane, int(self.case[0]))
+
+    def passed(self, figures: Complex, tolerance: float, most: int) -> dict[int, bool]:
+        """Take up a window's figures, and return the lanes whose case has ended: if it repeats.
+
+        Parameters
+        ----------
+        figures
+            Shape (lanes, n).
+        tolerance, most
+            See `repetition.repeat`.
+        """
+        ended = {}
+        for lane, seen in self.seen.items():
+            seen.append(figures[lane])
+            repeats = len(seen) > 1 and _same(seen[-2], seen[-1], tolerance)
+            if repeats or len(seen) == most:
+                ended[lane] = repeats
+        return ended
+
+    def release(self, lane: int) -> None:
+        """Let the next case into a lane whose case has ended."""
+        del self.seen[lane]
+        self._took(lane)
+
+    def _took(self, lane: int) -> bool:
+        try:
+            self._load(lane, self._queue.popleft())
+        except IndexError:  # another thread may have taken the last one
+            return False
+        self.seen[lane] = []
+        return True
+
+    def _load(self, lane: int, case: int) -> None:
+        self.case[lane] = case
+        self.columns[:, lane], self.vector[:, lane] = self._matrix[:, case], self._starts[:, case]
+
+
+def _same(before: Complex, now: Complex, tolerance: float) -> bool:
+    """Return whether a window repeats the one before; what does not move at all repeats."""
+    return bool(np.linalg.norm(now - before) <= tolerance * np.linalg.norm(now))
+
+
+# --- Repetition
+
 Figures = Callable[[Array], Complex]
 
 KEPT = 8

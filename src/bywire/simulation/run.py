@@ -18,14 +18,22 @@ from bywire.core.parameters import ParameterSet, leaf_table
 from bywire.core.signals import ranges_of, signals_of
 from bywire.core.typing import Array
 from bywire.core.units import shown
-from bywire.simulation.advance import Progress, advance_all, work_of
+from bywire.simulation.advance import (
+    Change,
+    Progress,
+    advance_all,
+    energies,
+    energy_of,
+    pieces,
+    put_in_signals,
+    work_of,
+)
 from bywire.simulation.buffered_call import BufferedCall
-from bywire.simulation.changes import Change, energies, energy_of, pieces, put_in_signals
+from bywire.simulation.contacts import unresolved
 from bywire.simulation.engine import Engine, prepare
 from bywire.simulation.layout import Layout
 from bywire.simulation.native import Request
 from bywire.simulation.schedule import Schedule, plan
-from bywire.simulation.stiff_contacts import unresolved
 
 Status = Literal["done", "interrupted", "unsettled"]
 

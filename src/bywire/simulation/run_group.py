@@ -19,9 +19,15 @@ from bywire.core.errors import ParameterError
 from bywire.core.interrupts import thread_pool
 from bywire.core.parameters import ParameterSet, leaf_table
 from bywire.core.typing import Array
-from bywire.simulation.advance import require_finite, require_work, work_of
+from bywire.simulation.advance import (
+    energies,
+    pieces,
+    put_in_signals,
+    require_finite,
+    require_work,
+    work_of,
+)
 from bywire.simulation.case_kernels import CaseKernel, case_kernel, is_side_by_side
-from bywire.simulation.changes import energies, pieces, put_in_signals
 from bywire.simulation.engine import CUDA, are_alike, prepare
 from bywire.simulation.native import Ends
 from bywire.simulation.run import (

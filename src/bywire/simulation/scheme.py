@@ -15,9 +15,8 @@ import casadi as ca
 
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
-from bywire.simulation.contact_set import overlaps, stiffness, violations
-from bywire.simulation.elimination import Reduced, eliminate
-from bywire.simulation.linear_form import Form, forms
+from bywire.simulation.contacts import overlaps, stiffness, violations
+from bywire.simulation.elimination import Form, Reduced, eliminate, forms
 from bywire.simulation.set_valued import Problem, Projection, project_fast, sliding
 from bywire.simulation.symbols import SX, column, nonlinear, scalars, symbol_tuple
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from bywire.core.arguments import checked
 from bywire.core.errors import CompilerError, ParameterError, unknown_name
 from bywire.core.typing import Array
-from bywire.simulation.advance import require_finite, work_of
-from bywire.simulation.changes import require_unchanged
+from bywire.simulation.advance import require_finite, require_unchanged, work_of
 from bywire.simulation.compiler import VECTOR, Compiler, find_compiler, load_library
 from bywire.simulation.emission import layout_of
 from bywire.simulation.emit_tangents import emit_tangents

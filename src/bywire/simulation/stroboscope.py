@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import CompilerError, ParameterError
 from bywire.core.typing import Array
-from bywire.simulation.advance import require_finite
-from bywire.simulation.changes import require_unchanged
+from bywire.simulation.advance import require_finite, require_unchanged
 from bywire.simulation.compiler import Compiler, find_compiler
 from bywire.simulation.engine import built_once, prepare
 from bywire.simulation.native import Request

@@ -1,8 +1,13 @@
-"""Fallback without a compiler: CasADi's virtual machine evaluates the same functions."""
+"""Fallback without a compiler: CasADi's virtual machine evaluates the same functions.
+
+A substep in which a velocity passes zero is cut there, as the C text of ``emit_rare`` cuts it.
+"""
 
 from __future__ import annotations
 
+import math
 import threading
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,12 +15,160 @@ import numpy as np
 from bywire.core.interrupts import raise_if_stopped
 from bywire.core.typing import Array
 from bywire.simulation.buffered_call import BufferedCall
-from bywire.simulation.cut_substep import CutSubstep
-from bywire.simulation.layout import CAP, COUNTERS, DOUBT, FLAG, Layout
+from bywire.simulation.layout import (
+    ATTEMPTS,
+    CAP,
+    CLOSE,
+    COUNTERS,
+    DOUBT,
+    EDGE,
+    FLAG,
+    JUMP,
+    NEAR,
+    STILL,
+    Layout,
+    most_cuts,
+)
 from bywire.simulation.native import Request
 
 if TYPE_CHECKING:
     from bywire.simulation.program import Program
+
+Settle = Callable[[Array, Array, Array, Array, float], tuple[list[Array], bool]]
+
+
+class CutSubstep:
+    """One substep, in as many parts as it takes.
+
+    Parameters
+    ----------
+    settle
+        What a step of any length gives: x, d, r, q, jump, ..., and whether it did not settle.
+    velocities
+        Indices of the states that carry dry friction.
+    m, p
+        Memory and parameters.
+    h
+        Length of the substep [s].
+
+    Attributes
+    ----------
+    tries
+        How many parts were tried.
+    """
+
+    def __init__(
+        self, settle: Settle, velocities: Sequence[int], m: Array, p: Array, h: float
+    ) -> None:
+        self._settle, self._velocities = settle, velocities
+        self._m, self._p, self._h = m, p, h
+        self.tries = 0
+
+    def results(self, x: Array, d: Array) -> tuple[list[Array], bool]:
+        """Return x, d, r, q at the end of the substep, and whether it did not settle."""
+        h, left, most = self._h, self._h, most_cuts(len(self._velocities))
+        flow: Array | float = 0.0
+        unsettled = False
+        for count in range(most + 1):
+            o, failed = self._part(x, d, left)
+            turns, _ = self._first_turn(x, o)
+            if turns < 0:
+                break
+            if count == most:
+                o[0][[k for k, jump in self._jumps(o) if x[k] * o[0][k] * jump < 0.0]] = 0.0
+                failed = True
+                break
+            o, t, turns, failed = self._locate(x, d, o, left)
+            unsettled |= failed
+            before, x, d = x, o[0], o[1] * (h / t)
+            for k, jump in self._jumps(o):
+                if k == turns or abs(x[k]) < STILL * abs(before[k]):  # alike bodies stop at once
+                    x[k], d[k] = 0.0, _turned_back(float(d[k]), jump * (h / t))
+            flow = flow + o[3] * (t / h)
+            left -= t
+        if left < h:
+            o[1], o[3] = o[1] * (h / left), flow + o[3] * (left / h)
+        return o, failed or unsettled
+
+    def _part(self, x: Array, d: Array, t: float) -> tuple[list[Array], bool]:
+        self.tries += 1
+        return self._settle(x, d * (t / self._h), self._m, self._p, t)
+
+    def _jumps(self, o: list[Array]) -> Iterator[tuple[int, float]]:
+        """Return which states carry dry friction, and by how much it would change."""
+        return zip(self._velocities, o[JUMP], strict=True)
+
+    def _first_turn(self, x: Array, o: list[Array]) -> tuple[int, float]:
+        """Return which velocity is the first to change its sign, -1 if none, and when."""
+        first, share = -1, 1.0
+        for k, jump in self._jumps(o):
+            v, w = float(x[k]), float(o[0][k])
+            if v * w * jump < 0.0 and v / (v - w) <= share:
+                first, share = k, v / (v - w)
+        return first, share
+
+    def _locate(
+        self, x: Array, d: Array, o: list[Array], length: float
+    ) -> tuple[list[Array], float, int, bool]:
+        """Return a part that ends where the first velocity is zero.
+
+        Its length, which velocity it is, and whether it did not settle.
+        """
+        first, final = EDGE * length, (1.0 - EDGE) * length
+        turns, _ = self._first_turn(x, o)
+        low, high = 0.0, length
+        points = [(0.0, float(x[turns])), (length, float(o[0][turns]))]
+        change = abs(points[0][1] - points[1][1])
+        before: tuple[float, list[Array]] | None = None
+        t = _zero_of(*points[0][1:], *points[1], 2.0 * float(d[turns]) / self._h, self._h)
+        for n in range(1, ATTEMPTS + 1):
+            t = float(np.clip(t, first, final))
+            o, failed = self._part(x, d, t)
+            other, share = self._first_turn(x, o)
+            if other >= 0 and other != turns and n < ATTEMPTS:
+                turns, low, high = other, 0.0, t
+                points = [(0.0, float(x[turns])), (t, float(o[0][turns]))]
+                change, before = abs(points[0][1] - points[1][1]), None
+                t = t * share
+                continue
+            w = float(o[0][turns])
+            (P, at_P), (Q, at_Q) = points
+            if abs(w) <= CLOSE * change or not first < t < final or t in (P, Q) or n == ATTEMPTS:
+                break  # with what this length gives
+            low, high = (t, high) if w * x[turns] > 0.0 else (low, t)
+            slope = (w - at_P) / (t - P) + (w - at_Q) / (t - Q) - (at_Q - at_P) / (Q - P)
+            following = t - w / slope
+            is_near = abs(w) <= NEAR * change and first < following < final
+            if is_near and before is not None:
+                # The rest is on the line through two attempts.
+                share = (following - t) / (t - before[0])
+                moved = [now + share * (now - was) for now, was in zip(o, before[1], strict=True)]
+                return [*moved[:JUMP], *o[JUMP:]], following, turns, failed
+            before = (t, o)
+            points[0 if abs(P - following) > abs(Q - following) else 1] = (t, w)
+            t = following if low < following < high else 0.5 * (low + high)
+        return o, t, turns, failed
+
+
+def _turned_back(before: float, jump: float) -> float:
+    """Return half the increment behind a zero of what had another before it."""
+    return math.copysign(max(abs(before) - jump, 0.0), before)
+
+
+def _zero_of(v: float, t: float, w: float, before: float, h: float) -> float:
+    """Return where a velocity that goes from v to w within t is zero.
+
+    On the parabola that has the mean slope ``before`` over an earlier length h, too.
+    """
+    mean = (w - v) / t
+    linear = -v / mean
+    bend = 2.0 * (mean - before) / (t + h) if before else 0.0
+    slope = mean + bend * (linear - 0.5 * t)
+    zero = linear - 0.5 * bend * linear * (linear - t) / slope if slope else linear
+    return zero if 0.0 < zero < t else linear
+
+
+# --- The machine
 
 
 class VirtualMachine:

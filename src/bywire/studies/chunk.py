@@ -1,4 +1,4 @@
-"""A chunk of a study's cases, computed: what varied and what it gave, a column each.
+"""A chunk of a study's cases: what varied and what it gave, a column each, and its Parquet file.
 
 It depends on the plan and its number alone, wherever and in whatever order it is computed.
 """
@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,10 @@ from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed
-from bywire.bench.key_figures import key_figures_of
+from bywire.bench.side_by_side import key_figures_of
 from bywire.core.errors import BywireError, DeviceError
+from bywire.core.scratch import replacing
+from bywire.data.file_format import library
 from bywire.studies.plan import CHUNK, StudyPlan
 
 CASE, FAILURE, WARNINGS = "case", "failure", "warnings"
@@ -186,3 +189,74 @@ def _fill(
     for figure in given.figures:
         columns[figure.name][cases] = figure.values
     columns[WARNINGS][cases] = ["; ".join(texts) for texts in given.warnings]
+
+
+# --- Its file: one Parquet file, whole or not at all, that says whose it is
+
+_WHAT = ("the files of a study", "studies")
+
+
+def require_pyarrow() -> None:
+    """Refuse to go on without the library: nothing could be read, and nothing is damaged.
+
+    Raises
+    ------
+    FileError
+        When it is not installed.
+    """
+    library("pyarrow", *_WHAT)
+
+
+def write_chunk(
+    path: Path, columns: Columns, units: Mapping[str, str], marks: Mapping[bytes, bytes]
+) -> None:
+    """Write a chunk's cases.
+
+    Parameters
+    ----------
+    path
+        Its file.
+    columns
+        Values of each quantity and figure, shape (cases,) each; texts as objects.
+    units
+        Unit of those that have one.
+    marks
+        What tells the file from any other.
+
+    Raises
+    ------
+    FileError
+        When pyarrow is not installed.
+    OSError
+        When the file cannot be written.
+    """
+    pa, parquet = library("pyarrow", *_WHAT), library("pyarrow.parquet", *_WHAT)
+    texts = [name for name, column in columns.items() if column.dtype.kind == "O"]
+    arrays = {name: pa.array(column) for name, column in columns.items()}
+    fields = [
+        pa.field(name, array.type, metadata={b"unit": units.get(name, "1").encode()})
+        for name, array in arrays.items()
+    ]
+    table = pa.table(list(arrays.values()), schema=pa.schema(fields, dict(marks)))
+    with replacing(path) as fresh:
+        # A dictionary of numbers that all differ would be written in vain.
+        parquet.write_table(table, fresh, write_page_checksum=True, use_dictionary=texts)
+
+
+def read_chunk(path: Path) -> tuple[Columns, Mapping[bytes, bytes]]:
+    """Return a chunk's cases as they were written, and what tells its file from any other.
+
+    Raises
+    ------
+    Exception
+        Whatever pyarrow raises of a file that is damaged.
+    """
+    parquet = library("pyarrow.parquet", *_WHAT)
+    # Of one file: what reads folders of them takes three times as long, and loads more.
+    with parquet.ParquetFile(path, page_checksum_verification=True, pre_buffer=False) as file:
+        table = file.read(use_threads=False)
+    columns = {
+        name: np.asarray(table.column(name).to_numpy(zero_copy_only=False))
+        for name in table.column_names
+    }
+    return columns, table.schema.metadata or {}

@@ -12,24 +12,258 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Limit
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
-from bywire.studies.choice_influence import ChoiceInfluence, choice_influence
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
-from bywire.studies.effects import ONE, Effect, effects
-from bywire.studies.judgment import Judgment, judgment_of
-from bywire.studies.plan import StudyPlan
+from bywire.studies.laws import ranked
+from bywire.studies.plan import StudyPlan, Varied
 from bywire.studies.rare_failures import RareFailure
 from bywire.studies.sensitivity import Sensitivity, sensitivity
-from bywire.studies.spread import Spread, spread_of
-from bywire.studies.statistics import Influence, influences
+from bywire.studies.statistics import (
+    FailureProbability,
+    Influence,
+    Outcome,
+    Share,
+    Spread,
+    influences,
+    judged,
+    share,
+    spread_of,
+)
 from bywire.studies.worst_case import WorstCase
 
 if TYPE_CHECKING:
     import pandas as pd
+
+ONE = "one-at-a-time"
+"""the design that shows it"""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What a key figure does as one quantity varies.
+
+    Parameters
+    ----------
+    quantity, unit
+        Its name and SI unit; of a choice no unit.
+    values
+        Its values [SI], or the choices, in the order of the cases, shape (levels,).
+    figures
+        The key figure at each, NaN where it is not defined, shape (levels,).
+    nominal
+        The key figure of the bench itself.
+    """
+
+    quantity: str
+    unit: str
+    values: Sequence[float | str]
+    figures: Array
+    nominal: float
+
+    @property
+    def least(self) -> float:
+        """Least value of the key figure, that of the bench itself among them."""
+        return float(np.nanmin([*self.figures, self.nominal]))
+
+    @property
+    def largest(self) -> float:
+        """Largest value."""
+        return float(np.nanmax([*self.figures, self.nominal]))
+
+    @property
+    def swing(self) -> float:
+        """How far the key figure goes."""
+        return self.largest - self.least
+
+    @property
+    def lacking(self) -> int:
+        """At how many levels it is not defined."""
+        return int(np.count_nonzero(~np.isfinite(self.figures)))
+
+
+def effects(
+    varied: Sequence[Varied], levels: int, columns: Sequence[Sequence[float | str]], figure: Array
+) -> list[Effect]:
+    """Return what each quantity does to a key figure, the largest swing first.
+
+    Quantities with which the figure is not defined any more come before that.
+
+    Parameters
+    ----------
+    varied, levels
+        What varies, and how many values each has; those of single values have theirs.
+    columns
+        Values of each quantity in every case, the bench itself first.
+    figure
+        The key figure in every case; what is not computed yet is missing at the end.
+    """
+    found: list[Effect] = []
+    begin = 1
+    for each, column in zip(varied, columns, strict=True):
+        end = begin + len(each.distribution.levels(levels))
+        figures = figure[begin:end]
+        if figures.size == end - begin and np.isfinite([figure[0], *figures]).any():
+            found.append(
+                Effect(each.name, each.unit, list(column[begin:end]), figures, float(figure[0]))
+            )
+        begin = end
+    return sorted(found, key=lambda effect: (-effect.lacking, -effect.swing))
+
+
+# --- Choices have no order: how a key figure goes with one
+
+
+@dataclass(frozen=True)
+class ChoiceInfluence:
+    """How a key figure goes with a choice that varies.
+
+    Parameters
+    ----------
+    quantity
+        Its name.
+    correlation_ratio
+        0 to 1: beside sizes of rank correlations; it has no sign.
+    is_distinct
+        Whether it differs from none.
+    """
+
+    quantity: str
+    correlation_ratio: float
+    is_distinct: bool
+
+    @property
+    def strength(self) -> float:
+        """How strong it is, 0 to 1."""
+        return self.correlation_ratio
+
+
+def choice_influence(
+    quantity: str, choices: Sequence[str], figure: Array, confidence: float
+) -> ChoiceInfluence | None:
+    """Return how a key figure goes with a choice; None where either does not vary.
+
+    The square of the ratio is the share of the ranks' variance that lies between the choices, less
+    what chance makes of it (T. L. Kelley, An unbiased correlation ratio measure, Proc. Natl. Acad.
+    Sci. 21, 1935). With two choices it is the size of the rank correlation with either, but for
+    that. Whether it differs from none, ranks alone tell (W. H. Kruskal and W. A. Wallis, Use of
+    ranks in one-criterion variance analysis, J. Am. Stat. Assoc. 47, 1952); an interval would need
+    to know how the figure is distributed.
+
+    Parameters
+    ----------
+    quantity, choices
+        Its name, and the choice of each case.
+    figure
+        The key figure in each case, shape (cases,); cases without one are left out.
+    confidence
+        With which it differs from none, between 0 and 1.
+    """
+    known = np.isfinite(figure)
+    y = ranked(figure[known])
+    _, group = np.unique(np.asarray(choices, dtype=str)[known], return_inverse=True)
+    counts = np.bincount(group)
+    if counts.size < 2 or y.size - counts.size < 1 or np.ptp(y) == 0.0:
+        return None
+    within = y - (np.bincount(group, y) / counts)[group]
+    rest = float(np.sum(within**2) / np.sum((y - y.mean()) ** 2))
+    ratio = math.sqrt(max(0.0, 1.0 - rest * (y.size - 1) / (y.size - counts.size)))
+    by_chance = float(special.chdtrc(counts.size - 1, (y.size - 1) * (1.0 - rest)))
+    return ChoiceInfluence(quantity, ratio, by_chance < 1.0 - confidence)
+
+
+# --- Requirements judged over the cases
+
+
+@dataclass(frozen=True)
+class Judgment:
+    """A requirement over all cases.
+
+    Parameters
+    ----------
+    demand
+        The requirement.
+    met
+        Whether each case meets it, shape (cases,); a case without a result does not.
+    share
+        How often, and the interval of the probability, whatever cases that are too close to the
+        limit are.
+    undecided
+        Cases no further from the limit than their figure may be off by the step.
+    outcome
+        Whether it is met with the probability that is wanted; of one that every case has to meet,
+        whether all do.
+    worst
+        Row of the case that is worst of all, or of the most probable failing one of a rare failure.
+        Worse than any other is a case that ran and does not have the figure. None where none ran,
+        or all have the same.
+    failure
+        How probable it is that the requirement is missed, of a study of rare failures: shares of
+        its cases are no probabilities.
+    """
+
+    demand: Limit
+    met: NDArray[np.bool_]
+    share: Share
+    undecided: int
+    outcome: Outcome
+    worst: int | None
+    failure: FailureProbability | None = None
+
+
+def judgment_of(
+    demand: Limit,
+    figure: Array,
+    failed: NDArray[np.bool_],
+    error: float,
+    confidence: float,
+) -> Judgment:
+    """Return a requirement judged over cases.
+
+    Parameters
+    ----------
+    demand
+        The requirement.
+    figure
+        Its key figure in every case, shape (cases,); NaN where a case does not have it.
+    failed
+        Whether a case has no result, shape (cases,).
+    error
+        What the figure may be off by, in its unit: cases closer to the limit count for neither
+        side.
+    confidence
+        Of the interval, between 0 and 1.
+    """
+    met, near = demand.is_met(figure), demand.is_near(figure, error)
+    count = figure.size
+    may, surely = (share(int(each.sum()), count, confidence) for each in (met | near, met & ~near))
+    if demand.probability is not None:
+        outcome = judged(may, surely, demand.probability)
+    elif may.count < count:
+        outcome = "missed"
+    else:
+        outcome = "met" if surely.count == count else "undecided"
+    told = replace(share(int(met.sum()), count, confidence), low=surely.low, high=may.high)
+    worst = _worst(figure, failed, demand.is_upper)
+    return Judgment(demand, met, told, int(near.sum()), outcome, worst)
+
+
+def _worst(figure: Array, failed: NDArray[np.bool_], is_upper: bool) -> int | None:
+    """Return the row of the case that is worst by an upper or a lower limit."""
+    known = np.isfinite(figure)
+    lacking = np.flatnonzero(~known & ~failed)
+    if lacking.size:
+        return int(lacking[0])
+    if not known.any() or (known.sum() > 1 and np.ptp(figure[known]) == 0.0):
+        return None  # whichever were named, it would be no worse than the others
+    return int(np.argmin(np.where(known, -figure if is_upper else figure, np.inf)))
+
+
+# --- All that was found
 
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 

@@ -1,4 +1,4 @@
-"""The study file that was meant where none is, perhaps without its ending."""
+"""The study that was meant: a file, perhaps without its ending, or a folder."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import os
 from pathlib import Path
 
 from bywire.core.errors import FileError
-from bywire.data.file_kinds import STUDY
-from bywire.data.meant_file import near_files
+from bywire.data.file_kinds import STUDY, first_there, kind_of_file, near_files
 
 _FOLDER = Path("studies")  # where study files usually are
 _NEAR = 0.8  # resemblance of a study file that was meant
@@ -34,3 +33,37 @@ def meant_study(file: Path) -> Path | None:
     """Return the study file that is meant: its name, with its ending, is the same or near."""
     folders = dict.fromkeys((file.parent, _FOLDER)) if file.parent == Path() else (file.parent,)
     return next((path for _, path in near_files(file, (STUDY,), folders, _NEAR)), None)
+
+
+# --- The folder of a study, where it is named
+
+RECORD = "study.json"
+"""file that says which study a folder holds"""
+_RESULTS = Path("results")  # where folders of results usually are
+
+
+def require_no_file(folder: Path) -> None:
+    """Refuse a file where the folder of a study is wanted.
+
+    Raises
+    ------
+    FileError
+        Naming the folder that the study was run into, where it is known.
+    """
+    try:
+        if not folder.is_file():
+            return
+    except (OSError, ValueError):  # ValueError: a null character in the path
+        return
+    near = (Path(folder.stem), _RESULTS / folder.stem, folder.parent)
+    there = first_there(each / RECORD for each in near)
+    is_study = kind_of_file(folder) == STUDY
+    advice = (
+        f"did you mean {there.parent}?"
+        if there is not None
+        else f"'bywire study run {folder}' makes one"
+        if is_study
+        else "name the one that 'bywire study run' has written"
+    )
+    kind = "study file" if is_study else "file"
+    raise FileError(f"{folder} is a {kind}, and the folder of a study is wanted: {advice}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,16 +16,159 @@ from numpy.typing import NDArray
 from bywire.bench.bench import Bench
 from bywire.bench.computation import computation
 from bywire.bench.requirements import Limit
+from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import Array
 from bywire.core.version import __version__
-from bywire.studies.correlation import correlation_factor
+from bywire.studies.designs import (
+    MORRIS,
+    RARE,
+    SAMPLED,
+    SENSITIVITY,
+    SOUGHT,
+    WORST,
+    Sampled,
+    SensitivityDesign,
+    SoughtDesign,
+    Spanned,
+    library_version,
+    spanned,
+)
 from bywire.studies.distribution import Distribution
-from bywire.studies.identity import as_json, digest_of
-from bywire.studies.points import SAMPLED, Sampled, Spanned, spanned
-from bywire.studies.sensitivity_design import MORRIS, SENSITIVITY, SensitivityDesign
-from bywire.studies.sought_design import RARE, SOUGHT, WORST, SoughtDesign, library_version
-from bywire.studies.studied_bench import StudiedBench
+
+
+@dataclass(frozen=True)
+class StudiedBench:
+    """Where the bench of a study comes from.
+
+    Parameters
+    ----------
+    bench
+        The bench file, as the study file names it, or the experiment.
+    changes
+        What ``[set]`` and ``--set`` change of it, as texts by name.
+    """
+
+    bench: str
+    changes: Mapping[str, str] = field(default_factory=dict)
+
+
+# --- Correlations of what varies: those of the normal scores, a Gaussian copula
+
+
+def correlation_factor(
+    names: Sequence[str], correlations: Mapping[tuple[str, str], float]
+) -> Array | None:
+    """Return the Cholesky factor of a correlation matrix; None where nothing is correlated.
+
+    Raises
+    ------
+    ParameterError
+        When no such quantities can exist: the matrix is not positive definite.
+    """
+    if not correlations:
+        return None
+    matrix = np.eye(len(names))
+    for (first, second), value in correlations.items():
+        i, k = names.index(first), names.index(second)
+        matrix[i, k] = matrix[k, i] = value
+    try:
+        return np.asarray(np.linalg.cholesky(matrix))
+    except np.linalg.LinAlgError:
+        least = float(np.linalg.eigvalsh(matrix)[0])
+        told = "; ".join(f"{a}, {b}: {value:g}" for (a, b), value in correlations.items())
+        raise ParameterError(
+            f"[[correlation]] {told}: no quantities can be correlated so, for the matrix is not "
+            f"positive definite (least eigenvalue {least:.2g}): take values closer to zero"
+        ) from None
+
+
+# --- What tells a study from another: all that figures of its cases depend on
+
+_SHOWN = 3  # entries that are named, of those that differ
+_WORDS = {
+    "version": "the version of bywire",
+    "computed equations": "the equations of the model",
+    "computed figures": "how the runs or their key figures are computed",
+    "points": "how the library draws",
+}
+"""entries whose values say nothing to a reader"""
+_PARTS = {"varied": ("", "together", "quantiles"), "stimuli": ("", "parameters")}
+"""entries whose values are lists, and what stands in each place of them"""
+
+
+def as_json(identity: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an identity as it is kept: of nothing but what JSON has."""
+    kept: dict[str, Any] = json.loads(json.dumps(identity, sort_keys=True, default=str))
+    return kept
+
+
+def digest_of(identity: Mapping[str, Any]) -> str:
+    """Return what tells an identity from any other."""
+    text = json.dumps(identity, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """Return which entries of two identities differ, for a reader; empty where that is not known.
+
+    Examples
+    --------
+    >>> differing({"seed": 1, "parameters": {"motor.R_m": 0.35}}, {"seed": 2, "parameters": {}})
+    'parameters motor.R_m: 0.35, now nothing; seed: 1, now 2'
+    """
+    if not before:
+        return ""
+    if "brake" in before:  # the digest of its source, which told studies apart once
+        return "an older version of bywire has written it"
+    old, new = dict(_entries(before)), dict(_entries(now))
+    differ = [name for name in sorted({*old, *new}) if old.get(name) != new.get(name)]
+    names = [name for name in differ if not _is_said(name, old, new)]
+    texts = [_difference(name, old, new) for name in names[:_SHOWN]]
+    rest = [f"and {len(names) - _SHOWN} more"] if len(names) > _SHOWN else []
+    return "; ".join(texts + rest)
+
+
+def _is_said(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    """Return whether a difference follows from one of another entry.
+
+    Quantiles differ where the text of a distribution does, and all of what varies only now.
+    """
+    whole, _, part = name.rpartition(" ")
+    if part == "quantiles":
+        return old.get(whole) != new.get(whole)
+    return part == "together" and (whole in old) != (whole in new)
+
+
+def _difference(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    if name in _WORDS:
+        return _WORDS[name]
+    before, now = _shown(old.get(name)), _shown(new.get(name))
+    return f"{name}: {before}, now {now}" if before != now else f"{name}: other values"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, list):
+        value = ", ".join(map(str, value))
+    text = "nothing" if value is None or value == "" else str(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _entries(identity: Mapping[str, Any], group: str = "") -> list[tuple[str, Any]]:
+    """Return the entries with those of groups in words of their own."""
+    entries: list[tuple[str, Any]] = []
+    for key, value in identity.items():
+        name = f"{group} {key}".strip()
+        if isinstance(value, Mapping):
+            entries += _entries(value, name)
+        elif group in _PARTS and isinstance(value, list):
+            entries += _entries(dict(zip(_PARTS[group], value, strict=False)), name)
+        else:
+            entries.append((name, value))
+    return entries
+
+
+# --- The plan
 
 CHUNK = 64
 """cases of a chunk, the piece of work that is computed, kept and counted as a whole"""
@@ -68,8 +212,8 @@ class StudyPlan:
     varied
         What varies.
     design
-        One of `points.SAMPLED`, `points.SPANNED`, `sensitivity_design.SENSITIVITY` or
-        `sought_design.SOUGHT`.
+        One of `points.SAMPLED`, `points.SPANNED`, `designs.SENSITIVITY` or
+        `designs.SOUGHT`.
     cases
         Cases asked for; of indices, and of each rare failure, at most so many; of other listed
         points, all there are.

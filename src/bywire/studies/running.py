@@ -12,12 +12,12 @@ from bywire.bench.result import Result
 from bywire.core.typing import Progress
 from bywire.simulation.cuda_device import find_device
 from bywire.simulation.engine import CUDA
+from bywire.studies.designs import WORST
 from bywire.studies.executor import executor_of, require_workers
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.rare_failures import rare_failures
-from bywire.studies.sought_design import WORST
 from bywire.studies.store import Origin, StudyStore
-from bywire.studies.worst_cases import worst_cases
+from bywire.studies.worst_case import worst_cases
 
 
 @dataclass(frozen=True)

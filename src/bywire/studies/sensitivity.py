@@ -9,7 +9,7 @@ import numpy as np
 
 from bywire.core.typing import Array
 from bywire.data.file_format import library
-from bywire.studies.sensitivity_design import LEVELS, LIBRARY, STEP, SensitivityDesign
+from bywire.studies.designs import LEVELS, SALIB, STEP, SensitivityDesign
 
 _RESAMPLES = 200  # of the groups, for intervals: their widths scatter by 5 %
 _ROUNDING = 1e-12  # share of a figure below which its differences are those of rounding
@@ -159,7 +159,7 @@ def sensitivity(
 def _variance_shares(
     design: SensitivityDesign, names: Sequence[str], figure: Array, confidence: float
 ) -> Sensitivity:
-    indices = library("SALib.analyze.sobol", *LIBRARY).analyze(
+    indices = library("SALib.analyze.sobol", *SALIB).analyze(
         design.problem,
         figure,
         calc_second_order=False,
@@ -185,7 +185,7 @@ def _elementary_effects(
     figure: Array,
     confidence: float,
 ) -> Sensitivity:
-    indices = library("SALib.analyze.morris", *LIBRARY).analyze(
+    indices = library("SALib.analyze.morris", *SALIB).analyze(
         design.problem,
         design.probabilities,
         figure,

@@ -1,4 +1,4 @@
-"""What the cases of a study say: probabilities and quantiles with intervals, and what drives them.
+"""What the cases of a study say: probabilities and quantiles with intervals, and spread.
 
 Intervals are those of independent cases. Latin hypercubes and scrambled sequences scatter less, of
 averages at least: their intervals are on the safe side as a rule (A. B. Owen, Monte Carlo variance
@@ -8,8 +8,8 @@ of scrambled net quadrature, SIAM J. Numer. Anal. 34, 1997).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -230,3 +230,212 @@ def running_share(met: NDArray[np.bool_], confidence: float, count: int = 60) ->
     """Return how an estimate came about: the share of the first cases, of ever more of them."""
     sizes = np.unique(np.geomspace(1, max(met.size, 1), count).astype(int))
     return [share(int(met[:n].sum()), int(n), confidence) for n in sizes if met.size]
+
+
+# --- Spread of a key figure over the cases
+
+QUANTILES = (0.05, 0.5, 0.95)
+"""shares of the cases below the quantiles that are shown"""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A key figure over all cases; values in ``unit``, NaN where no case has it.
+
+    Parameters
+    ----------
+    name, unit
+        The figure.
+    nominal
+        What the bench itself gives.
+    undefined
+        Cases in which it is not defined, or without a result.
+    mean, sd
+        Mean and standard deviation.
+    quantiles
+        Those of `QUANTILES`, with intervals.
+    least, largest
+        Ends.
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    undefined: int
+    mean: float
+    sd: float
+    quantiles: tuple[Quantile, ...]
+    least: float
+    largest: float
+
+
+def spread_of(name: str, unit: str, nominal: float, figure: Array, confidence: float) -> Spread:
+    """Return the spread of a key figure that some case has.
+
+    Parameters
+    ----------
+    name, unit, nominal
+        The figure, and what the bench itself gives.
+    figure
+        In every case, shape (cases,); NaN where a case does not have it.
+    confidence
+        Of the intervals of its quantiles, between 0 and 1.
+    """
+    known = figure[np.isfinite(figure)]
+    return Spread(
+        name,
+        unit,
+        nominal,
+        figure.size - known.size,
+        float(known.mean()),
+        float(known.std(ddof=1)) if known.size > 1 else math.nan,
+        tuple(quantile(known, p, confidence) for p in QUANTILES),
+        float(known.min()),
+        float(known.max()),
+    )
+
+
+# --- Probability of a missed requirement: an estimate, its interval, where it is from
+
+State = Literal["done", "negligible", "budget spent", "unfinished", "level", "no design point"]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An estimate of a probability with its coefficient of variation and its interval.
+
+    Parameters
+    ----------
+    value, variation
+        The estimate and its standard deviation over it; NaN where there is none.
+    low, high
+        Ends of the interval.
+    """
+
+    value: float
+    variation: float
+    low: float
+    high: float
+
+
+UNKNOWN = Interval(math.nan, math.nan, 0.0, 1.0)
+"""what is known of a probability without any case"""
+
+
+def interval(value: float, variation: float, confidence: float) -> Interval:
+    """Return an estimate with an interval that is log-normal: products of shares are skewed.
+
+    Examples
+    --------
+    >>> found = interval(1e-4, 0.3, 0.95)
+    >>> round(found.low * 1e5, 2), round(found.high * 1e5, 2)
+    (5.62, 17.78)
+    """
+    if not value > 0.0:
+        return UNKNOWN
+    reach = float(normal_quantile(0.5 + 0.5 * confidence)) * math.sqrt(math.log1p(variation**2))
+    return Interval(value, variation, value * math.exp(-reach), min(value * math.exp(reach), 1.0))
+
+
+def counted(count: int, cases: int, confidence: float) -> Interval:
+    """Return a probability by independent cases, with its exact interval."""
+    exact = share(count, cases, confidence)
+    variation = math.sqrt((1.0 - exact.value) / count) if count else math.nan
+    return Interval(exact.value, variation, exact.low, exact.high)
+
+
+@dataclass(frozen=True)
+class Level:
+    """A level of subset simulation, or the only one of another method.
+
+    Parameters
+    ----------
+    margin
+        Margin at which it ends, in the figure's unit; zero of the last.
+    probability
+        That a case has this margin or less.
+    """
+
+    margin: float
+    probability: float
+
+
+@dataclass(frozen=True)
+class FailureProbability:
+    """How probable a failure is, by a method for rare ones.
+
+    Parameters
+    ----------
+    state
+        ``done``; ``negligible``: below what the method went on for; ``budget spent``;
+        ``unfinished``: cases are not computed yet; ``level``: too many cases have the same figure;
+        ``no design point``: a search found none.
+    estimate
+        Of the probability that the margin is <= 0; of a method that did not come there, an upper
+        end alone.
+    below
+        ``below(x)``: estimate of the probability that the margin is <= x, in the figure's unit.
+    levels
+        How the estimate came about.
+    runs
+        Cases used.
+    span
+        Least and largest margin of which ``below`` has something to say; none where it has not.
+    place, scores
+        The most probable failing case: its place among the cases used, and its standard normal
+        scores, independent ones; None where none failed.
+    center
+        Where failures lie: the mean of their scores, or FORM's design point; None where it is not
+        known.
+    failing
+        Scores of failing cases, as probable as they are, shape (cases, quantities); None of another
+        method than subset simulation.
+    first_order
+        FORM's reliability index beta; NaN of another method.
+    failed
+        How many of the cases failed, where somebody has counted them.
+    why
+        What else there is to say of the state.
+    """
+
+    state: State
+    estimate: Interval
+    below: Callable[[float], Interval]
+    levels: tuple[Level, ...]
+    runs: int
+    span: tuple[float, float] | None = None
+    place: int | None = None
+    scores: Array | None = None
+    center: Array | None = None
+    failing: Array | None = None
+    first_order: float = math.nan
+    failed: int = 0
+    why: str = ""
+
+    def within(self, error: float) -> Interval:
+        """Return the estimate with the interval that decides.
+
+        Parameters
+        ----------
+        error
+            As of `outcome`.
+        """
+        low, high = self.below(-error).low, self.below(error).high
+        known = self.estimate
+        return replace(known, low=min(low, known.low), high=max(high, known.high))
+
+    def outcome(self, wanted: float, error: float) -> Outcome:
+        """Return whether a requirement is met with a probability.
+
+        Parameters
+        ----------
+        wanted
+            Least probability that it is met.
+        error
+            What the figure may be off by, in its unit: cases this close to the limit count for
+            neither side.
+        """
+        decides, allowed = self.within(error), 1.0 - wanted
+        if decides.high <= allowed:
+            return "met"
+        return "missed" if decides.low > allowed else "undecided"

@@ -1,4 +1,4 @@
-"""The folder of a study: one Parquet file a chunk, and what tells whose they are.
+"""The folder of a study: a Parquet file a chunk, whose they are, and how many are asked for.
 
 The files are the truth: a chunk that is there is never computed again. Each appears whole or not at
 all, so that whatever is killed loses the chunks that it was at.
@@ -10,21 +10,21 @@ import json
 import shlex
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bywire.core.arguments import whole_number
 from bywire.core.brake import loaded_files
-from bywire.core.errors import FileError
+from bywire.core.errors import FileError, ParameterError
 from bywire.core.scratch import replacing, sweep
-from bywire.studies.chunk import Columns
-from bywire.studies.chunk_file import read_chunk, require_pyarrow, write_chunk
-from bywire.studies.identity import differing
-from bywire.studies.plan import CHUNK, StudyPlan
-from bywire.studies.study_folder import RECORD, require_no_file
+from bywire.studies.chunk import Columns, read_chunk, require_pyarrow, write_chunk
+from bywire.studies.designs import MOST, SPANNED
+from bywire.studies.meant_study import RECORD, require_no_file
+from bywire.studies.plan import CHUNK, StudyPlan, differing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -266,4 +266,69 @@ def _unwritable(path: Path, error: OSError) -> FileError:
     return FileError(
         f"cannot write {path}: {error.strerror or error}: make room there and resume the study; "
         "what is finished stays"
+    )
+
+
+# --- How many cases are asked for, beside what the file says and the folder has
+
+
+def with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPlan:
+    """Return the plan with so many cases, and with all that its folder was asked for.
+
+    Parameters
+    ----------
+    plan
+        The study as its file says.
+    store
+        Its folder.
+    cases
+        Cases asked for; None for as many as the file and the folder say. Fewer than the folder was
+        asked for take back those that are not computed.
+
+    Raises
+    ------
+    ParameterError
+        For fewer than are computed, too few, too many, and where the design says how many there
+        are.
+    """
+    if cases is not None:
+        cases = whole_number("cases", cases, 1, MOST)
+    if plan.design in SPANNED:
+        if cases is not None:
+            require_extensible(plan, cases)
+        return plan
+    if plan.is_sampled or plan.sought is not None:
+        asked, computed = store.asked_and_computed(plan)
+        if cases is not None and cases < computed:
+            raise ParameterError(
+                f"cases = {cases}: {store.folder} has {computed} already, and none are taken off: "
+                "name more of them, or another folder"
+            )
+        extended = replace(plan, cases=max(plan.cases, asked) if cases is None else cases)
+        if extended.sought is not None:
+            extended.sought.require_budget()
+        return extended
+    given = plan if cases is None else replace(plan, cases=cases)
+    given.points  # noqa: B018 - refuses too few before anything runs
+    return given
+
+
+def require_extensible(plan: StudyPlan, cases: int) -> None:
+    """Refuse to add cases to a design that has its own.
+
+    Raises
+    ------
+    ParameterError
+        When it lists them, or they belong together in groups.
+    """
+    if plan.is_sampled or plan.sought is not None:
+        return
+    why = (
+        "it lists them by quantities and levels"
+        if plan.design in SPANNED
+        else "its groups belong together"
+    )
+    raise ParameterError(
+        f"cases = {cases}: none are added to a study of {plan.design!r}, for {why}: change the "
+        "study file, and run it into another folder"
     )

@@ -2,27 +2,283 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
 
+from pydantic import Field
+
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
 from bywire.bench.bench_source import names_experiment
-from bywire.core.errors import InputError, ParameterError, quoted
-from bywire.core.section import Hint, Name, Section, Table
+from bywire.bench.requirements import Limit, read_limit
+from bywire.core.callers import option
+from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
+from bywire.core.quantities import Unit
+from bywire.core.section import Hint, Name, Names, Section, Table
+from bywire.core.units import parse
 from bywire.data.file_kinds import STUDY, require_kind
 from bywire.data.toml_file import read_toml
-from bywire.studies.correlation_section import CorrelationSection, in_order, read_correlations
-from bywire.studies.demand_section import read_demands
-from bywire.studies.design_rules import require_agreement
-from bywire.studies.design_section import DesignSection, read_design
-from bywire.studies.measured import MeasuredSection
-from bywire.studies.plan import StudyPlan
-from bywire.studies.studied_bench import StudiedBench
-from bywire.studies.vary_section import read_all_varied
+from bywire.studies.designs import (
+    DEFAULT_CASES,
+    IMPORTANCE,
+    LEVELS,
+    MORRIS,
+    MOST,
+    RARE,
+    SAMPLED,
+    SENSITIVITY,
+    SOUGHT,
+    SPANNED,
+    SUBSET,
+    SoughtDesign,
+)
+from bywire.studies.distribution import rising
+from bywire.studies.plan import StudiedBench, StudyPlan, Varied, correlation_factor
+from bywire.studies.vary_section import MeasuredSection, read_all_varied
+
+_CORRELATION = Hint("write for instance of = ['motor.R_m', 'motor.K_e'] and value = 0.5")
+
+
+class CorrelationSection(Section):
+    """A section ``[[correlation]]``: two quantities, and the correlation of their scores."""
+
+    of: Annotated[Names, _CORRELATION]
+    value: Annotated[float, Unit("1"), Field(gt=-1, lt=1), _CORRELATION]
+
+
+def in_order(
+    varied: Sequence[Varied], correlations: Mapping[tuple[str, str], float]
+) -> tuple[Varied, ...]:
+    """Return what varies; single values that are correlated rise, however the file lists them."""
+    correlated = {name for pair in correlations for name in pair}
+    return tuple(
+        replace(each, distribution=rising(each.distribution))
+        if each.name in correlated and each.distribution.is_discrete
+        else each
+        for each in varied
+    )
+
+
+def read_correlations(
+    sections: Sequence[CorrelationSection],
+    varied: Sequence[Varied],
+    known: Mapping[tuple[str, str], float],
+) -> dict[tuple[str, str], float]:
+    """Return the correlations of ``[[correlation]]`` by pairs of names in alphabetical order.
+
+    Parameters
+    ----------
+    sections
+        What the file says.
+    varied
+        What varies.
+    known
+        Correlations that are known already.
+
+    Raises
+    ------
+    InputError
+        For entries that do not fit, and correlations that no quantities can have.
+    """
+    names = {each.name: each for each in varied}
+    pairs: dict[tuple[str, str], float] = {}
+    for section in sections:
+        pair = section.of
+        if len(pair) != 2 or pair[0] == pair[1]:
+            raise ParameterError(f"[[correlation]] of = {quoted(list(pair))}: two names are wanted")
+        for name in pair:
+            if name not in names:
+                raise unknown_name("quantity of [[correlation]]", name, names)
+            if not names[name].unit:
+                raise ParameterError(
+                    f"[[correlation]] of {pair[0]} and {pair[1]}: {name} is a choice, and what has "
+                    "no order neither rises nor falls with another: leave it out, or make a study "
+                    "for each of its values"
+                )
+        first, second = sorted(pair)
+        if (first, second) in {**known, **pairs}:
+            raise ParameterError(f"[[correlation]] of {first} and {second} stands there twice")
+        pairs[first, second] = section.value
+    correlation_factor(list(names), {**known, **pairs})
+    return pairs
+
+
+# --- The section ``[requirements]``: limits, each with a probability as wanted
+
+_WITH = re.compile(r"(.*?)\s+with\b\s*(.*?)\s*", re.DOTALL)
+_PERCENT = re.compile(r"[+-]?[\d.]+(?:[eE][+-]?\d+)?\s*%")
+_SHARE = re.compile(r"0?\.\d+")
+_DEMAND = "99 %"
+
+
+def read_demands(bench: Bench, section: Mapping[str, Any]) -> Iterator[Limit]:
+    """Yield what is required: by the study, and by its bench of what the study says nothing of.
+
+    Raises
+    ------
+    InputError
+        For key figures that there are not, and limits and probabilities that cannot be read.
+    """
+    units = bench.definition.kpis_with(bench.chosen_options)
+    for kpi, text in {**bench.requirements, **section}.items():
+        if kpi not in units:
+            raise unknown_name("KPI in [requirements]", kpi, units)
+        split = _WITH.fullmatch(text) if isinstance(text, str) else None
+        limit = read_limit(kpi, split[1] if split else text, units[kpi])
+        yield replace(limit, probability=_probability(kpi, text, split[2])) if split else limit
+
+
+def _probability(kpi: str, text: str, given: str) -> float:
+    """Return the probability that stands behind "with" in the text of a requirement."""
+    if not _PERCENT.fullmatch(given):  # 0.9 may be a share, or 0.9 %
+        example = f"{100.0 * float(given):.10g} %" if _SHARE.fullmatch(given) else _DEMAND
+        raise ParameterError(
+            f"requirement {kpi} = {quoted(text)}: behind 'with' stands {quoted(given)}, and a "
+            f"probability in percent is wanted: write for instance 'with {example}'"
+        )
+    share = parse(given, "1", f"probability of requirement {kpi}")
+    if not 0.0 < share < 1.0:
+        raise ParameterError(
+            f"requirement {kpi}: a probability of {given} is not admissible: it must lie between 0 "
+            "and 100 %, as 'with 99.9 %'; leave it out where every case has to meet the limit"
+        )
+    return share
+
+
+# --- What a design admits: probabilities, correlations, and how many cases
+
+_DEPENDENT = "has cases that share values and are not independent"
+
+
+def require_agreement(plan: StudyPlan) -> None:
+    """Refuse probabilities and correlations of designs without independent cases.
+
+    Raises
+    ------
+    ParameterError
+        For these, and for a number of cases that the design does not admit.
+    """
+    if plan.is_sampled:
+        return
+    if plan.sought is not None and plan.design in RARE:
+        _require_rare(plan, plan.sought)
+        return
+    is_indexed = plan.design in SENSITIVITY
+    others = ", ".join(map(repr, SAMPLED))
+    if plan.correlations:
+        why = (
+            "exchanges each quantity for itself, so that none may depend on another"
+            if is_indexed
+            else "goes to the ends of each quantity for itself"
+        )
+        raise ParameterError(
+            f"[[correlation]]: {plan.design!r} {why}: leave it out, or take {others}"
+        )
+    if plan.design == MORRIS:
+        for each in plan.varied:
+            if (count := len(each.distribution.singles)) > LEVELS:
+                raise ParameterError(
+                    f"[vary] {each.name} has {count} values, and {plan.design!r} steps on {LEVELS} "
+                    f"levels: some would never be taken; name {LEVELS} of them, or take "
+                    "'sobol-indices'"
+                )
+    for demand in plan.demands:
+        if demand.probability is not None:
+            why = _DEPENDENT if plan.design == "sobol-indices" else "draws nothing"
+            raise ParameterError(
+                f"requirement {str(demand)!r}: {plan.design!r} {why}, so that its cases "
+                f"have no probability: take {others}, or leave 'with ...' out: every case then has "
+                "to meet the limit"
+            )
+    if plan.sought is not None:
+        if not plan.demands:
+            raise ParameterError(
+                f"[requirements]: {plan.design!r} searches for the worst case of each, and there "
+                'is none: write for instance overshoot = "<= 15 %"'
+            )
+        plan.sought.require_budget()
+        return
+    plan.points  # noqa: B018 - refuses what is too large, or too small for indices
+
+
+def _require_rare(plan: StudyPlan, design: SoughtDesign) -> None:
+    """Refuse rare failures of nothing, and the search of a design point among single values."""
+    if not plan.judged_demands:
+        raise ParameterError(
+            f"[requirements]: {plan.design!r} asks how probable it is that one is missed, and none "
+            'has a probability: write for instance "<= 15 % with 99.99 %"'
+        )
+    singles = [each.name for each in plan.varied if each.distribution.is_discrete]
+    if singles and plan.design == IMPORTANCE:
+        raise ParameterError(
+            f"[vary] {', '.join(singles)}: {plan.design!r} follows derivatives, and single values "
+            f"have none: take {SUBSET!r}"
+        )
+    design.require_budget()
+
+
+# --- The section ``[design]``: where it is computed, and how many cases
+
+_KINDS = (*SAMPLED, *SPANNED, *SENSITIVITY, *SOUGHT)
+_WITH_LEVELS = ("grid", "one-at-a-time")
+_Cases = Annotated[int | None, Field(ge=1, le=MOST)]
+
+
+class DesignSection(Section):
+    """The section ``[design]``; what it leaves out is as of a `StudyPlan`."""
+
+    kind: str = StudyPlan.design
+    cases: _Cases = None
+    seed: Annotated[int | None, Field(ge=0, le=2**63 - 1)] = None
+    levels: Annotated[int | None, Field(ge=2, le=1000)] = None
+    confidence: Annotated[float | None, Unit("1"), Field(ge=0.5, lt=1)] = None
+    cases_per_level: _Cases = None
+    time: Annotated[float | None, Unit("s"), Field(gt=0)] = None
+
+
+def read_design(section: DesignSection) -> dict[str, Any]:
+    """Return what the section says, by the fields of a `StudyPlan`.
+
+    Raises
+    ------
+    InputError
+        For what is unknown, and what the kind of design has no use for.
+    """
+    if section.kind not in _KINDS:
+        raise unknown_name("[design] kind", section.kind, _KINDS)
+    given = section.given
+    _require_of_use(section.kind, given)
+    if section.kind in DEFAULT_CASES:
+        given.setdefault("cases", DEFAULT_CASES[section.kind])
+    return {"design": section.kind} | {key: given[key] for key in given if key != "kind"}
+
+
+def _require_of_use(kind: str, section: Mapping[str, Any]) -> None:
+    """Refuse what a design has no use for."""
+    if "levels" in section and kind not in _WITH_LEVELS:
+        raise ParameterError(
+            f"[design] levels: {kind!r} has none to choose"
+            + (f", it steps on {LEVELS}" if kind == "morris" else "")
+            + ": leave them out"
+        )
+    if "cases_per_level" in section and kind != SUBSET:
+        raise ParameterError(
+            f"[design] cases_per_level: {kind!r} has no levels to fill, {SUBSET!r} has: leave it "
+            "out"
+        )
+    if "time" in section and kind in SOUGHT:
+        raise ParameterError(f"[design] time: the budget of {kind!r} is its 'cases': leave it out")
+    if "cases" in section and kind in SPANNED:
+        raise ParameterError(
+            f"[design] cases: {kind!r} lists its cases by quantities and levels: leave them out"
+        )
+
+
+# --- The file
 
 BenchName = Annotated[
     Name,
@@ -118,7 +374,7 @@ def read_bench(
         if not isinstance(value, str):
             raise ParameterError(
                 f"[set] {key} = {quoted(value)}: write the value as a text, "
-                "with its unit, as --set takes it"
+                f"with its unit, as {option('overrides')} takes it"
             )
     there = source if names_experiment(source) else folder / source
     return bench_file.read(there, {**flat, **overrides})

@@ -1,16 +1,22 @@
-"""A surrogate: a key figure as a polynomial of what varies, and how far it is off."""
+"""Surrogates: key figures as fitted polynomials of what varies, and how far they are off."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.typing import Array
 from bywire.core.units import shown
+from bywire.data.file_format import library
+from bywire.studies.designs import SOUGHT
+from bywire.studies.findings import Findings
+from bywire.studies.plan import StudyPlan, Varied
 
 _SHOWN = 6  # single values that an error names
 _SAME = 1e-9  # share by which two texts of the same value may differ
@@ -134,3 +140,173 @@ def _listed(values: Array, unit: str) -> str:
     if len(texts) > _SHOWN:
         texts = [*texts[: _SHOWN - 1], "...", texts[-1]]
     return ", ".join(texts)
+
+
+# --- Polynomial chaos through the cases of a study
+# R. G. Ghanem and P. D. Spanos, Stochastic Finite Elements, 1991; fitted by OpenTURNS, with terms
+# chosen by least angle regression (G. Blatman and B. Sudret, Journal of Computational Physics 230,
+# 2011).
+
+LIBRARY = ("surrogates of studies", "studies")
+_FEWEST = 30  # cases of which a surrogate may be made
+_LARGEST = 4  # degree: with five quantities the fifth gains little, and takes ten times as long
+_FOLDS = 5  # a fifth of the cases is told by the others, in turn
+_LACKING = ("one-at-a-time", "corners", "morris", *SOUGHT)  # they show no more than some places
+
+
+def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
+    """Return the surrogate of a key figure from the cases of a study.
+
+    The degree is the one that tells a fifth of the cases best which it has not seen.
+
+    Raises
+    ------
+    UnknownNameError
+        For a figure that the study does not have.
+    ParameterError
+        For designs that do not show what lies between their points, structural choices among what
+        varies, too few cases, and a figure that does not vary.
+    FileError
+        When OpenTURNS is not installed.
+    """
+    plan = findings.plan
+    require_fittable(plan)
+    if kpi not in findings.units:
+        raise unknown_name("key figure", kpi, findings.units)
+    y = findings.figure(kpi)
+    known = np.isfinite(y)
+    columns = {v.name: np.asarray(findings.cases[v.name], dtype=float) for v in plan.varied}
+    x, y = np.column_stack(list(columns.values()))[known], y[known]
+    if y.size < _FEWEST:
+        raise ParameterError(
+            f"{kpi} is defined in {y.size} of the cases: a surrogate needs {_FEWEST} at least"
+        )
+    if np.ptp(y) == 0.0:
+        raise ParameterError(f"{kpi} is the same in all cases: there is nothing to tell")
+    errors, best = min(
+        (_of_unseen(plan.varied, x, y, degree, 0) for degree in _degrees(x.shape)),
+        key=lambda told: float(np.mean(told[0] ** 2)),
+    )
+    others = [_of_unseen(plan.varied, x, y, best.degree, k)[0] for k in range(1, _FOLDS)]
+    errors = np.concatenate([errors, *others])
+    best = _fitted(plan.varied, x, y, best.degree)
+    nominal = _within(plan.varied, x)
+    return Surrogate(
+        kpi,
+        findings.units[kpi],
+        nominal,
+        {v.name: v.unit for v in plan.varied},
+        dict(zip(nominal, x.min(axis=0).tolist(), strict=True)),
+        dict(zip(nominal, x.max(axis=0).tolist(), strict=True)),
+        _singles(plan.varied, x),
+        y.size,
+        best.degree,
+        best.terms,
+        float(np.sqrt(np.mean(errors**2))),
+        float(np.abs(errors).max()),
+        1.0 - float(np.mean(errors**2) / np.var(y)),
+        best.polynomial,
+    )
+
+
+def require_fittable(plan: StudyPlan) -> None:
+    """Refuse studies whose cases no polynomial goes through: see `surrogate_of`.
+
+    Raises
+    ------
+    ParameterError
+        For designs that show no more than some places, and choices among what varies.
+    """
+    if plan.design in _LACKING:
+        raise ParameterError(
+            f"the cases of {plan.design!r} do not show what lies between them: a surrogate "
+            "takes 'monte-carlo', 'latin-hypercube', 'sobol', 'sobol-indices' or 'grid'"
+        )
+    choices = [v.name for v in plan.varied if not v.unit]
+    if choices:
+        raise ParameterError(
+            f"{', '.join(choices)}: a choice has no polynomial; make a study for each of its values"
+        )
+
+
+def _within(varied: Sequence[Varied], x: Array) -> dict[str, float]:
+    """Return what the bench has of each quantity; where no case comes so far, the nearest."""
+    singles = _singles(varied, x)
+    return {
+        v.name: min(singles[v.name], key=lambda single: abs(single - v.nominal))
+        if v.name in singles
+        else float(np.clip(v.nominal, x[:, k].min(), x[:, k].max()))
+        for k, v in enumerate(varied)
+    }
+
+
+def _singles(varied: Sequence[Varied], x: Array) -> dict[str, tuple[float, ...]]:
+    """Return the values in the cases of each quantity that has single ones."""
+    return {
+        v.name: tuple(np.unique(x[:, k]).tolist())
+        for k, v in enumerate(varied)
+        if v.distribution.is_discrete
+    }
+
+
+def _degrees(shape: tuple[int, ...]) -> list[int]:
+    """Return degrees whose polynomial has fewer terms than half of the cases it is fitted to."""
+    cases, quantities = shape
+    fit = [
+        degree
+        for degree in range(1, _LARGEST + 1)
+        if math.comb(quantities + degree, degree) <= 0.5 * cases * (1.0 - 1.0 / _FOLDS)
+    ]
+    return fit or [1]
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """A polynomial through cases, its degree, and how many terms it has."""
+
+    degree: int
+    terms: int
+    polynomial: Polynomial
+
+
+def _of_unseen(
+    varied: Sequence[Varied], x: Array, y: Array, degree: int, fifth: int
+) -> tuple[Array, _Fit]:
+    """Return the errors of a fifth of the cases, told by the others, and what told them."""
+    apart = np.arange(y.size) % _FOLDS == fifth
+    fit = _fitted(varied, x[~apart], y[~apart], degree)
+    return fit.polynomial(x[apart]) - y[apart], fit
+
+
+def _fitted(varied: Sequence[Varied], x: Array, y: Array, degree: int) -> _Fit:
+    ot: Any = library("openturns", *LIBRARY)
+    law = ot.JointDistribution([_marginal(ot, v, x[:, k]) for k, v in enumerate(varied)])
+    basis = ot.OrthogonalProductPolynomialFactory([law.getMarginal(k) for k in range(len(varied))])
+    count = basis.getEnumerateFunction().getStrataCumulatedCardinal(degree)
+    chosen = ot.LeastSquaresMetaModelSelectionFactory(ot.LARS(), ot.CorrectedLeaveOneOut())
+    algorithm = ot.FunctionalChaosAlgorithm(
+        ot.Sample(x),
+        ot.Sample(y[:, None]),
+        law,
+        ot.FixedStrategy(basis, count),
+        ot.LeastSquaresStrategy(chosen),
+    )
+    algorithm.run()
+    result = algorithm.getResult()
+    model = result.getMetaModel()
+
+    def polynomial(points: Array) -> Array:
+        return np.asarray(model(ot.Sample(points)), dtype=float)[:, 0]
+
+    return _Fit(degree, result.getCoefficients().getSize(), polynomial)
+
+
+def _marginal(ot: Any, varied: Varied, values: NDArray[np.float64]) -> Any:
+    """Return the law whose polynomials a quantity has: any will do that is as wide."""
+    low, high = float(values.min()), float(values.max())
+    if low == high:
+        return ot.Uniform(low - 1.0, high + 1.0)
+    law = varied.distribution
+    if math.isfinite(law.low) and math.isfinite(law.high):
+        return ot.Uniform(min(low, law.low), max(high, law.high))
+    return ot.Normal(float(values.mean()), float(values.std()))

@@ -1,4 +1,4 @@
-"""The worst case within the ends of what varies: a search, which proves nothing."""
+"""The worst cases within the ends of what varies: searches, which prove nothing."""
 
 from __future__ import annotations
 
@@ -7,11 +7,16 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from bywire.core.typing import Array
+from bywire.core.typing import Array, Progress, silent
+from bywire.studies.designs import population
+from bywire.studies.executor import Executor
 from bywire.studies.limit_state import BudgetSpentError, Margins, UnfinishedError
-from bywire.studies.sought_design import population
+from bywire.studies.plan import StudyPlan
+from bywire.studies.rare_failures import RequirementCases, SoughtCases
+from bywire.studies.store import StudyStore
 
 if TYPE_CHECKING:
+    import pandas as pd
     from scipy.optimize import OptimizeResult
 
 _BEYOND_ENDS = 0.1  # of a range: worst cases lie at ends, which then have a share of their own
@@ -99,3 +104,40 @@ def worst_case(margins: Margins, quantities: int, seed: int) -> WorstCase:
         state = "unfinished"
     least = min((float(each.min()) for each in tried), default=np.inf)
     return WorstCase(state, least, sum(map(len, tried)))
+
+
+# --- One search for each requirement
+
+
+def worst_cases(
+    plan: StudyPlan,
+    store: StudyStore,
+    executor: Executor | None = None,
+    progress: Progress = silent,
+) -> tuple[tuple[WorstCase, ...], pd.DataFrame]:
+    """Return how the search for the worst case of each requirement ended, and all cases.
+
+    Parameters
+    ----------
+    plan, store
+        The study and its folder.
+    executor
+        Who computes the cases that the folder lacks; None to say what it shows so far.
+    progress
+        Called with a label and the share of the budget that is used.
+
+    Raises
+    ------
+    FileError
+        When the folder cannot be read or written.
+    RunError
+        When workers are lost.
+    KeyboardInterrupt
+        When interrupted.
+    """
+    with SoughtCases(plan, store, executor, progress) as cases:
+        found = tuple(
+            worst_case(RequirementCases(cases, k).drawn, len(plan.varied), plan.seed)
+            for k in range(len(plan.judged_demands))
+        )
+    return found, cases.frame

@@ -1,7 +1,17 @@
-"""What gains are worth on the nonlinear bench: sines by amplitude, and the brake's step.
+r"""What gains are worth on the nonlinear bench: sines by amplitude, and the brake's step.
 
-Many sets of gains run side by side, in the lanes of one ensemble. A set is measured in stages, and
-left where what is known of it already says that it is not wanted.
+Many sets of gains run side by side, in the lanes of one ensemble. A set is measured in stages,
+and left where what is known of it already says that it is not wanted.
+
+Controller and sensor are linear between their limits. What the closed loop G, measured with a sine
+of one amplitude, leaves for the rest P (actuator, friction, dither) follows from the loop's laws
+C_r (set point) and C_y (output, sensor included):
+
+.. math:: G = \frac{C_r P}{1 + C_y P}, \quad L = C_y P = \frac{C_y G}{C_r - C_y G}
+
+P is the describing function at that amplitude of the set point, so the margin is one of small and
+middle-sized motion, not a proof of stability in the large. Scheduled gains count as those at the
+operating point: within a blend that is exact for small sines only.
 """
 
 from __future__ import annotations
@@ -13,14 +23,222 @@ from dataclasses import dataclass, field
 import numpy as np
 import xarray as xr
 
+from bywire.analysis.crossings import Margin, fall, measured_margin
+from bywire.analysis.linear.corners import taking
 from bywire.analysis.loop import Loop
+from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep, common_interval, complex_values, nyquist
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import as_run
 from bywire.bench.kpis.registry import evaluate
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array, Complex
 from bywire.simulation.ensemble import simulate_ensemble
-from bywire.synthesis.bench_sines import Sines, Small
+from bywire.simulation.run import Run
+
+_POINTS = 12
+_BELOW, _ABOVE = 4.0, 3.0  # of the target: the range of frequencies
+_LEAST = 3  # periods in a window
+_WINDOWS = 12  # granted to a response: friction and converter may keep it from repeating exactly
+_ROUGH_WINDOWS, _ROUGH = 8, 5e-3
+
+
+@dataclass(frozen=True)
+class Small:
+    """Figures of the loop's answer to sines of one amplitude.
+
+    Parameters
+    ----------
+    amplitude
+        Of the sine, in the input's SI unit.
+    bandwidth
+        Frequency at which it has fallen to -3 dB [Hz]; the highest measured one where it stays
+        above; 0 where it is below, or sticks, from the lowest on.
+    least
+        Smallest gain up to the target; 0 where it sticks.
+    phase_margin, crossover
+        Of the describing function [degree, Hz], see `crossings.measured_margin`; NaN where laws
+        are not known.
+    peak
+        Largest gain.
+    settled
+        Whether every response repeated itself.
+    """
+
+    amplitude: float
+    bandwidth: float
+    least: float
+    phase_margin: float
+    crossover: float
+    peak: float
+    settled: bool
+
+
+class Sines:
+    """What several sets of gains make of sines, measured at the frequencies that are asked for.
+
+    Parameters
+    ----------
+    loop, par, value, amplitudes, gains, target, rough
+        As of `bench_figures.wanted_figures`.
+
+    Attributes
+    ----------
+    near, others
+        Indices of the frequencies next to the target, and of the others.
+    """
+
+    def __init__(
+        self,
+        loop: Loop,
+        par: ParameterSet,
+        value: float,
+        amplitudes: Sequence[float],
+        gains: Mapping[str, Sequence[float]],
+        target: float,
+        *,
+        rough: bool,
+    ) -> None:
+        point = loop.point(par.replace(loop.sustained), value)
+        self._run, self._whole = point.run(), loop.whole(point.par)
+        self._loop, self._par, self._value, self._target = loop, par, value, target
+        self._amplitudes, self._gains, self._rough = tuple(amplitudes), gains, rough
+        self._f: Array = np.array(_frequencies(self._run, self._whole, target))
+        first = min(int(np.searchsorted(self._f, target)), self._f.size - 1)
+        self.near = sorted({max(first - 1, 0), first})
+        self.others = [k for k in range(self._f.size) if k not in self.near]
+        sets = len(next(iter(gains.values())))
+        shape = (sets, len(self._amplitudes), self._f.size)
+        self._closed: Complex = np.full(shape, np.nan, dtype=np.complex128)
+        self._size, self._settled = np.zeros(shape), np.zeros(shape, dtype=bool)
+
+    def measure(self, sets: Sequence[int], which: Sequence[int]) -> None:
+        """Measure some sets of gains at some frequencies, which are indices both."""
+        if not sets or not which:
+            return
+        chosen = {name: [float(values[k]) for k in sets] for name, values in self._gains.items()}
+        sweep = Sweep(
+            self._loop.inputs,
+            self._loop.output,
+            self._f[list(which)].tolist(),
+            self._amplitudes,
+            chosen,
+            flags=(),
+            whole=self._whole,
+            least=_LEAST,
+            tolerance=_ROUGH if self._rough else 1e-3,
+            most=_ROUGH_WINDOWS if self._rough else _WINDOWS,
+        )
+        responses = frequency_response(self._run, sweep)
+        at = np.ix_(sets, range(len(self._amplitudes)), which)
+        self._f[list(which)] = responses["frequency"].values
+        self._closed[at] = complex_values(responses)
+        self._size[at] = np.nan_to_num(responses["gain"].values)  # what sticks: with nothing
+        self._settled[at] = responses["settled"].values > 0
+
+    def first_look(self, k: int) -> tuple[Small, ...]:
+        """Return what the frequencies next to the target say of a set: its gain there."""
+        f, unknown = self._f[self.near], (math.nan,) * 3
+        return tuple(
+            Small(
+                size,
+                math.nan,
+                float(np.interp(self._target, f, gain)),
+                *unknown,
+                bool(settled.all()),
+            )
+            for size, gain, settled in zip(
+                self._amplitudes,
+                self._size[k][:, self.near],
+                self._settled[k][:, self.near],
+                strict=True,
+            )
+        )
+
+    def figures(self, k: int) -> tuple[Small, ...]:
+        """Return the figures of a set by amplitude, measured at all frequencies."""
+        gains = {name: float(values[k]) for name, values in self._gains.items()}
+        laws = laws_of(self._loop, self._par.replace(gains), self._value, self._f)
+        return tuple(self._small(laws, k, j) for j in range(len(self._amplitudes)))
+
+    def _small(self, laws: tuple[Complex, Complex] | None, k: int, j: int) -> Small:
+        closed, f, size = self._closed[k, j], self._f, self._size[k, j]
+        moves = np.isfinite(closed)
+        margin = Margin(math.nan, math.nan)
+        if laws is not None and moves.any():
+            demand, feedback = laws
+            gain = _behind(closed[moves], demand[moves], feedback[moves])
+            margin = measured_margin(f[moves], gain)
+        before = np.append(size[f < self._target], np.interp(self._target, f, size))
+        return Small(
+            amplitude=float(self._amplitudes[j]),
+            bandwidth=min(fall(size, f), float(f[-1])),
+            least=float(before.min()),
+            phase_margin=margin.phase,
+            crossover=margin.crossover,
+            peak=float(size.max()),
+            settled=bool(self._settled[k, j].all()),
+        )
+
+
+def _frequencies(run: Run, whole: Sequence[float], target: float) -> list[float]:
+    """Return ascending frequencies of which few periods are whole sample times and dithers.
+
+    Several periods, at another phase of the dither each: friction would lock one period of 10 Hz
+    to five of 50 Hz, and what is measured would depend on how both began.
+    """
+    common = common_interval(run, whole)
+    limit = nyquist(run)
+    wanted = np.geomspace(target / _BELOW, min(_ABOVE * target, 0.9 * limit), _POINTS)
+    frequencies = set()
+    for f in wanted:
+        choices = [(n, max(round(n / f / common), 1)) for n in range(_LEAST, _LEAST + 3)]
+        n, m = min(
+            ((n, m) for n, m in choices if math.gcd(n, m) == 1),
+            key=lambda candidate: abs(candidate[0] / (candidate[1] * common * f) - 1.0),
+            default=choices[0],
+        )
+        frequencies.add(n / (m * common))
+    return sorted(candidate for candidate in frequencies if candidate < limit)
+
+
+def loop_gain(
+    loop: Loop, par: ParameterSet, value: float, closed: Complex, frequencies: Array
+) -> Complex | None:
+    """Return the loop gain behind a measured closed response.
+
+    Parameters
+    ----------
+    loop, par, value
+        Loop, and the parameters and operating point it was measured with.
+    closed, frequencies
+        Response and frequencies [Hz], shape (n,).
+
+    Returns
+    -------
+    numpy.ndarray or None
+        Shape (n,); None for a loop whose laws are not known.
+    """
+    laws = laws_of(loop, par, value, frequencies)
+    return None if laws is None else _behind(closed, *laws)
+
+
+def laws_of(
+    loop: Loop, par: ParameterSet, value: float, frequencies: Array
+) -> tuple[Complex, Complex] | None:
+    """Return what a loop's laws make of set point and measured value; None where not known."""
+    if loop.laws is None:
+        return None
+    with taking(loop.side):
+        return loop.laws(par, value, frequencies)
+
+
+def _behind(closed: Complex, demand: Complex, feedback: Complex) -> Complex:
+    return np.asarray(feedback * closed / (demand - feedback * closed))
+
+
+# --- Figures of the bench
 
 STEP_FIGURES = ("overshoot", "settling_time", "steady_state_error")
 

@@ -2,15 +2,15 @@ r"""Gains that keep the worst normalized slack as large as possible.
 
 .. math:: \max_{x, t} t \quad \text{with} \quad s_{jk}(x) \ge t
 
-for every requirement j and model k: the largest of smallest slacks, without the kinks that a plain
-minimum has. Sequential quadratic programming from several starts, then a simplex where it stopped
-at a kink of a figure itself.
+for every requirement j and model k: the largest of smallest slacks, without the kinks that a
+plain minimum has. Sequential quadratic programming from several starts, then a simplex where it
+stopped at a kink of a figure itself.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,9 +19,33 @@ from scipy.optimize import minimize
 from scipy.stats import qmc
 
 from bywire.bench.requirements import Limit
-from bywire.core.typing import Array
+from bywire.core.typing import Array, Progress
 from bywire.synthesis.linear_case import LinearCase, room, slack
-from bywire.synthesis.stages import Report, piece
+
+Report = Callable[[float], None]
+"""``report(share)``: the share of a stage that is done, 0 to 1"""
+
+
+def stage(progress: Progress | None, label: str) -> Report:
+    """Return what reports the share of one stage; nothing is shown where nobody watches."""
+    if progress is None:
+        return lambda share: None
+    return lambda share: progress(label, min(max(share, 0.0), 1.0))
+
+
+def piece(report: Report, k: int, count: int) -> Report:
+    """Return what reports the share of one of several pieces of a stage."""
+    return lambda share: report((k + share) / count)
+
+
+def suffixed(progress: Progress | None, text: str) -> Progress | None:
+    """Return progress whose labels say besides what they are of."""
+    if progress is None:
+        return None
+    return lambda label, share: progress(f"{label}, {text}", share)
+
+
+# --- The optimizer
 
 UNSTABLE = -12.0
 """slack of an unstable loop, before its growth is counted"""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from bywire.analysis.linear.open_loop import analog_gain
+from bywire.analysis.linear.sampled_loops import analog_gain
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.margins import margins

@@ -7,10 +7,9 @@ from typing import Any
 
 import pytest
 
-from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.corners import REACH, CornerError, read_sides, taking
 from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.linear.open_loop import open_loop
+from bywire.analysis.linear.sampled_loops import closed_loop, open_loop
 from bywire.core.errors import ParameterError
 from bywire.core.model import Task
 from bywire.core.ops import clip, fabs, floor, fmax, fmin, interpolate, sqrt, where

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from bywire.analysis.crossings import margin
-from bywire.analysis.linear.closed_loop import closed_loop
-from bywire.analysis.linear.open_loop import open_loop
+from bywire.analysis.linear.sampled_loops import closed_loop, open_loop
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.margins import margins
 from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop

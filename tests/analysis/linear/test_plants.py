@@ -10,7 +10,7 @@ import pytest
 
 from bywire.analysis.linear.linearize import linearize
 from bywire.analysis.linear.plant import PLANTS
-from bywire.analysis.reduction.error import reduction_error
+from bywire.analysis.reduction import reduction_error
 from bywire.brakes.motorcycle.linear.brake import (
     theoretical,
     two_pole,

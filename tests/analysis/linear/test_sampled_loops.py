@@ -8,10 +8,10 @@ import pytest
 from scipy.signal import cont2discrete
 
 from bywire.analysis.crossings import fall
-from bywire.analysis.linear.closed_loop import closed_loop
+from bywire.analysis.linear.sampled_loops import closed_loop
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.response.dataset import Sweep, complex_values
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep, complex_values
 from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.linear.control_laws import current_loop

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from bywire.analysis.loop import LOOPS, Point
-from bywire.analysis.periodic.averaged_map import (
+from bywire.analysis.periodic import (
     PeriodicModel,
     dithered_loop,
+    find_orbit,
+    period_of,
     periodic_model,
     unrounded,
 )
-from bywire.analysis.periodic.periodic_orbit import find_orbit, period_of
-from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep
 from bywire.brakes.motorcycle.dither.dithered_plant import dithered_plant
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.catalog import PARAMETER_SETS

@@ -10,9 +10,7 @@ import pytest
 from analysis.small_linear_models import model_of
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.reduction.error import reduction_error
-from bywire.analysis.reduction.reduce import reduce
-from bywire.analysis.reduction.residualized import residualized
+from bywire.analysis.reduction import reduce, reduction_error, residualized
 from bywire.brakes.motorcycle.linear.brake import linear_model
 from bywire.brakes.wedge.linear import full
 from bywire.core.catalog import main_set, parameters

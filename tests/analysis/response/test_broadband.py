@@ -10,8 +10,8 @@ import pytest
 
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.broadband import Broadband, broadband_response
-from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError
 from systems.describing import SATURATION, Saturation, at_rest, saturation

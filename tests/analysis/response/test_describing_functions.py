@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep
 from systems.backlash import BACKLASH, Backlash, backlash
 from systems.describing import (
     RUBBING,

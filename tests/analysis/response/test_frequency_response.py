@@ -9,9 +9,9 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.linear.closed_loop import closed_loop
-from bywire.analysis.response.dataset import Sweep, response_data
+from bywire.analysis.linear.sampled_loops import closed_loop
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep, response_data
 from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.start import memory_at

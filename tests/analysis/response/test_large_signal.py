@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from bywire.analysis.loop import LOOPS
+from bywire.analysis.loop import LOOPS, Saturation
 from bywire.analysis.margins import margins
-from bywire.analysis.response.dataset import Sweep, complex_values
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.large_signal import (
     Variant,
@@ -18,10 +17,10 @@ from bywire.analysis.response.large_signal import (
     widths,
     with_widths,
 )
-from bywire.analysis.response.saturation import Saturation
+from bywire.analysis.response.sweep import Sweep, complex_values
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.synthesis.bench_sines import loop_gain
+from bywire.synthesis.bench_figures import loop_gain
 
 
 def response(variants, frequencies, amplitudes, **more):

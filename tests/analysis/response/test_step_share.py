@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import bywire
-from bywire.analysis.response.step_share import FIGURES, largest, with_step_errors
+from bywire.analysis.response.frequency_response import FIGURES, largest, with_step_errors
 from bywire.api import frequency_response as use_case
 from bywire.core.errors import RunError
 

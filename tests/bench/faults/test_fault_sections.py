@@ -10,8 +10,7 @@ import pytest
 import bywire
 from bywire.api.described_faults import faults
 from bywire.bench.bench import Bench
-from bywire.bench.bench_file import load, read
-from bywire.bench.bench_text import bench_text
+from bywire.bench.bench_file import bench_text, load, read
 from bywire.bench.faults.course import AT_ZERO
 from bywire.bench.faults.modes import modes_of
 from bywire.bench.running import run

@@ -33,7 +33,7 @@ from math import isfinite, sqrt
 from typing import NamedTuple
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import Samples, integral
+from bywire.bench.kpis.loops import Samples, integral, moving_average
 
 LEVEL = 0.5
 WORDS = "its words"
@@ -142,6 +142,13 @@ COMPUTED = {
         moved = list(y)
         moved[0] = 7.0
         return integral(t, whole) + max(twice) + moved[0] + moved[-1] + odd[0] + len(odd)
+    """,
+    "functions that make lists": """
+        whole = 0.0
+        for x in moving_average(t, y, 0.1)[1:]:
+            whole += x
+        size = [abs(x) for x in moving_average(t, y, 0.2)]
+        return whole + max(size) + moving_average(t, y, 0.3)[-1] + moving_average(t, y, 1.0)[2]
     """,
     "nothing": """
         least = 0.0 if setting.least is None else setting.least
@@ -273,9 +280,14 @@ REFUSED = {
         0,
         "at most 3 numbers",
     ),
+    "a list in a comparison": (
+        "return 1.0 if 0.0 < max(moving_average(t, y, 1.0)) < 1.0 else 0.0",
+        0,
+        "a number that has a name",
+    ),
     "infinity": ("return math.inf", 0, "only a finite number is a constant"),
     "a name in several": ("a = b = 1.0\nreturn a", 0, "it knows assignments"),
-    "a sum": ("return sum(y)", 0, "`sum`"),
+    "a sum": ("return sum(y)", 0, "`sum(y)` in C: it calls functions of loops"),
     "a starred call": ("return integral(*[t, y])", 0, "without * and **"),
     "what is never nothing": ("return 1.0 if y is None else 0.0", 0, "this is never None"),
     "a lambda": ("f = lambda x: x\nreturn 0.0", 0, "not among the expressions"),
@@ -288,16 +300,16 @@ def test_what_has_no_translation_is_refused_with_its_line(written, body, line, w
     family = written(figure(body))
     before = HEAD.count("\n") + 3  # decorator, head and docstring
     with pytest.raises(ModelError, match=re.escape(why)) as caught:
-        family.c_text  # noqa: B018
+        family.translate()
     assert f"written.py, line {before + line + 1}, in f: " in str(caught.value)
 
 
 def test_a_function_that_calls_itself_and_an_unknown_type_are_refused(written):
     again = "def g(x: float) -> float:\n    return g(x)\n"
     with pytest.raises(ModelError, match="does not call itself"):
-        written(again, figure("return g(y[0])")).c_text  # noqa: B018
+        written(again, figure("return g(y[0])")).translate()
     with pytest.raises(ModelError, match="the type of 'x' is <class 'str'>"):
-        written("def g(x: str) -> float:\n    return 1.0\n", figure("return g('a')")).c_text  # noqa: B018
+        written("def g(x: str) -> float:\n    return 1.0\n", figure("return g('a')")).translate()
     with pytest.raises(ModelError, match="takes 'z', which must be t, setting, a field"):
         written(figure("return 1.0", "z: Samples"))
 

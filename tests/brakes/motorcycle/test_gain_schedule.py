@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bywire.analysis.linear.closed_loop import closed_loop
+from bywire.analysis.linear.sampled_loops import closed_loop
 from bywire.analysis.loop import LOOPS
 from bywire.bench.bench import Bench
 from bywire.bench.running import run

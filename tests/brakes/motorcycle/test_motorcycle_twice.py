@@ -13,7 +13,7 @@ from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.assembly import Assembly
 from bywire.core.parameters import ParameterSet
 from bywire.core.subassembly import Sub
-from bywire.simulation.model_check import check_model
+from bywire.simulation.program import check_model
 
 
 class BothParameters(ParameterSet):

@@ -6,7 +6,7 @@ import pytest
 
 import bywire
 from bywire.bench.ensemble import changed
-from bywire.bench.key_figures import key_figures_of
+from bywire.bench.side_by_side import key_figures_of
 from bywire.core import watching
 from run_once import run_once
 

@@ -5,11 +5,10 @@ import pytest
 
 import bywire
 from bywire.bench.ensemble import changed
-from bywire.bench.key_figures import key_figures_of
+from bywire.bench.side_by_side import key_figures_of
 from bywire.brakes.wedge.life import WEDGE_PADS
 from bywire.life.life_file import read_life
-from bywire.life.one_by_one import one_by_one
-from bywire.life.projection import projected
+from bywire.life.projection import one_by_one, projected
 
 ALIKE = {"wear.mechanism": "none", "stop.pause": "1 h"}
 MIX = """

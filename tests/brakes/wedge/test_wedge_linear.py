@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
+from bywire.analysis.linear.sampled_loops import closed_loop
 from bywire.bench.experiment import Case, as_run
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws import moment_control

@@ -14,7 +14,6 @@ from typer.testing import CliRunner
 
 from bywire.api import controller_check
 from bywire.api.controller_check import ControllerCheck, figures_of
-from bywire.api.export_controller import export_controller
 from bywire.cli.app import app
 from bywire.core.errors import CompilerError
 from bywire.export.controller.target import trial
@@ -26,6 +25,7 @@ from bywire.export.controller.target.trial import (
     Trial,
     missing_tools,
 )
+from bywire.usecases.export_controller import export_controller
 
 needs_targets = pytest.mark.skipif(bool(missing_tools()), reason=missing_tools() or "all there")
 
@@ -92,7 +92,7 @@ def test_other_bits_do_not_hold() -> None:
 def test_command_checks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(controller_check, "missing_tools", lambda: "no tools")
     words = ["export", "controller", "moment-pulses", "--out", str(tmp_path), "--vectors", "5"]
-    done = CliRunner().invoke(app, [*words, "--check", "--json"])
+    done = CliRunner().invoke(app(), [*words, "--check", "--json"])
     assert done.exit_code == 0, done.output
     check = json.loads(done.stdout.splitlines()[-1])["check"]
     assert check["holds"]

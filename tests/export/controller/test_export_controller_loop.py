@@ -86,7 +86,7 @@ def test_bench_file_asks_for_it(tmp_path: Path) -> None:
     assert load(file).engine == "sil-single"
     result = bywire.run(file, estimate_error=False)
     assert result.recording.attrs["engine"].endswith("ECU as C in single precision")
-    done = CliRunner().invoke(app, ["run", str(file), "--engine", "sill", "--no-error-estimate"])
+    done = CliRunner().invoke(app(), ["run", str(file), "--engine", "sill", "--no-error-estimate"])
     assert isinstance(done.exception, UnknownNameError)
     assert "did you mean 'sil', 'sil-single'?" in str(done.exception)
 

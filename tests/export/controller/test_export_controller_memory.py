@@ -9,13 +9,13 @@ from typing import Annotated, Any, NamedTuple
 import pytest
 from exported_ecu import BRAKES, bench_of, build, needs_compiler
 
-from bywire.api.export_controller import export_controller
 from bywire.core.model import Task
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal
 from bywire.export.controller.files import files
 from bywire.export.controller.program import program
 from bywire.export.controller.vectors import vectors
+from bywire.usecases.export_controller import export_controller
 
 Number = Annotated[float, Signal("1", "a number", 1.0)]
 

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from exported_ecu import needs_compiler
 
-from bywire.api.export_controller import export_controller
 from bywire.core.errors import ParameterError
 from bywire.export.controller.harness import FLAGS, WARNINGS
+from bywire.usecases.export_controller import export_controller
 
 ECUS: dict[str, tuple[str, str]] = {
     "front": ("hard-braking", "double"),

@@ -10,10 +10,11 @@ from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 import bywire
-from bywire.api.export_fmu import ExportedFmu, export_fmu
+from bywire.api.export_fmu import ExportedFmu
 from bywire.bench.running import run_of
 from bywire.core.errors import CompilerError, FileError, ParameterError, UnknownNameError
 from bywire.export.fmu import binaries
+from bywire.usecases.export_fmu import export_fmu
 from export.fmu.clients import Client
 
 MOTORCYCLE = bywire.Bench(

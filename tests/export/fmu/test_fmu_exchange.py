@@ -12,8 +12,9 @@ from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 import bywire
-from bywire.api.export_fmu import ExportedFmu, export_fmu
+from bywire.api.export_fmu import ExportedFmu
 from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.usecases.export_fmu import export_fmu
 from export.fmu.clients import Client
 from export.fmu.solver_client import SolverClient
 

@@ -16,8 +16,7 @@ import pytest
 from bywire.core.errors import CompilerError
 from bywire.export.wasm import formulas
 from bywire.export.wasm.formulas import OPERATIONS, Formula, table
-from bywire.simulation.graph import Graph
-from bywire.simulation.operation import BOOLEAN, Node, Operation
+from bywire.simulation.graph import BOOLEAN, Graph, Node, Operation
 
 NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(NODE is None, reason="there is no node to run the formulas in")

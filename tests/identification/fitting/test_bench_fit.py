@@ -11,14 +11,13 @@ import xarray as xr
 import bywire
 from bywire.core.errors import InputError
 from bywire.identification.fitting.bench_fit import BenchFit
-from bywire.identification.fitting.question import Question
-from bywire.identification.fitting.unknown_texts import starts_of, unknowns_of
+from bywire.identification.fitting.question import Question, starts_of, unknowns_of
 from bywire.identification.fitting.worth import starts_check
+from bywire.identification.measured import joined
 from bywire.identification.method import Effort, Identified
 from bywire.identification.methods.output_error import METHOD
 from bywire.identification.output_error import output_error
-from bywire.identification.records import joined
-from bywire.identification.replaying.measured_run import case_of
+from bywire.identification.replaying.bench_replay import case_of
 from bywire.identification.trust import trust
 
 SINE = {"kind": "sine", "mean": "0 V", "amplitude": "2 V", "f": "4 Hz", "phase": 0, "t_start": 0}
@@ -203,7 +202,7 @@ def test_a_few_outliers_are_counted_by_a_robust_loss(loss: str) -> None:
     checks = {c.name: c for c in found.checks}
     if loss == "linear":
         assert not checks["residual_over_noise"].holds
-        assert "take --loss huber" in checks["residual_over_noise"].note
+        assert 'take loss="huber"' in checks["residual_over_noise"].note
         return
     assert all(check.holds for check in found.checks)
     inside(found, {"motor.R_m": 0.35, "motor.K_e": 0.0304})
@@ -219,7 +218,7 @@ def test_noise_that_the_record_does_not_tell_is_no_proof_of_a_model() -> None:
     assert check.value == 1.0
     assert not check.holds
     assert "p_mc changes itself from sample to sample" in check.note
-    assert '--output "p_mc=NOISE bar"' in check.note
+    assert 'outputs "p_mc=NOISE bar"' in check.note
     assert all(c.holds for c in identified(bench(), record(bench(), 2), own).checks)
     given = identified(bench(), record(bench(), 2)).checks
     assert "noise_not_told" not in {c.name for c in given}
@@ -229,7 +228,7 @@ def test_a_minimum_that_one_start_of_several_found_is_not_believed() -> None:
     assert not starts_check(1, 3)
     (alone,), (met,) = starts_check(1, 4), starts_check(2, 4)
     assert not alone.holds
-    assert "--starts" in alone.note
+    assert "take more starts" in alone.note
     assert met.holds
 
 

@@ -10,11 +10,10 @@ import xarray as xr
 
 from bywire.core.errors import ParameterError
 from bywire.identification.confidence import uncertainty
-from bywire.identification.measured import measured
+from bywire.identification.measured import joined, measured, split
 from bywire.identification.method import Effort
 from bywire.identification.methods.seal_friction import METHOD
-from bywire.identification.records import joined, split
-from bywire.identification.sealing.strokes import velocity
+from bywire.identification.strokes import velocity
 from bywire.identification.trust import trust
 
 MEASURED = Path(__file__).parents[4] / "shared" / "data" / "seal_friction"

@@ -21,7 +21,7 @@ from bywire.core.errors import InputError, ParameterError, UnknownNameError
 from bywire.core.parameters import leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.core.units import convert, parse
-from bywire.report.live_page.dependence import dependence
+from bywire.report.live_page.content import dependence
 from bywire.report.live_page.sliders import SLIDERS, first_sliders
 from run_once import run_once
 

@@ -15,8 +15,7 @@ from bywire.core.catalog import main_set
 from bywire.core.connections import STIMULUS, Network, Node, network
 from bywire.core.model import ASSEMBLIES
 from bywire.core.wires import Wire
-from bywire.report.schematic.drawing import Schematic, schematic, schematic_svg
-from bywire.report.schematic.layers import layered
+from bywire.report.schematic import Schematic, layered, schematic, schematic_svg
 from systems.loading import loaded
 
 EXAMPLES = Path(__file__).parents[3] / "examples"

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.smooth_functions import SmoothPoint, equations
 from bywire.core import elementary, ops
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError, quoted
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
@@ -285,7 +286,7 @@ def linear_models(of: Linearization) -> tuple[LinearModel, ...]:
         raise CornerError(
             f"{of.point.model.name}: at the operating point {names} is on its one-sided limit, and "
             "cannot fall. Choose another operating point, or take the model of motions that rise: "
-            "--side above"
+            f"{option('side', 'above')}"
         )
     corner = _Corner(of)
     models = corner.chosen() if corner.is_near() else of.models(of.point)
@@ -476,7 +477,8 @@ class _Corner:
         return (
             f"{name}: the operating point lies on a corner, and the linear models of its sides "
             f"differ: {places}. Choose another operating point, or take a side: "
-            f"--side above, --side below, or --side {kinks[0].place}=above"
+            f"{option('side', 'above')}, {option('side', 'below')}, or "
+            f"{option('side', f'{kinks[0].place}=above')}"
         )
 
 

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bywire.analysis.linear.minimal import Realization
-from bywire.analysis.linear.transfer import Transfer
+from bywire.analysis.linear.transfer import Realization, Transfer
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array, Complex
 
@@ -69,7 +68,7 @@ class LinearModel:
         """
         import control
 
-        from bywire.analysis.linear.minimal import state_scale
+        from bywire.analysis.linear.transfer import state_scale
 
         k = self.effective()
         A, B, C = self.A[np.ix_(k, k)], self.B[k], self.C[:, k]
@@ -314,3 +313,36 @@ def _places(kind: str, names: Sequence[str], known: tuple[str, ...]) -> list[int
         if name not in known:
             raise unknown_name(kind, name, known)
     return [known.index(name) for name in names]
+
+
+# --- Poles of sampled models as rates of continuous motions
+
+DEAD = 1e-9
+"""poles of less than this size are dead beats: their motion is over within a sample"""
+STILL = 1e-6
+"""rates of less than this size [1/s] are those of what does not move: integrators at rest"""
+
+
+def rates(model: LinearModel) -> Complex:
+    r"""Return the poles as rates [1/s] of continuous motions, slowest first.
+
+    .. math:: s = \ln(z) / T
+
+    for sampled models; a continuous one has them already. Dead beats are left out. The imaginary
+    part is known up to multiples of the sampling frequency only; the least is returned.
+
+    Parameters
+    ----------
+    model
+        Model with n states.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (at most n,).
+    """
+    poles = model.poles()
+    if not model.period:
+        return poles
+    continuous = np.log(poles[np.abs(poles) > DEAD]) / model.period
+    return np.asarray(continuous[np.argsort(np.abs(continuous))])

@@ -1,4 +1,4 @@
-"""Transfer functions with named signals: zeros, poles and gain of one path of a linear model."""
+"""Transfer functions with named signals, minimal: zeros, poles and gain of one path."""
 
 from __future__ import annotations
 
@@ -8,9 +8,154 @@ from typing import Any
 
 import numpy as np
 
-from bywire.analysis.linear.minimal import Realization, minimal, zeros
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array, Complex
+
+_ROUNDING = 100.0 * float(np.finfo(float).eps)  # of the largest entry: what counts as zero
+
+
+@dataclass(frozen=True, eq=False)
+class Realization:
+    r"""One input, one output.
+
+    .. math:: \dot x = A x + b u, \quad y = c x + d u
+
+    Parameters
+    ----------
+    A, b, c, d
+        Shapes (n, n), (n,), (n,), and a number.
+    """
+
+    A: Array
+    b: Array
+    c: Array
+    d: float
+
+    def dual(self) -> Realization:
+        """Return the model with input and output exchanged, of the same transfer function."""
+        return Realization(self.A.T, self.c, self.b, self.d)
+
+
+def minimal(system: Realization) -> Realization:
+    """Return a realization without states that the input does not reach or the output not see.
+
+    Parameters
+    ----------
+    system
+        Any realization.
+
+    Notes
+    -----
+    Balanced by a diagonal scaling first, then brought to staircase form from the input and, of
+    what is left, from the output. Orthogonal steps alone: errors stay at rounding times the
+    largest entry. Cancellations are found before there are any poles and zeros to compare.
+
+    References
+    ----------
+    P. M. Van Dooren, "The generalized eigenstructure problem in linear system theory", IEEE
+    Transactions on Automatic Control 26 (1981): staircase form.
+    """
+    return _reached(_reached(scaled(system)).dual()).dual()
+
+
+def scaled(system: Realization) -> Realization:
+    """Return it with its states in units of similar weight: powers of two, no rounding."""
+    size = state_scale(system.A, system.b[:, None], system.c[None])
+    A = system.A * size / size[:, None]
+    return Realization(A, system.b / size, system.c * size, system.d)
+
+
+def state_scale(A: Array, B: Array, C: Array) -> Array:
+    """Return units of the states, powers of two, in which the entries of A, B, C are alike.
+
+    Parameters
+    ----------
+    A, B, C
+        Matrices, shapes (n, n), (n, nu), (ny, n).
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (n,); the model in these units is A_ij s_j / s_i, B_i / s_i, C_j s_j.
+    """
+    from scipy.linalg import matrix_balance
+
+    n = len(A)
+    if n == 0:
+        return np.ones(0)
+    whole = np.zeros((n + 1, n + 1))
+    whole[:n, :n], whole[:n, n], whole[n, :n] = A, np.abs(B).max(axis=1), np.abs(C).max(axis=0)
+    scale: Any = matrix_balance(whole, permute=False, separate=True)[1][0]
+    return np.asarray(scale[:n] / scale[n])
+
+
+def zeros(system: Realization) -> tuple[Complex, float]:
+    r"""Return the finite zeros, and the factor k in front of the products.
+
+    .. math:: c (sI - A)^{-1} b + d = k \prod_j (s - z_j) / \prod_i (s - \lambda_i)
+
+    Parameters
+    ----------
+    system
+        A minimal realization; a zero for each state that an input does not reach else.
+
+    Notes
+    -----
+    While no input passes straight to the output, the output can only stay zero within the null
+    space of c; there the output's rate takes its place. Each turn loses a state and keeps the
+    zeros, until something passes: then they are the eigenvalues of A - b c / d.
+
+    References
+    ----------
+    A. Emami-Naeini, P. Van Dooren, "Computation of zeros of linear multivariable systems",
+    Automatica 18 (1982), for one input and one output.
+    """
+    A, b, c, d = system.A, system.b, system.c, system.d
+    factor = 1.0
+    while abs(d) <= _ROUNDING * float(np.linalg.norm(b)):
+        size = float(np.linalg.norm(c))
+        if not len(A) or size == 0.0:
+            return np.zeros(0, dtype=complex), 0.0
+        row = c / size
+        factor *= size
+        Q = _complement(row)
+        A, b, c, d = Q.T @ A @ Q, Q.T @ b, row @ A @ Q, float(row @ b)
+    roots = np.linalg.eigvals(A - np.outer(b, c) / d) if len(A) else np.zeros(0)
+    return np.asarray(roots, dtype=complex), factor * d
+
+
+def _reached(system: Realization) -> Realization:
+    """Return the part that the input reaches: each step adds the direction of A times the last."""
+    A, b, c = system.A, system.b, system.c
+    n = len(A)
+    if n == 0 or not b.any():
+        return Realization(np.zeros((0, 0)), np.zeros(0), np.zeros(0), system.d)
+    least = _ROUNDING * max(float(np.abs(A).max()), np.finfo(float).tiny)
+    basis = np.zeros((n, n))
+    basis[:, 0] = b / np.linalg.norm(b)
+    count = 1
+    while count < n:
+        step = A @ basis[:, count - 1]
+        for _ in range(2):  # once more: what is left after the first may be rounding alone
+            step -= basis[:, :count] @ (basis[:, :count].T @ step)
+        size = float(np.linalg.norm(step))
+        if size <= least:
+            break
+        basis[:, count] = step / size
+        count += 1
+    Q = basis[:, :count]
+    return Realization(Q.T @ A @ Q, Q.T @ b, Q.T @ c, system.d)
+
+
+def _complement(row: Array) -> Array:
+    """Return an orthonormal basis of what is perpendicular to a unit vector, by a reflection."""
+    v = row.copy()
+    v[0] += np.copysign(1.0, row[0])
+    reflection = np.eye(len(row)) - 2.0 * np.outer(v, v) / float(v @ v)
+    return np.asarray(reflection[:, 1:])
+
+
+# --- Transfer functions
 
 _AT_REST = 1e-11  # of the largest pole: what counts as an integrator
 

@@ -12,9 +12,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.response.cases import Cases, cases_of
-from bywire.analysis.response.dataset import Sweep, as_dataset
-from bywire.analysis.response.window import (
+from bywire.analysis.response.sweep import (
+    Cases,
+    Sweep,
+    as_dataset,
+    cases_of,
     interval,
     kept,
     line_window,

@@ -29,7 +29,7 @@ from bywire.analysis.crossings import (
 )
 from bywire.analysis.loop import Loop, Point
 from bywire.analysis.loop_figures import LoopFigures
-from bywire.analysis.response.dataset import complex_values
+from bywire.analysis.response.sweep import complex_values
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of

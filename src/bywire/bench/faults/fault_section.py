@@ -10,6 +10,7 @@ from typing import Any
 from bywire.bench.faults.course import AT_ZERO, Course
 from bywire.bench.faults.modes import Mode, modes_of
 from bywire.bench.relative_changes import settled
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError, UnknownNameError, quoted, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
@@ -120,7 +121,7 @@ def _read(
     for choice, wanted in mode.lacks(par).items():
         raise ParameterError(
             f"fault {name}: there is nothing to fail, as {choice} = {par.value(choice)!r}: set it "
-            f"to {wanted!r}, as with --set {choice}={wanted}"
+            f"to {wanted!r}, as with {option('overrides', {choice: str(wanted)})}"
         )
     return Injection(mode, _value(where, section, mode), course, seed)
 

@@ -50,6 +50,7 @@ from bywire.core.typing import Array
 from bywire.simulation.compiler import find_compiler, load_library
 
 NO_NUMBER = "its computation gives no finite number"
+_NO_FIGURE = Undefined(NO_NUMBER)
 _FLAGS = ("-O3", "-march=native")  # loops over samples: vectors pay, and sums keep their order
 _FEW = 100_000  # rows, for which Python takes a third of the time of a compiler
 _NEGATIVE_ZERO = re.compile(r"-0(?![.\d])")
@@ -99,7 +100,9 @@ class LoopFamily:
         self._looked_at = 0  # rows of single runs
         self._optional: dict[str, bool] = {}  # signals, and whether they may be missing
         for each in self.measures.values():
-            taken = self._taken(each.__wrapped__)
+            self._take(each.__wrapped__)
+        for each in self.measures.values():
+            taken = self._parameters(each.__wrapped__)
             each.needs = tuple(name for name in taken if self._optional.get(name))
 
     @property
@@ -156,7 +159,11 @@ class LoopFamily:
         given: dict[str, Any] = {"t": t, "setting": self._in_floats(setting), **signals}
         for name, function in self.shared.items():
             given[name] = self._given(function, given)
-        return {name: self._given(each.__wrapped__, given) for name, each in self.measures.items()}
+        figures = {n: self._given(each.__wrapped__, given) for n, each in self.measures.items()}
+        return {
+            name: value if isinstance(value, Undefined) or math.isfinite(value) else _NO_FIGURE
+            for name, value in figures.items()
+        }
 
     def _given(self, function: Callable[..., Any], given: Mapping[str, Any]) -> Any:
         """Return what a function gives."""
@@ -165,11 +172,9 @@ class LoopFamily:
         if undefined is not None:
             return undefined
         try:
-            value = function(*args)
+            return function(*args)
         except (ZeroDivisionError, OverflowError, ValueError):  # of a division, of a root
-            return Undefined(NO_NUMBER)
-        is_infinite = isinstance(value, float) and not math.isfinite(value)
-        return Undefined(NO_NUMBER) if is_infinite else value
+            return _NO_FIGURE
 
     def _in_floats(self, setting: Any) -> Any:
         """Return a setting whose numbers are Python's: those of NumPy divide by zero."""
@@ -201,12 +206,37 @@ class LoopFamily:
         ModelError
             When a function holds what has no translation.
         """
-        return _HEADER.read_text(encoding="utf-8") + self._body
+        unit = self._unit
+        lines = "\n".join(f"    {line}" for line in self._lines())
+        return f"""{_HEADER.read_text(encoding="utf-8")}
+{unit.text}
+void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal *signals,
+    const double *settings, double *work, double *values, int32_t *reasons, double *numbers) {{
+  const bw_figures to = {{values, reasons, numbers, cases}};
+  const bw_samples t = {{times, n}};
+  const bw_undefined of_times = {unit.function(defect_of_times).name}(t);
+  for (int64_t k = 0; k < cases; ++k) {{
+    double *rest = work, **room = &rest;
+    bw_undefined wrong = of_times;
+{lines}
+  }}
+}}
+"""
+
+    def translate(self) -> None:
+        """Translate the functions, to refuse those that have no translation.
+
+        Raises
+        ------
+        ModelError
+            When a function holds what has no translation.
+        """
+        assert self.c_text
 
     @cached_property
     def reasons(self) -> list[Reason]:
         """Why figures are not defined, by the numbers of C from 1 on."""
-        assert self._body
+        self.translate()
         return [Reason(*each) for each in self._unit.reasons]
 
     @cached_property
@@ -233,29 +263,6 @@ class LoopFamily:
                 row.append(0.0 if value is None else float(value))
         return row
 
-    @cached_property
-    def width(self) -> int:
-        """How many numbers C takes of a setting."""
-        return sum(1 + k.or_none + (k.inner == PAIR) for k in self._numbers.values())
-
-    @cached_property
-    def _body(self) -> str:
-        unit = self._unit
-        lines = "\n".join(f"    {line}" for line in self._lines())
-        return f"""{unit.text}
-void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal *signals,
-    const double *settings, double *work, double *values, int32_t *reasons, double *numbers) {{
-  const bw_figures to = {{values, reasons, numbers, cases}};
-  const bw_samples t = {{times, n}};
-  const bw_undefined late = {unit.function(defect_of_times).name}(t);
-  for (int64_t k = 0; k < cases; ++k) {{
-    double *rest = work, **room = &rest;
-    bw_undefined wrong = late;
-{lines}
-  }}
-}}
-"""
-
     def _lines(self) -> Iterator[str]:
         """Yield what C does for a case."""
         unit, defect = self._unit, self._unit.function(defect_of_signal).name
@@ -275,7 +282,7 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
         yield "    bw_give(&to, j, k, 0.0, wrong, 1);"
         yield "  continue;"
         yield "}"
-        if self._numbers and any("setting" in self._parameters(f) for f in self._called):
+        if any("setting" in self._parameters(each) for each in self._called):
             yield from self._setting_lines()
         for name, function in self.shared.items():
             made = unit.function(function)
@@ -378,7 +385,15 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
         values = np.empty((len(self.measures), cases))
         reasons = np.empty(values.shape, dtype=np.int32)
         numbers = np.empty((*values.shape, 3))
-        arrays = (np.ascontiguousarray(t), places, packed, work, values, reasons, numbers)
+        arrays = (
+            np.ascontiguousarray(t, dtype=np.float64),
+            places,
+            packed,
+            work,
+            values,
+            reasons,
+            numbers,
+        )
         self._function(cases, n, *(each.ctypes.data for each in arrays))
         values += 0.0  # zeros are positive, whose sign C does not keep
         return FiguresInC(values, reasons, numbers)
@@ -397,28 +412,26 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
     def _parameters(self, function: Callable[..., Any]) -> list[str]:
         return list(inspect.signature(function).parameters)
 
-    def _taken(self, function: Callable[..., Any]) -> list[str]:
-        """Return what a function takes, and note which signals and functions that are."""
+    def _take(self, function: Callable[..., Any], *above: object) -> None:
+        """Note which signals and functions a function takes; ``above``: those that take it."""
         hints = typing.get_type_hints(function)
-        names = self._parameters(function)
         settings = typing.get_type_hints(self.setting_class)
-        for name in names:
+        for name in self._parameters(function):
             beside = vars(self._module).get(name)
             if name in ("t", "setting") or name in self.shared:
                 continue
             if settings.get(name) is str:
                 is_optional = NoneType in typing.get_args(hints.get(name))
                 self._optional[name] = self._optional.get(name, True) and is_optional
-            elif isinstance(beside, FunctionType):
-                self._taken(beside)
+            elif isinstance(beside, FunctionType) and beside not in (function, *above):
+                self._take(beside, function, *above)
                 self.shared[name] = beside
             else:
                 raise ModelError(
                     f"{self._module.__file__}: the key figure's function {function.__name__} takes "
                     f"{name!r}, which must be t, setting, a field of Setting that names a signal, "
-                    "or a function of the file"
+                    "or another function of the file"
                 )
-        return names
 
 
 @cache

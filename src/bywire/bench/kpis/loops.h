@@ -43,6 +43,7 @@ static inline double bw_no_number(void) {
 }
 
 static inline int64_t bw_length(bw_samples y) { return y.n; }
+static inline double bw_from_end(bw_samples y, int64_t back) { return y.at[y.n - back]; }
 static inline double bw_larger(double a, double b) { return b > a ? b : a; }
 static inline double bw_smaller(double a, double b) { return b < a ? b : a; }
 static inline int64_t bw_larger_int(int64_t a, int64_t b) { return b > a ? b : a; }

@@ -12,6 +12,7 @@ import xarray as xr
 from bywire.bench.kpis.kpi import Kpi, Measure
 from bywire.bench.kpis.loop_family import LoopFamily
 from bywire.bench.kpis.samples import signal
+from bywire.core.errors import ModelError
 from bywire.core.registry import Kind
 
 
@@ -52,7 +53,14 @@ def _declared(module: ModuleType) -> Iterator[Family]:
         summary = (module.__doc__ or "").strip().splitlines()[0]
         name = module.__name__.rpartition(".")[2]
         select = getattr(module, "select", None)
+        if not hasattr(module, "Setting"):
+            raise ModelError(
+                f"{module.__file__}: key figures need a data class Setting beside them, with the "
+                "names of their signals"
+            )
         loops = None if select else LoopFamily(module)
+        if loops is not None and not module.__name__.startswith("bywire."):
+            loops.translate()  # so that its author sees a mistake at once, and not in a study
         yield Family(name, summary, module.Setting, figures, select, loops)
 
 

@@ -4,8 +4,8 @@ A key figure that many cases or a page ask for is such a function; Python runs i
 translator knows int, float and bool, `Samples`, NamedTuples of these, the numbers of a family's
 ``Setting``, ``| None`` and ``| Undefined``; ``for`` over a range or samples, ``while``, ``if``,
 ``break``, ``continue``, ``return``; arithmetic, comparisons, slices, lists of a number for each
-sample; other functions of this kind, and those of `_BUILT_IN`. Whatever else a function holds is
-an error that names its line.
+sample; other functions of this kind, and some of Python. Whatever else a function holds is an error
+that names its line.
 
 C and Python give the same bits, but for signs of zero, because every operation is written as it
 stands and compilers may not regroup it. So a function whose digits depend on the library of the
@@ -25,7 +25,7 @@ import typing
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import FunctionType, ModuleType, NoneType
+from types import FunctionType, NoneType
 from typing import Any, NoReturn
 
 from bywire.bench.kpis.kpi import Undefined
@@ -386,15 +386,17 @@ class _Writer:
         self.made.arrays += self.array(node)
         array, k = (f"bw_{each}_{self.made.arrays}" for each in ("list", "place"))
         outer = self.kinds.get(name)
-        if isinstance(over, ast.Call) and self.called_name(over) == "range":
+        if self.calls(over, range):
             begin, end = self.bounds_of_list(over)
+            above = []
             self.kinds[name] = INT
             item = f"const int64_t {c_name(name)} = {k} + {begin};"
         else:
-            begin, samples = "0", self.samples(over)
-            end = f"{samples}.n"
+            given = f"{array}_of"
+            above = [f"const bw_samples {given} = {self.samples(over)};"]
+            begin, end = "0", f"{given}.n"
             self.kinds[name] = FLOAT
-            item = f"const double {c_name(name)} = {samples}.at[{k}];"
+            item = f"const double {c_name(name)} = {given}.at[{k}];"
         self.loops += 1
         value = self.number(element)
         self.loops -= 1
@@ -403,6 +405,7 @@ class _Writer:
             self.kinds[name] = outer
         count = f"{array}_n"
         return [
+            *above,
             f"const int64_t {count} = {end} > {begin} ? {end} - {begin} : 0;",
             f"double *restrict {array} = bw_take(room, {count});",
             f"for (int64_t {k} = 0; {k} < {count}; ++{k}) {{",
@@ -411,9 +414,9 @@ class _Writer:
             "}",
         ], Value(f"(bw_samples){{{array}, {count}}}", SAMPLES)
 
-    def bounds_of_list(self, over: ast.Call) -> tuple[str, str]:
+    def bounds_of_list(self, over: ast.expr) -> tuple[str, str]:
         """Return where a list's range begins and ends; it is not longer than what is recorded."""
-        match over.args:
+        match getattr(over, "args", ()):
             case [end]:
                 begin = "0"
             case [ast.Constant(int(first)), end]:
@@ -427,7 +430,7 @@ class _Writer:
 
     def length(self, node: ast.expr) -> str:
         """Return how many samples a list is for."""
-        if isinstance(node, ast.Call) and self.called_name(node) == "len":
+        if self.calls(node, len):
             return self.value(node).text
         self.refuse(node, "a list holds a number for each sample: len(...)")
 
@@ -441,25 +444,30 @@ class _Writer:
         """Return the lines of a loop over a range or over samples; its bounds are known at once."""
         if name in self.kinds:
             self.refuse(node, f"{name!r} is in use: give what counts this loop a name of its own")
-        self.loops += 1
         k = c_name(name)
-        if isinstance(over, ast.Call) and self.called_name(over) == "range":
-            head, item, self.kinds[name] = self.range_head(over, k), [], INT
+        if self.calls(over, range):
+            head, self.kinds[name] = [f"{{ {self.range_head(over, k)}"], INT
         else:
-            at, count = f"bw_at_{self.loops}_{k}", f"bw_n_{self.loops}_{k}"
-            samples = self.samples(over)
-            head = f"for (int64_t {at} = 0, {count} = {samples}.n; {at} < {count}; ++{at}) {{"
-            item, self.kinds[name] = [f"  const double {k} = {samples}.at[{at}];"], FLOAT
+            at, given = f"bw_at_{k}", f"bw_of_{k}"
+            head, self.kinds[name] = (
+                [
+                    f"{{ const bw_samples {given} = {self.samples(over)};",
+                    f"for (int64_t {at} = 0; {at} < {given}.n; ++{at}) {{",
+                    f"  const double {k} = {given}.at[{at}];",
+                ],
+                FLOAT,
+            )
+        self.loops += 1
         self.counters.append(name)
         lines = _in(self.block(body))
         self.counters.pop()
         del self.kinds[name]
         self.loops -= 1
-        return [head, *item, *lines, "}"]
+        return [*head, *lines, "}}"]
 
-    def range_head(self, over: ast.Call, k: str) -> str:
+    def range_head(self, over: ast.expr, k: str) -> str:
         """Return the head of a loop over a range."""
-        match over.args:
+        match getattr(over, "args", ()):
             case [end]:
                 begin, step = "0", 1
             case [first, end]:
@@ -561,6 +569,8 @@ class _Writer:
                 begin = "0" if low is None else self.whole(low)
                 end = "INT64_MAX" if high is None else self.whole(high)
                 return Value(f"bw_slice({self.samples(of)}, {begin}, {end})", SAMPLES)
+            case ast.Subscript(of, ast.UnaryOp(ast.USub(), ast.Constant(int(back)))):
+                return Value(f"bw_from_end({self.samples(of)}, {back})", FLOAT)
             case ast.Subscript(of, at) if not isinstance(at, ast.Slice):
                 return Value(f"{self.plain(of).text}.at[{self.index(of, at)}]", FLOAT)
             case ast.UnaryOp(ast.Not(), operand):
@@ -592,24 +602,11 @@ class _Writer:
         self.refuse(node, "only a finite number is a constant")
 
     def evaluated(self, node: ast.expr) -> Any:
-        """Return what a name, or a name in a module, stands for outside the function."""
-        names = self.function.__globals__
-        match node:
-            case ast.Name(name) if name in names:
-                return names[name]
-            case ast.Name(name) if name in _BUILTIN_NAMES:
-                return _BUILTIN_NAMES[name]
-            case ast.Attribute(of, name) if isinstance(held := self.evaluated(of), ModuleType):
-                return getattr(held, name, None)
-            case ast.BinOp(left, ast.BitOr(), right):
-                return self.evaluated(left) | self.evaluated(right)
-            case ast.Constant(None):
-                return None
-            case ast.Subscript(of, ast.Tuple(parts)):
-                return self.evaluated(of)[tuple(map(self.evaluated, parts))]
-            case ast.Subscript(of, part):
-                return self.evaluated(of)[self.evaluated(part)]
-        self.refuse(node, "it has no value yet, or only in a loop that is over")
+        """Return what an expression of names stands for outside the function."""
+        try:
+            return eval(ast.unparse(node), self.function.__globals__)
+        except (NameError, AttributeError):
+            self.refuse(node, "it has no value yet, or only in a loop that is over")
 
     def attribute(self, node: ast.Attribute) -> Value:
         """Return a field, or a constant of a module."""
@@ -622,15 +619,12 @@ class _Writer:
         return Value(f"{value.text}.{c_name(node.attr)}", kind)
 
     def index(self, of: ast.expr, at: ast.expr) -> str:
-        """Return the place of a sample; a constant below zero counts from the end."""
+        """Return the place of a sample."""
         value = self.plain(of)
         if value.kind == PAIR and isinstance(at, ast.Constant) and at.value in (0, 1):
             return str(at.value)
         if value.kind != SAMPLES:
             self.refuse(of, "samples are needed here")
-        match at:
-            case ast.UnaryOp(ast.USub(), ast.Constant(int(back))):
-                return f"{value.text}.n - {back}"
         return self.whole(at)
 
     def arithmetic(self, node: ast.BinOp) -> Value:
@@ -655,7 +649,10 @@ class _Writer:
                 there = "reason" if value.kind.base is Undefined else "is"
                 sign = "==" if isinstance(op, ast.Is) else "!="
                 return Value(f"({value.text}.{there} {sign} 0)", BOOL)
+        before = self.made.arrays
         sides = [self.number(each) for each in (node.left, *node.comparators)]
+        if len(sides) > 2 and self.made.arrays > before:  # C would compute the middle one twice
+            self.refuse(node, "compare a number that has a name")
         signs = [_OPERATORS.get(type(op)) for op in node.ops]
         if None in signs:
             self.refuse(node, "comparisons are < <= > >= == != of numbers, and `is None`")
@@ -675,22 +672,28 @@ class _Writer:
 
     # calls
 
-    def called_name(self, node: ast.Call) -> str:
-        """Return the name of a built-in function that is called; empty for others."""
-        called = self.evaluated(node.func) if _is_named(node.func, self.kinds) else None
-        return next((name for name, each in _CALLED.items() if each is called), "")
+    def calls(self, node: ast.expr, function: Any) -> bool:
+        """Return whether an expression calls a function of Python."""
+        is_call = isinstance(node, ast.Call) and self.is_outside(node.func)
+        return is_call and self.evaluated(node.func) is function  # type: ignore[attr-defined]
+
+    def is_outside(self, node: ast.expr) -> bool:
+        """Return whether a name, or one in a module, stands for something outside the function."""
+        while isinstance(node, ast.Attribute):
+            node = node.value
+        return isinstance(node, ast.Name) and node.id not in self.kinds
 
     def call(self, node: ast.Call) -> Value:
         """Return what a function gives, or a record that is made."""
-        if not _is_named(node.func, self.kinds):
+        if not self.is_outside(node.func):
             self.refuse(node, "only functions of modules are called")
-        called, name = self.evaluated(node.func), self.called_name(node)
+        called = self.evaluated(node.func)
         if called is isinstance:
             return self.is_undefined(node)
         if called is Undefined:
             return self.undefined(node)
-        if name:
-            return self.built_in(node, name)
+        if called in _BUILT_IN:
+            return self.built_in(node, _BUILT_IN[called])
         if isinstance(called, FunctionType):
             if self.unit.is_begun(called):
                 self.refuse(node, "a function does not call itself")
@@ -702,7 +705,8 @@ class _Writer:
             return Value(f"{made.name}({', '.join([*rooms, *args.values()])})", made.returns)
         kind = kind_of(called) if isinstance(called, type) else None
         if kind is None or not hasattr(called, "_fields"):
-            self.refuse(node, f"it calls functions of loops, NamedTuples, and {', '.join(_CALLED)}")
+            known = ", ".join(each.__name__ for each in _BUILT_IN)
+            self.refuse(node, f"it calls functions of loops, NamedTuples, and {known}")
         args = self.arguments(node, called, fields_of(called))
         given = ", ".join(f".{c_name(n)} = {text}" for n, text in args.items())
         return Value(f"({self.unit.ctype(kind)}){{{given}}}", kind)
@@ -727,21 +731,20 @@ class _Writer:
             self.refuse(node, f"the type of {missing[0]!r} is none that C has")
         return {name: self.coerced(bound.arguments[name], wanted[name]) for name in wanted}
 
-    def built_in(self, node: ast.Call, name: str) -> Value:
+    def built_in(
+        self, node: ast.Call, forms: Sequence[tuple[tuple[Kind, ...], Kind, str]]
+    ) -> Value:
+        """Return what a function of Python gives."""
         values = [self.plain(each) for each in node.args]
         given = tuple(each.kind for each in values)
         if given in ((INT, FLOAT), (FLOAT, INT)):
             given = (FLOAT, FLOAT)
-        for takes, gives, text in _BUILT_IN[name]:
+        for takes, gives, text in forms:
             if takes == given and not node.keywords:
                 return Value(f"{text}({', '.join(each.text for each in values)})", gives)
-        self.refuse(
-            node,
-            "it takes "
-            + ", or ".join(" and ".join(map(_said, takes)) for takes, *_ in _BUILT_IN[name])
-            if _BUILT_IN[name]
-            else "it stands only in a for, or alone on the right of an assignment",
-        )
+        known = ", or ".join(" and ".join(map(_said, takes)) for takes, *_ in forms)
+        alone = "it stands only in a for, or alone on the right of an assignment"
+        self.refuse(node, f"it takes {known}" if known else alone)
 
     def is_undefined(self, node: ast.Call) -> Value:
         match node.args:
@@ -881,48 +884,26 @@ def _short(node: ast.AST) -> str:
     return text if len(text) < 60 else f"{text[:57]}..."
 
 
-def _is_named(node: ast.expr, kinds: dict[str, Kind]) -> bool:
-    while isinstance(node, ast.Attribute):
-        node = node.value
-    return isinstance(node, ast.Name) and node.id not in kinds
-
-
 _SIMPLE = {*_NUMBERS, list, tuple, Undefined, NoneType}
-_BUILT_IN: dict[str, list[tuple[tuple[Kind, ...], Kind, str]]] = {
-    "abs": [((FLOAT,), FLOAT, "__builtin_fabs")],
-    "bisect_left": [((SAMPLES, FLOAT), INT, "bw_bisect_left")],
-    "bisect_right": [((SAMPLES, FLOAT), INT, "bw_bisect_right")],
-    "float": [((INT,), FLOAT, "(double)"), ((FLOAT,), FLOAT, "")],
-    "isfinite": [((FLOAT,), BOOL, "bw_is_finite")],
-    "len": [((SAMPLES,), INT, "bw_length")],
-    "list": [],
-    "max": [
+_BUILT_IN: dict[Any, list[tuple[tuple[Kind, ...], Kind, str]]] = {
+    abs: [((FLOAT,), FLOAT, "__builtin_fabs")],
+    bisect.bisect_left: [((SAMPLES, FLOAT), INT, "bw_bisect_left")],
+    bisect.bisect_right: [((SAMPLES, FLOAT), INT, "bw_bisect_right")],
+    float: [((INT,), FLOAT, "(double)"), ((FLOAT,), FLOAT, "")],
+    len: [((SAMPLES,), INT, "bw_length")],
+    list: [],
+    math.isfinite: [((FLOAT,), BOOL, "bw_is_finite")],
+    math.sqrt: [((FLOAT,), FLOAT, "__builtin_sqrt")],
+    max: [
         ((SAMPLES,), FLOAT, "bw_largest"),
         ((FLOAT, FLOAT), FLOAT, "bw_larger"),
         ((INT, INT), INT, "bw_larger_int"),
     ],
-    "min": [
+    min: [
         ((SAMPLES,), FLOAT, "bw_least"),
         ((FLOAT, FLOAT), FLOAT, "bw_smaller"),
         ((INT, INT), INT, "bw_smaller_int"),
     ],
-    "range": [],
-    "sqrt": [((FLOAT,), FLOAT, "__builtin_sqrt")],
+    range: [],
 }
-_CALLED: dict[str, Any] = {
-    "abs": abs,
-    "bisect_left": bisect.bisect_left,
-    "bisect_right": bisect.bisect_right,
-    "float": float,
-    "isfinite": math.isfinite,
-    "len": len,
-    "list": list,
-    "max": max,
-    "min": min,
-    "range": range,
-    "sqrt": math.sqrt,
-}
-_BUILTIN_NAMES: dict[str, Any] = {
-    **{name: each for name, each in _CALLED.items() if each.__module__ == "builtins"},
-    **{each.__name__: each for each in (isinstance, int, bool, tuple)},
-}
+"""functions of Python by what they take: what they give, and their names in C"""

@@ -10,6 +10,7 @@ from typing import Any, get_origin
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.registry import Kind
@@ -134,6 +135,7 @@ def wanted(stimulus: Stimulus | None, experiment: str) -> Stimulus:
     if stimulus is None:
         raise ParameterError(
             f"{experiment} needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine "
-            "or table, with its parameters; without a file --set stimulus.kind=step and so on"
+            "or table, with its parameters; without a file "
+            f"{option('overrides', {'stimulus.kind': 'step'})} and so on"
         )
     return stimulus

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
-from bywire.analysis.loop import Loop, Point, Quantity
-from bywire.analysis.loop_schedule import LoopSchedule
+from bywire.analysis.loop import Loop, LoopSchedule, Point, Quantity
 from bywire.brakes.motorcycle.ecu import Stimulus
 from bywire.brakes.motorcycle.linear import control_laws
 from bywire.brakes.motorcycle.model import MotorcycleBrake

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from bywire.report.line_role import Role
-from bywire.report.panels import Panel, Panels, Trace
+from bywire.report.panels import Panel, Panels, Role, Trace
 
 PANELS = Panels(
     "motorcycle",

@@ -13,8 +13,13 @@ from typing import Any
 import numpy as np
 
 from bywire.brakes.motorcycle.model import MotorcycleBrake
-from bywire.campaigns.lasting import largest_of_the_last, least_of_the_last, mean_of_the_last
-from bywire.campaigns.residual import NEVER, Residual
+from bywire.campaigns.residual import (
+    NEVER,
+    Residual,
+    largest_of_the_last,
+    least_of_the_last,
+    mean_of_the_last,
+)
 from bywire.core.typing import Array
 
 NAME = MotorcycleBrake.name

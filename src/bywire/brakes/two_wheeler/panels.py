@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from bywire.control import abs_rules
-from bywire.report.line_role import Role
-from bywire.report.panels import Panel, Panels, Trace
+from bywire.report.panels import Panel, Panels, Role, Trace
 
 _VEHICLE = (
     Panel(

@@ -13,8 +13,7 @@ import numpy as np
 
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire
 from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear
-from bywire.campaigns.lasting import mean_of_the_last
-from bywire.campaigns.residual import NEVER, Residual
+from bywire.campaigns.residual import NEVER, Residual, mean_of_the_last
 from bywire.core.typing import Array
 
 VEHICLES = (TwoWheelerByWire.name, TwoWheelerWholeRear.name)

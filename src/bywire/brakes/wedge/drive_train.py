@@ -9,7 +9,7 @@ from bywire.control import position_pd
 from bywire.core import ops
 from bywire.core.model import Bounds
 from bywire.core.signals import Signal
-from bywire.core.wired import Wired
+from bywire.core.wires import Wired
 from bywire.plant import axial_bearing, current_drive, roller_screw, servo_motor
 
 Par = WedgeParameters

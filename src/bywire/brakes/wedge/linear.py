@@ -8,11 +8,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from bywire.analysis.linear.equilibrium import equilibrium
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.linearize import Friction, linearize
+from bywire.analysis.linear.linearize import Friction, equilibrium, linearize
 from bywire.analysis.loop import Point
-from bywire.analysis.reduction.residualized import residualized
+from bywire.analysis.reduction import residualized
 from bywire.brakes.wedge.control import Stimulus
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.model import WedgeBrake, state_at

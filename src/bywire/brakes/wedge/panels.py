@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from bywire.report.line_role import Role
-from bywire.report.panels import Panel, Panels, Trace
+from bywire.report.panels import Panel, Panels, Role, Trace
 
 _WINDINGS = Panel(
     "windings",

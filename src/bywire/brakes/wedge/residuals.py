@@ -13,8 +13,13 @@ import numpy as np
 
 from bywire.brakes.wedge.laws.moment_control import MOMENT
 from bywire.brakes.wedge.model import WedgeBrake
-from bywire.campaigns.lasting import largest_of_the_last, least_of_the_last, mean_of_the_last
-from bywire.campaigns.residual import NEVER, Residual
+from bywire.campaigns.residual import (
+    NEVER,
+    Residual,
+    largest_of_the_last,
+    least_of_the_last,
+    mean_of_the_last,
+)
 from bywire.core.typing import Array
 
 NAME = WedgeBrake.name

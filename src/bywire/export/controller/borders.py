@@ -1,4 +1,11 @@
-"""Test vectors next to borders: inputs at which a comparison of the laws is about to turn."""
+"""Test vectors next to borders: inputs at which a comparison of the laws is about to turn.
+
+Random inputs hardly ever meet a limit to the last digit, where ``<`` and ``<=`` differ, nor come
+so close to it that another limit shows. A tick is run on numbers that note every comparison that
+they take part in, and how far its sides are apart. One input is changed until a comparison turns;
+in between the place is sought where it does. What lies there is where the search goes on: behind
+a limit that is rarely met stand those that are met nowhere else.
+"""
 
 from __future__ import annotations
 
@@ -250,11 +257,6 @@ def _guessed(
 
 
 # --- Inputs next to borders
-# Random inputs hardly ever meet a limit to the last digit, where ``<`` and ``<=`` differ, nor come
-# so close to it that another limit shows. A tick is run on numbers that note every comparison that
-# they take part in, and how far its sides are apart. One input is changed until a comparison turns;
-# in between the place is sought where it does. What lies there is where the search goes on: behind
-# a limit that is rarely met stand those that are met nowhere else.
 
 _LAW = 3
 """places, innermost first, that are the same for all who call a law"""

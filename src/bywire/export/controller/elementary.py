@@ -10,7 +10,7 @@ import struct
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
-from bywire.core import elementary_series as double
+from bywire.core import elementary as double
 from bywire.core import elementary_single as single
 from bywire.export.controller.c_text import Precision
 from bywire.export.controller.contract import LARGEST

@@ -24,8 +24,7 @@ from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.continuous import Continuous, build_continuous
 from bywire.simulation.emission import indented, leaf_namer, statements
 from bywire.simulation.expressions import as_number, needed
-from bywire.simulation.graph import Graph
-from bywire.simulation.operation import Node
+from bywire.simulation.graph import Graph, Node
 
 LEAVES = {"p": "p", "x": "x", "m": "m", "c": "closed", "r": "reaction"}
 """arguments of the C functions by kind of leaf; integrals are none, they are not computed"""

@@ -18,12 +18,10 @@ from bywire.core.errors import CompilerError
 from bywire.export.exported import Exported, start_nodes
 from bywire.export.model_header import braced, number
 from bywire.simulation.emission import leaf_count, unread
-from bywire.simulation.emit_rare import rare_header, rare_results
+from bywire.simulation.emit_rare import PROJECTION, rare_header, rare_results
 from bywire.simulation.expressions import needed
-from bywire.simulation.graph import Graph
+from bywire.simulation.graph import Graph, Node, Operation
 from bywire.simulation.layout import COUNTERS
-from bywire.simulation.operation import Node, Operation
-from bywire.simulation.rare_text import PROJECTION
 from bywire.simulation.stages import STATE, Stages
 
 OPERATIONS = (

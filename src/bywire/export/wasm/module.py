@@ -20,7 +20,7 @@ from bywire.export.interface import Interface, finite_range, interface, paramete
 from bywire.export.wasm.formulas import run_formulas, with_section
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.compiler import KERNEL_MATH, TIMEOUT, bundled_compiler
-from bywire.simulation.rare_text import CUT
+from bywire.simulation.emit_rare import CUT
 from bywire.simulation.run import sampled_stimulus
 
 HERE = Path(__file__).parent

@@ -19,9 +19,9 @@ from bywire.identification.electrics.loop_records import (
     require_steps,
     without_lead,
 )
+from bywire.identification.measured import split
 from bywire.identification.method import Effort, Identified, Method
 from bywire.identification.output_error import Trial, trial
-from bywire.identification.records import split
 
 
 @dataclass(frozen=True)

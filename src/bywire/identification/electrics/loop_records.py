@@ -17,11 +17,9 @@ from bywire.core.typing import Array
 from bywire.data.labeled import over
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import estimate
-from bywire.identification.measured import wrong_sign
+from bywire.identification.measured import require_signals, wrong_sign
 from bywire.identification.method import Check, Curve, Identified
-from bywire.identification.moved_run import moved_run
-from bywire.identification.output_error import Trial, output_error
-from bywire.identification.records import require_signals
+from bywire.identification.output_error import Trial, moved_run, output_error
 from bywire.identification.residuals import explained
 from bywire.identification.unknown import parameters_of
 from bywire.simulation.run import simulate

@@ -12,9 +12,8 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency
 from bywire.core.signals import Signal, zeros
 from bywire.core.typing import Array
-from bywire.identification.driven import Driven
-from bywire.identification.output_error import Trial, even_interval
-from bywire.identification.records import require_signals
+from bywire.identification.measured import require_signals
+from bywire.identification.output_error import Driven, Trial, even_interval
 from bywire.plant import anti_alias_filter, dc_motor
 from bywire.simulation.run import Run
 

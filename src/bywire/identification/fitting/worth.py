@@ -5,23 +5,101 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.core.callers import option
+from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
-from bywire.identification.fitting.question import Options
-from bywire.identification.fitting.unknown_texts import is_parameter
+from bywire.identification.fitting.question import Options, is_parameter
 from bywire.identification.method import Check, Curve
 from bywire.identification.noise import FAR, outliers, robust_scale
-from bywire.identification.output_error import Trial
-from bywire.identification.prediction import Prediction, computed
-from bywire.identification.replaying.bench_replay import beside
-from bywire.identification.replaying.measured_run import MeasuredRun
+from bywire.identification.output_error import Trial, moved_run
+from bywire.identification.replaying.bench_replay import MeasuredRun, beside
+from bywire.identification.replaying.fit import fit_figures
+from bywire.identification.replaying.segments import Segment
 from bywire.identification.residuals import explained
+from bywire.simulation.run import simulate
 
 _OWN = ("initial.", "start.")  # what each record has for itself
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A record beside the model with the estimates.
+
+    Parameters
+    ----------
+    label
+        Of the record; empty where there is one alone.
+    pairs
+        ``measured`` and ``modeled`` over ``time`` [s], by output.
+    """
+
+    label: str
+    pairs: Mapping[str, xr.Dataset]
+
+    def figures(self, name: str) -> dict[str, float]:
+        """Return the figures of an output over the whole record; see ``fit_figures``."""
+        time = self.pairs[name]["time"].values
+        whole = Segment("all", float(time[0]), float(time[-1]))
+        return {k.name: k.value for k in fit_figures(self.pairs[name], whole)}
+
+
+def predict(trial: Trial, estimate: Estimate) -> Prediction:
+    """Return a record beside the model with the estimates, without fitting anything.
+
+    Parameters
+    ----------
+    trial
+        A record and its model. Unknowns of a record's own, such as where it begins, are taken
+        from the estimate only where they carry this trial's label.
+    estimate
+        Of this or of other records; what the data does not tell stays where it was.
+
+    Raises
+    ------
+    SolverError
+        When the run cannot be computed.
+    """
+    modeled, time = computed(trial, estimate, tuple(trial.measured))
+    signals = signals_of(trial.run.model.Output)
+    pairs = {}
+    for name, values in trial.measured.items():
+        attrs = {"units": signals[name].unit, "long_name": signals[name].label}
+        pairs[name] = xr.Dataset(
+            {
+                "measured": ("time", np.where(trial.rows(name), values, np.nan), attrs),
+                "modeled": ("time", modeled[name], attrs),
+            },
+            {"time": ("time", time, {"units": "s"})},
+        )
+    return Prediction(trial.label, pairs)
+
+
+def computed(
+    trial: Trial, estimate: Estimate, names: tuple[str, ...]
+) -> tuple[dict[str, Array], Array]:
+    """Return outputs of a trial's run with the estimates, offsets added, and its instants [s]."""
+    values = {
+        u.name: float(v)
+        for u, v in (
+            *zip(estimate.unknowns, estimate.values, strict=True),
+            *((k.unknown, k.unknown.start) for k in estimate.kept),
+        )
+        if u.trial == trial.label or not (u.trial or u.name.startswith(_OWN))
+    }
+    moving = {name: v for name, v in values.items() if not name.startswith("offset.")}
+    run = simulate(moved_run(trial.run, moving, trial.start), names)
+    return {name: run[name] + values.get(f"offset.{name}", 0.0) for name in names}, run.time
+
+
+# --- What the fit is worth
+
 _EXPLAINED = 0.5  # of the variance: what is explained outweighs what is left
 _BETWEEN = (
     "; outputs were measured at uneven instants and interpolated: where they move fast from sample "
@@ -107,16 +185,16 @@ def checks_of(
             limit=_EXPLAINED,
             at_least=True,
             note="share of the outputs' variance, over their noise, that the model predicts",
-            next_step="check that --input is what drove the record, its unit and its sign; "
-            "'bywire replay' draws both",
+            next_step=f"check that {option('inputs')} is what drove the record, its unit and its "
+            "sign; 'bywire replay' draws both",
         ),
         Check(
             "parameters_without_meaning",
             float(len(vague)),
             limit=0.0,
             note=said or "none at its bound, none with a 95 % interval wider than +-100 %",
-            next_step="leave these --unknown out, give a --prior, or record a motion that they "
-            "change",
+            next_step=f"leave these {option('unknowns')} out, give a {option('priors')}, or record "
+            "a motion that they change",
         ),
         Check(
             "not_told",
@@ -134,10 +212,11 @@ def _missing(fit: Estimate) -> str:
     worst = max(left, key=lambda each: each.rms / (each.noise or 1.0))
     name = worst.label.rpartition(":")[2]
     return (
-        f"look at {worst.label}, of which most is left: if its curves are shifted, add --unknown "
-        f"offset.{name}; if they part at the beginning, --estimate-start; if another parameter "
-        "shapes what is left, make it an --unknown; if it only scatters, give its noise with "
-        f"--output '{name}=...'"
+        f"look at {worst.label}, of which most is left: if its curves are shifted, add "
+        f"{option('unknowns')} offset.{name}; if they part at the beginning, "
+        f"{option('states')}; if another parameter shapes what is left, make it an "
+        f"{option('unknowns')}; if it only scatters, give its noise with "
+        f"{option('outputs')} '{name}=...'"
     )
 
 
@@ -145,7 +224,8 @@ def _few(r: Array, far: NDArray[np.bool_], robust: bool) -> str:
     """Return what stands behind residuals without a robust loss: perhaps a few outliers."""
     if robust or not 0.0 < float(far.mean()) < _FEW or robust_scale(r) > FAR:
         return ""
-    return f"; {far.sum()} of {far.size} stand out: if they are outliers, take --loss huber"
+    advice = f"if they are outliers, take {option('loss', 'huber')}"
+    return f"; {far.sum()} of {far.size} stand out: {advice}"
 
 
 def _outliers(far: NDArray[np.bool_], options: Options) -> Check:
@@ -190,7 +270,8 @@ def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
     note = "starts that met the lowest minimum"
     if reached < _MET:
         note += (
-            ": there may be a lower one; take more --starts, narrower ranges (--unknown "
+            f": there may be a lower one; take more {option('starts')}, narrower ranges "
+            f"({option('unknowns')} "
             "NAME=LOW..HIGH), or fewer unknowns"
         )
     return (
@@ -200,7 +281,7 @@ def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
             limit=_MET,
             at_least=True,
             note=note,
-            next_step="take --starts 16, or a range for each --unknown",
+            next_step=f"take {option('starts')} 16, or a range for each {option('unknowns')}",
         ),
     )
 

@@ -11,14 +11,19 @@ import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case, as_run
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError, unknown_name, unknown_of_few
 from bywire.core.signals import Signal, signals_of, without_noise
-from bywire.identification.fitting.bench_fit import BenchFit
-from bywire.identification.fitting.output_noise import noise_given
-from bywire.identification.fitting.question import BenchMethod, Options, Question
-from bywire.identification.fitting.unknown_texts import is_parameter, unknowns_of
+from bywire.identification.fitting.bench_fit import BenchFit, noise_given
+from bywire.identification.fitting.question import (
+    BenchMethod,
+    Options,
+    Question,
+    is_parameter,
+    unknowns_of,
+)
 from bywire.identification.method import Method
-from bywire.identification.replaying.measured_run import case_of
+from bywire.identification.replaying.bench_replay import case_of
 from bywire.simulation.run import simulate
 
 _NAME = "output-error"
@@ -143,15 +148,15 @@ def _require_known(case: Case, question: Question) -> None:
     outputs, stimuli = signals_of(case.model.Output), signals_of(case.model.Stimulus)
     if not question.noise:
         raise ParameterError(
-            "no output is measured: give --output SIGNAL, once for each of the model's outputs "
-            f"that the record has, for instance {', '.join(list(outputs)[:6])}"
+            f"no output is measured: give {option('outputs')} SIGNAL, once for each of the "
+            f"model's outputs that the record has, for instance {', '.join(list(outputs)[:6])}"
         )
     driven = without_noise(stimuli)
     states = case.model.State._fields
     for kind, names, known, refused in (
         ("output", question.noise, outputs, unknown_name),
         ("stimulus", question.inputs, driven, unknown_of_few),
-        ("state in --estimate-start", question.states, states, unknown_of_few),
+        (f"state in {option('states')}", question.states, states, unknown_of_few),
     ):
         for name in names:
             if name not in known:

@@ -3,42 +3,128 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import xarray as xr
 from pydantic import Field
 
+from bywire.core.callers import option
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Force, Frequency, Nodes, Position, Unit
 from bywire.core.typing import Array
+from bywire.data.labeled import over
+from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
-from bywire.identification.method import Check, Effort, Identified, Method
-from bywire.identification.records import joined, split
-from bywire.identification.sealing.seal_curves import (
-    force_over_travel,
-    friction_line,
-    sliding_force,
-)
-from bywire.identification.sealing.strokes import (
+from bywire.identification.measured import after_one_another, joined, split
+from bywire.identification.method import Check, Curve, Effort, Identified, Method
+from bywire.identification.output_error import even_interval
+from bywire.identification.strokes import (
+    Group,
     drifting,
+    find_strokes,
     grouped,
     half_widths,
     misfits,
     pressure_between,
     require_signs,
     require_told,
+    velocity,
 )
 from bywire.identification.unknown import Unknown
+
+
+def friction_line(fit: Estimate, groups: Sequence[Group]) -> Curve:
+    """Return friction over pressure with its band, and what each group says of it."""
+    offset = fit["F_off"] if "F_off" in fit.names else 0.0
+    seen = {g.p: g.direction * (g.F - fit["A"] * g.p - offset) for g in groups}
+    p = np.union1d(np.linspace(0.0, 1.1 * max(seen), 60), list(seen))
+    places = [fit.names.index(n) for n in ("F_0", "f") if n in fit.names]
+    rows = np.column_stack((np.ones(p.size), p))[:, : len(places)]
+    value = rows @ fit.values[places]
+    variance = np.einsum("ni,ij,nj->n", rows, fit.covariance[np.ix_(places, places)], rows)
+    half = 0.5 * float(np.diff(fit.intervals()[0])[0]) / float(fit.deviations[0])
+    reach = half * np.sqrt(variance)
+    columns = {
+        "value": value,
+        "low": value - reach,
+        "high": value + reach,
+        "measured": np.array([seen.get(float(v), np.nan) for v in p]),
+    }
+    return Curve(
+        "friction",
+        "Friction over pressure with its 95 % band; points: each record, each direction.",
+        over(("p", p, "Pa", "pressure"), columns, "N", "friction"),
+        "p",
+    )
+
+
+def sliding_force(
+    records: Mapping[str, xr.Dataset],
+    fit: Estimate,
+    stretch: tuple[float, float],
+    slowest: float,
+    cutoff: float,
+) -> Curve:
+    """Return the force while it slides, measured and modeled, record after record."""
+    pairs, times = [], {}
+    for name, record in records.items():
+        times[name] = record["time"].values - record["time"].values[0]
+        pairs.append(_sliding(record, fit, stretch, slowest, cutoff))
+    return Curve(
+        "strokes",
+        "Force while the piston slides, record after record: measured, and of the model.",
+        _beside(pairs, after_one_another(times)),
+        "time",
+    )
+
+
+def force_over_travel(
+    records: Mapping[str, xr.Dataset],
+    fit: Estimate,
+    stretch: tuple[float, float],
+    slowest: float,
+    cutoff: float,
+) -> Curve:
+    """Return the loops of force over travel while it slides, measured and modeled."""
+    pairs = [_sliding(record, fit, stretch, slowest, cutoff) for record in records.values()]
+    x = np.concatenate([record["x"].values for record in records.values()])
+    axis = {"x": ("x", x, {"units": "m", "long_name": "travel"})}
+    return Curve(
+        "loops",
+        "Force over travel while the piston slides: the height of a loop is twice the friction.",
+        _beside(pairs, axis, "x"),
+        "x",
+    )
+
+
+def _sliding(
+    record: xr.Dataset, fit: Estimate, stretch: tuple[float, float], slowest: float, cutoff: float
+) -> tuple[Array, Array]:
+    """Return measured and modeled force, NaN where the piston does not slide."""
+    offset = fit["F_off"] if "F_off" in fit.names else 0.0
+    x, p, F = (record[n].values for n in ("x", "p", "F"))
+    v = velocity(x, even_interval(record["time"].values), cutoff)
+    model = np.full(F.size, np.nan)
+    for stroke in find_strokes(x, v, *stretch, slowest):
+        k = stroke.rows
+        model[k] = fit["A"] * p[k] + stroke.direction * (fit["F_0"] + fit["f"] * p[k]) + offset
+    return np.where(np.isfinite(model), F, np.nan), model
+
+
+def _beside(pairs: Sequence[tuple[Array, Array]], axis: Any, dim: str = "time") -> xr.Dataset:
+    attrs = {"units": "N", "long_name": "force"}
+    measured, modeled = (np.concatenate(columns) for columns in zip(*pairs, strict=True))
+    return xr.Dataset({"measured": (dim, measured, attrs), "modeled": (dim, modeled, attrs)}, axis)
+
+
+# --- The method
 
 ForcePerPressure = Annotated[float, Unit("N/Pa", 1e-5), Field(ge=0, allow_inf_nan=False)]
 
 _MISFIT = 0.1
 _OFF_BORE = 0.1  # of the area: sensors' gains are off by a few hundredths, wrong units by far more
-_UNCHECKED = (
-    "units of pressure and force are not checked: --option bore=25mm compares the area with a "
-    "known bore"
-)
 
 
 class Truth(ParameterSet):
@@ -137,7 +223,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
                 sigma / friction,
                 limit=_MISFIT,
                 note="what the line leaves of the mean forces, over the mean friction",
-                next_step=_NEXT,
+                next_step=_advice(),
             ),
             Check(
                 "stroke_scatter",
@@ -159,17 +245,26 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
             *(f"{label} {reason}" for label, reason in fit.vague().items()),
             *drifting(groups, fit["A"]),
             *misfits(groups, W, F),
-            *(() if options.bore else (_UNCHECKED,)),
+            *(() if options.bore else (_unchecked(),)),
         ),
     )
 
 
-_NEXT = (
-    "look at 'pressure_between_directions' and the curve of each record: if one record lies off, "
-    "identify without it; if all forces are shifted, take --option zero=free; if friction depends "
-    "on speed or bends over pressure, take 'bywire identify friction-model' on friction, speed and "
-    "pressure, which compares such laws"
-)
+def _unchecked() -> str:
+    return (
+        f"units of pressure and force are not checked: {option('options', {'bore': '25mm'})} "
+        "compares the area with a known bore"
+    )
+
+
+def _advice() -> str:
+    return (
+        "look at 'pressure_between_directions' and the curve of each record: if one record lies "
+        "off, identify without it; if all forces are shifted, take "
+        f"{option('options', {'zero': 'free'})}; if friction depends on speed or bends over "
+        "pressure, take 'bywire identify friction-model' on friction, speed and pressure, which "
+        "compares such laws"
+    )
 
 
 def _bore_check(area: float, bore: float) -> tuple[Check, ...]:
@@ -184,7 +279,8 @@ def _bore_check(area: float, bore: float) -> tuple[Check, ...]:
             limit=_OFF_BORE,
             note=f"{1e6 * area:.5g} mm^2 found, the bore has {1e6 * known:.5g} mm^2: "
             "beyond the limit a unit of pressure or force is wrong",
-            next_step="check both units in the file (--output 'p=COLUMN [bar]'), and the bore",
+            next_step=f"check both units in the file ({option('outputs')} 'p=COLUMN [bar]'), and "
+            "the bore",
         ),
     )
 

@@ -1,23 +1,332 @@
-"""Measured demands drive a bench's model, and its answer is laid beside the measured one."""
+"""A bench's model driven by measured demands, and its answer beside the measured one."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
+from bywire.bench.experiment import Case, changes_of, driven_at
 from bywire.bench.recording import energy_doubts_of, energy_signals
 from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, abandoned, steps_of, unestimated
-from bywire.core.errors import ParameterError
-from bywire.core.signals import signals_of
+from bywire.core.callers import option
+from bywire.core.errors import (
+    ParameterError,
+    StepError,
+    UnitError,
+    nearest_first,
+    unknown_name,
+    unknown_of_few,
+)
+from bywire.core.parameters import leaf_fields
+from bywire.core.signals import Signal, signals_of, without_noise
 from bywire.core.typing import Array
-from bywire.identification.records import RECORD
-from bywire.identification.replaying.compared import missed_samples
-from bywire.identification.replaying.measured_run import MeasuredRun, measured_run
+from bywire.data.column_units import measures, unit_of_symbol
+from bywire.identification.measured import RECORD, as_even, require_signals
+from bywire.identification.output_error import Between, even_interval
 from bywire.simulation.run import Run, Trajectory, simulate
+
+_ACCUMULATED = ("J", "s")  # errors of which say when something went wrong, not how well it fits
+
+
+def compared_outputs(
+    case: Case, data: xr.Dataset, wanted: Sequence[str] | None, driven: Mapping[str, str]
+) -> tuple[list[str], tuple[str, ...]]:
+    """Return which outputs are compared, and what the user should know of it.
+
+    Parameters
+    ----------
+    case, data
+        Run of the model, and what was measured.
+    wanted
+        Outputs; by default all that are measured and that tell how well the model fits.
+    driven
+        Stimulus -> measured signal; none of these is compared by default.
+
+    Raises
+    ------
+    UnknownNameError, UnitError, ParameterError
+        When the model has no such output, it is not measured, or there is none.
+    """
+    signals, there = signals_of(case.model.Output), [str(name) for name in data.data_vars]
+    notes: tuple[str, ...] = ()
+    if wanted is None:
+        known = [n for n in there if n in signals and n not in driven.values()]
+        wanted = [n for n in known if _tells(data[n].values, signals[n].unit)] or known
+        passed = [n for n in known if n not in wanted]
+        if passed:
+            notes = (f"left out as flags, sums or constants: {', '.join(passed)}",)
+    if not wanted:
+        raise ParameterError(
+            "nothing measured is an output of the model: name signals as the model does "
+            f"({option('mapping')}), "
+            f"for instance {', '.join(list(signals)[:6])}; measured are "
+            f"{nearest_first(there, signals)}"
+        )
+    for name in wanted:
+        if name not in signals:
+            raise unknown_name("output", name, signals)
+        require_measured(data, name, signals[name])
+    return list(wanted), notes
+
+
+def _tells(values: Array, unit: str) -> bool:
+    """Return whether a signal moves and is neither a flag nor accumulated."""
+    there = values[np.isfinite(values)]
+    if unit in _ACCUMULATED or not there.size or np.ptp(there) == 0.0:
+        return False
+    return not (unit == "1" and bool(np.all(there == np.round(there))))
+
+
+def missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
+    """Return a sentence for each compared signal that misses samples."""
+    counts = {name: int(np.isnan(data[name].values).sum()) for name in compared}
+    total = data.sizes["time"]
+    return [
+        f"{name} misses {count} of {total} samples ({100.0 * count / total:.2g} %), where nothing "
+        "is compared"
+        for name, count in counts.items()
+        if count
+    ]
+
+
+def require_measured(data: xr.Dataset, name: str, signal: Signal) -> None:
+    """Refuse a signal that is not measured, or in a unit of something else."""
+    require_signals(data, [name])
+    unit = str(data[name].attrs.get("units", "1"))
+    if unit != signal.unit and not measures(unit_of_symbol(unit), signal.unit):
+        raise UnitError(f"{name} is measured in {unit}, but {signal.unit} is wanted: check the map")
+
+
+# --- The run, before it is computed
+# Any assembly and any experiment: one of the experiment's runs gives model, parameters, start and
+# what is not measured; measured signals take the place of the stimulus signals that they are given
+# for. Sensor noise stays off.
+
+
+@dataclass(frozen=True)
+class MeasuredRun:
+    """A run with its measured inputs, and what its outputs are compared with.
+
+    Parameters
+    ----------
+    bench
+        With the start that was measured.
+    case
+        Its run, aligned to the record.
+    data
+        Measured signals over ``time`` [s], on the instants at which the model is recorded.
+    driven
+        Stimulus -> measured signal.
+    compared
+        Outputs, measured under the same names.
+    run
+        What is to be computed; its first ``settled`` rows lie before the record.
+    settled
+        Rows of the settling time.
+    begun_at
+        Option of the experiment -> signal whose first sample it was taken from.
+    notes
+        What the user should know.
+    """
+
+    bench: Bench
+    case: Case
+    data: xr.Dataset
+    driven: Mapping[str, str]
+    compared: tuple[str, ...]
+    run: Run
+    settled: int
+    begun_at: Mapping[str, str]
+    notes: tuple[str, ...]
+
+
+def measured_run(
+    bench: Bench,
+    data: xr.Dataset,
+    inputs: Mapping[str, str] | None = None,
+    outputs: Sequence[str] | None = None,
+    case: str = "",
+    *,
+    settle: bool = True,
+    between: Between = "held",
+) -> MeasuredRun:
+    """Return a bench's run over measured demands.
+
+    Parameters
+    ----------
+    bench
+        Its experiment gives model, start, and what is not measured.
+    data
+        Measured signals over ``time`` [s], SI; resampled where the model's steps want it. The
+        run begins with the record; a time that begins before zero is taken as the experiment's.
+    inputs
+        Stimulus of the model -> measured signal; by default all of the same name.
+    outputs
+        Outputs of the model, measured under the same names; by default all that are but flags,
+        what accumulates (energies, times) and what does not move.
+    case
+        Label of the experiment's run; the first one by default.
+    settle
+        Whether the run settles before the record as the experiment does.
+    between
+        What inputs do between samples: demands of a controller are held, what is smooth and
+        read faster than it was measured is better joined by straight lines.
+
+    Raises
+    ------
+    UnknownNameError
+        When a signal is not measured, or the model has none of that name.
+    ParameterError
+        When nothing drives the model, nothing is compared, or an input has gaps.
+    """
+    chosen = case_of(bench, case)
+    driven = _inputs(chosen, data, inputs)
+    compared, passed = compared_outputs(chosen, data, outputs, driven)
+    bench, begun_at, notes = _started(bench, data, compared)
+    chosen = case_of(bench, case)
+    if not settle and chosen.settle > 0.0:
+        chosen = replace(chosen, settle=0.0)
+        notes = (*notes, "begins with the record: the experiment's settling is left out")
+    data, chosen, said = _on_grid(bench, data, chosen)
+    for signal in driven.values():
+        missing = np.flatnonzero(np.isnan(data[signal].values))
+        if missing.size:
+            at = float(data["time"].values[missing[0]])
+            raise ParameterError(
+                f"{signal} drives the model and misses {missing.size} samples, the first at "
+                f"{at:.4g} s: cut the record there"
+            )
+    run = _run(bench, chosen, data, driven, between)
+    return MeasuredRun(
+        bench,
+        chosen,
+        data,
+        driven,
+        tuple(compared),
+        run,
+        round(chosen.settle / run.record),
+        begun_at,
+        (*notes, *said, *passed),
+    )
+
+
+def case_of(bench: Bench, label: str) -> Case:
+    """Return a run of a bench's experiment; the first one where the label is empty.
+
+    Raises
+    ------
+    UnknownNameError
+        When there is none of that label.
+    ParameterError
+        When the experiment makes no run.
+    """
+    cases = {case.label: case for case in bench.cases()}
+    if not cases:
+        raise ParameterError(f"experiment {bench.experiment!r} makes no run: take another one")
+    if label and label not in cases:
+        raise unknown_name(f"run of {bench.experiment}", label, cases)
+    return cases[label] if label else next(iter(cases.values()))
+
+
+def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> dict[str, str]:
+    stimuli, there = signals_of(case.model.Stimulus), [str(name) for name in data.data_vars]
+    if wanted is None:
+        wanted = {name: name for name in there if name in stimuli}
+    driven = without_noise(stimuli)
+    if not wanted:
+        raise ParameterError(
+            f"nothing measured drives the model: give {option('inputs', {'STIMULUS': 'SIGNAL'})} "
+            f"with one of "
+            f"{', '.join(driven)} and one of {nearest_first(there, driven)}"
+        )
+    for stimulus, signal in wanted.items():
+        if stimulus not in stimuli:
+            raise unknown_of_few("stimulus", stimulus, driven)
+        require_measured(data, signal, stimuli[stimulus])
+    return dict(wanted)
+
+
+def _started(
+    bench: Bench, data: xr.Dataset, compared: Sequence[str]
+) -> tuple[Bench, dict[str, str], tuple[str, ...]]:
+    """Return the bench with its start at what was measured, where the experiment has one."""
+    for name, signal in bench.definition.begins_at.items():
+        known = name in bench.chosen_options.flat() and name not in bench.options
+        if known and signal in compared:
+            first = data[signal].values[np.isfinite(data[signal].values)][:1]
+            leaf = leaf_fields(bench.definition.options)[name]
+            start = max(float(first[0]), leaf.low) if first.size else leaf.low
+            started = replace(bench, options={**bench.options, name: start})
+            said = f"starts at the measured {signal}, {start:.5g} {leaf.unit.symbol}"
+            return started, {name: signal}, (said,)
+    return bench, {}, ()
+
+
+def _on_grid(
+    bench: Bench, data: xr.Dataset, case: Case
+) -> tuple[xr.Dataset, Case, tuple[str, ...]]:
+    """Return data on instants at which the model can be recorded, and the case aligned to them."""
+    interval = even_interval(data["time"].values)
+    # A clock that begins before zero is the experiment's own: part of its settling was recorded.
+    case = replace(case, settle=max(case.settle + min(float(data["time"].values[0]), 0.0), 0.0))
+    try:
+        return data, case.aligned(bench.step, interval), ()
+    except StepError:
+        near = max(round(interval / bench.step), 1) * bench.step
+    for candidate in (near, case.record):
+        try:
+            aligned = case.aligned(bench.step, float(f"{candidate:.9g}"))
+        except StepError:
+            continue
+        even, said = as_even(data, aligned.record)
+        return even, aligned, tuple(said)
+    raise StepError(
+        f"neither samples every {interval:g} s nor every {case.record:g} s go with steps of "
+        f"{bench.step:g} s: resample the measurement (bywire convert --rate)"
+    )
+
+
+def _run(
+    bench: Bench, case: Case, data: xr.Dataset, driven: Mapping[str, str], between: Between
+) -> Run:
+    interval = case.record
+    columns = {name: data[signal].values for name, signal in driven.items()}
+    fields = case.model.Stimulus._fields
+    begin = min(float(data["time"].values[0]), 0.0)
+
+    def stimulus(t: Array) -> Array:
+        """Measured values, from one sample to the next; the first one while it settles."""
+        rows = np.zeros((t.size, len(fields)))
+        given = driven_at(case, t - case.settle + begin)
+        at = (t - case.settle) / interval
+        at = np.floor(at + 1e-6) if between == "held" else at
+        for k, name in enumerate(fields):
+            if name in columns:
+                rows[:, k] = np.interp(at, np.arange(columns[name].size), columns[name])
+            elif name in given and not name.startswith("noise_"):
+                rows[:, k] = given[name]
+        return rows
+
+    duration = case.settle + (data.sizes["time"] - 1) * interval
+    return Run(
+        case.model,
+        case.par,
+        case.state,
+        case.memory,
+        stimulus,
+        duration,
+        bench.step,
+        interval,
+        changes_of(case, case.settle - begin),
+    )
+
+
+# --- The answer beside the measured one
 
 
 @dataclass(frozen=True)
@@ -59,7 +368,7 @@ def replay(
     Parameters
     ----------
     bench, data, inputs, outputs, case
-        See ``bywire.identification.replaying.measured_run``.
+        See ``bywire.identification.replaying.bench_replay``.
     estimate_error
         Whether the model runs in other steps too; see `bywire.bench.running.run`.
 

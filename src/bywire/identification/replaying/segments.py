@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from pydantic import Field
 
+from bywire.core.callers import option
 from bywire.core.errors import InputError, ParameterError
 from bywire.core.quantities import Unit
 from bywire.core.section import Hint, Section
@@ -95,7 +96,7 @@ def found_in(demand: xr.DataArray, tolerances: Mapping[str, str]) -> list[Segmen
     if len(merged) - 1 > _MOST:
         raise ParameterError(
             f"the demand {demand.name} holds and moves {len(merged) - 1} times: name the "
-            "stretches that matter in a file, --segments FILE"
+            f"stretches that matter in a file, {option('segments')} FILE"
         )
     counts = {"hold": 0, "move": 0}
     segments = []

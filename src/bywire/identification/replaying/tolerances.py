@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Limit, Verdict, parted, read_limit, verdict_of
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError, unknown_name
 
 SIGNED = ("bias", "lag")
@@ -36,8 +37,8 @@ def read_tolerances(texts: Sequence[str]) -> dict[str, str]:
         name, compare, bound = parted(text)
         if compare is None or not name or not bound:
             raise ParameterError(
-                f"--tolerance {text!r} cannot be read: write for instance 'nrmse <= 5 %' or "
-                "'p_mc.max_error <= 2 bar'"
+                f"{option('tolerances')} {text!r} cannot be read: write for instance 'nrmse <= 5 "
+                "%' or 'p_mc.max_error <= 2 bar'"
             )
         limit = f"{compare} {bound}"
         limits[name] = f"{limits[name]} and {limit}" if name in limits else limit

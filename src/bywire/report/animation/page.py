@@ -10,7 +10,7 @@ from string import Template
 import numpy as np
 
 from bywire.report.animation.scene import Frames, Scene
-from bywire.report.policy import admitted
+from bywire.report.inline_script import admitted
 
 _DIGITS = 4
 _KEYS = ("x", "y", "turn", "stretch")

@@ -1,4 +1,4 @@
-"""The page's text: a file with kernel, scripts and styles inside, and a policy that admits no more.
+"""The page's text: kernel, scripts and styles inside, and a policy that admits no more.
 
 Whatever a browser runs or styles stands in the page with its digest in the policy; what is data
 stands as JSON in which no tag can begin.
@@ -11,7 +11,9 @@ import hashlib
 import json
 import math
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache
 from html import escape
 from importlib.resources import files
@@ -20,34 +22,158 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bywire.analysis.loop import LOOPS
 from bywire.bench.bench import Bench
-from bywire.bench.bench_text import bench_text
+from bywire.bench.bench_file import bench_text
+from bywire.bench.experiment import Case
 from bywire.bench.kpis.cases import FamilyJudge
 from bywire.bench.kpis.registry import FAMILIES
 from bywire.bench.result import Result
 from bywire.bench.stated import StatedLevel, StatedRange, stated_figures, stated_for
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.errors import InputError
+from bywire.core.errors import BywireError, InputError
 from bywire.core.quantities import display_unit
+from bywire.core.typing import Array
 from bywire.core.units import convert, parse
 from bywire.core.version import __version__
 from bywire.export.exported import Exported
+from bywire.export.loop_source import LoopSource, loop_source
 from bywire.export.wasm.module import module_files
-from bywire.report.changes import bench_changes
-from bywire.report.inline_script import bare
-from bywire.report.live_page.dependence import dependence
-from bywire.report.live_page.loops import loops_of, told
+from bywire.report.inline_script import admitted, bare
 from bywire.report.live_page.sliders import first_sliders
 from bywire.report.panels import Panel, Trace
-from bywire.report.parameter_rows import parameter_rows
-from bywire.report.policy import admitted
 from bywire.report.stated_levels import stated_figure
+from bywire.report.subject import bench_changes, parameter_rows
 from bywire.report.terminal import change_texts
-from bywire.report.wording import unit_text
+from bywire.report.wording import amount, unit_text
 from bywire.simulation.c_runtime import SCALAR
 
 if TYPE_CHECKING:
     import xarray as xr
+
+_SHARE = 1e-3  # of a value, by which it is moved to see what follows it
+_TIMES = 101  # at which stimuli are compared
+_SAME = 1e-12  # by which states may differ, of each
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """What follows which parameter.
+
+    Parameters
+    ----------
+    driving
+        Parameters that change what drives the run, how long it takes, when rows are recorded, or
+        in a way that the page does not know the state in which it begins; those that the
+        experiment sets itself; and nodes of tables, which only together make a table.
+    judging
+        Parameters that change options by which key figures look at it.
+    """
+
+    driving: frozenset[str]
+    judging: frozenset[str]
+
+
+def dependence(bench: Bench, number: int, names: Collection[str]) -> Dependence:
+    """Return what follows the parameters of a bench in one of its runs.
+
+    Each is moved by a thousandth, up or else down; one that admits neither counts as driving.
+    """
+    case, values = _case(bench, number), bench.par.leaves()
+    driving, judging = set(), set()
+    for name in names:
+        if name not in values:  # a node, as exports call it: p_table[1]
+            driving.add(name)
+            continue
+        moved, other = _moved(bench, number, name, values[name])
+        is_taken = other is not None and other.par.value(name) == moved.par.value(name)
+        if other is None or not (is_taken and _is_driven_alike(bench, case, other)):
+            driving.add(name)
+        if moved.chosen_options != bench.chosen_options:
+            judging.add(name)
+    return Dependence(frozenset(driving), frozenset(judging))
+
+
+def _is_driven_alike(bench: Bench, case: Case, other: Case) -> bool:
+    """Return whether a page's run with other parameters is driven, and begins, as the bench's."""
+    plans = [(c.duration, c.settle, c.keep, c.record) for c in (case, other)]
+    is_driven = plans[0] == plans[1] and np.array_equal(_rows(case), _rows(other))
+    return is_driven and _begins_alike(bench, case, other)
+
+
+def _case(bench: Bench, number: int) -> Case:
+    """Return a run as it is driven; where that takes other runs before, as its preview says."""
+    made = bench.cases_with(bench.par, bench.chosen_options, bench.definition.preview)[number]
+    return made.aligned(bench.step, bench.record)
+
+
+def _begins_alike(bench: Bench, case: Case, other: Case) -> bool:
+    """Return whether a run with other parameters begins where the page's does with them."""
+    if bench.definition.preview is not None:
+        return True  # where it really begins, other runs say; the page says that it keeps to ours
+    begun = (case.state, case.memory) if case.start is None else case.start(other.par)
+    pairs = zip(begun, (other.state, other.memory), strict=True)
+    return all(np.allclose(a, b, rtol=_SAME, atol=0.0, equal_nan=True) for a, b in pairs)
+
+
+def _moved(bench: Bench, number: int, name: str, value: float) -> tuple[Bench, Case | None]:
+    """Return the bench with a parameter moved, and its run; None where neither way is admitted."""
+    step = _SHARE * (abs(value) or 1.0)
+    for other in (value + step, value - step):
+        with suppress(BywireError):
+            moved = bench.with_overrides({name: other})
+            return moved, _case(moved, number)
+    return bench, None
+
+
+def _rows(case: Case) -> Array:
+    """Return the stimulus over the run, what is left out as zero."""
+    times = np.linspace(-case.settle, case.duration, _TIMES)
+    given = case.stimulus(times)
+    names: Sequence[str] = case.model.Stimulus._fields
+    return np.array([given.get(name, np.zeros(_TIMES)) for name in names], dtype=float)
+
+
+# --- Loops shown beside the run: those that the bench's experiment is the proof of
+
+
+def loops_of(made: Exported) -> list[LoopSource]:
+    """Return the loops of a bench in C; those whose point cannot follow parameters are left out."""
+    par = made.run.par
+    shown = [
+        loop
+        for loop in LOOPS.all().values()
+        if loop.proof == made.bench.experiment and made.bench.definition.assembly == loop.assembly
+    ]
+    sources = [loop_source(loop, par) for loop in shown]
+    return [source for source in sources if source is not None]
+
+
+def told(source: LoopSource) -> dict[str, Any]:
+    """Return what the page must know of a loop."""
+    loop = source.loop
+    is_state = loop.cut in source.states
+    names = source.states if is_state else source.memory
+    point = f"{loop.at.name} {amount(loop.at.default, loop.at.unit)}"
+    return {
+        "name": loop.name,
+        "summary": loop.summary,
+        "point": point,
+        "cutName": loop.cut,
+        "entry": source.entry,
+        "size": source.size,
+        "contacts": source.contacts,
+        "states": len(source.states),
+        "held": len(source.memory),
+        "every": list(source.every),
+        "frame": source.frame,
+        "from": loop.band[0],
+        "isAnalog": loop.analog,
+        "cut": {"isState": is_state, "at": names.index(loop.cut)},
+    }
+
+
+# --- The page
 
 _SCRIPTS = ("values.js", "controls.js", "curves.js", "bode.js", "bench.js")
 _WORKER = ("unpack.js", "figures.js", "loops.js", "margins.js", "worker.js")

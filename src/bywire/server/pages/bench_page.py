@@ -8,7 +8,7 @@ from bywire.server.contents import Contents
 from bywire.server.pages.entries import text
 from bywire.server.pages.frame import form, frame, link, section
 from bywire.server.shown_bench import ShownBench
-from bywire.server.task_registry import tasks
+from bywire.server.task import tasks
 
 
 def bench_page(bench: ShownBench, there: Contents, largest: int) -> str:

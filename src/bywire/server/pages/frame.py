@@ -119,5 +119,5 @@ def form(
     # The script makes the button work: pressed before it is there, it would send to nowhere.
     return (
         f'<form class="task" data-task="{text(task.name)}">\n{hidden}{first}\n{folded}'
-        f'<button type="submit" disabled>{text(task.action)}</button>\n</form>'
+        f'<button type="submit" disabled>{text(task.form.action)}</button>\n</form>'
     )

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from bywire.server.contents import Contents
 from bywire.server.pages.entries import text
 from bywire.server.pages.frame import frame, link, section, table
-from bywire.server.task_registry import tasks
+from bywire.server.task import tasks
 
 _SHOWN = 200  # reports, and measurements
 
@@ -38,9 +38,9 @@ def index_page(folder: str, there: Contents, experiments: Mapping[str, str], lar
         [link("/task/life", name, life=name), text(what)] for name, what in there.lives.items()
     ]
     tools = [
-        [link(f"/task/{each.name}", each.title), text(each.summary)]
+        [link(f"/task/{each.name}", each.form.title), text(each.case.summary)]
         for each in tasks().values()
-        if each.summary
+        if each.form.is_listed
     ]
     body = [
         section("Benches", "benches", _listed(["file", "experiment"], benches, "bench files")),

@@ -7,7 +7,7 @@ from urllib.parse import quote
 from bywire.server.contents import Contents
 from bywire.server.pages.entries import text
 from bywire.server.pages.frame import form, frame, link, section
-from bywire.server.task_registry import tasks
+from bywire.server.task import tasks
 
 
 def study_page(

@@ -16,5 +16,8 @@ def task_page(task: Task, there: Contents, chosen: Mapping[str, str], largest: i
     """
     inner = form(task, there, {}, open_fields=4, chosen=chosen)
     return frame(
-        task.title, task.summary, [section("What is asked", task.name, inner)], largest=largest
+        task.form.title,
+        task.case.summary,
+        [section("What is asked", task.name, inner)],
+        largest=largest,
     )

@@ -23,8 +23,8 @@ from bywire.brakes.motorcycle.methods.braking_dynamics import METHOD, pair_shows
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.identification.estimate import Estimate
+from bywire.identification.measured import joined, split
 from bywire.identification.method import Effort, Identified
-from bywire.identification.records import joined, split
 
 Array = NDArray[np.float64]
 

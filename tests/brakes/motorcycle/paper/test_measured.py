@@ -35,7 +35,7 @@ from bywire.brakes.motorcycle.paper.runs import parameters
 from bywire.brakes.motorcycle.sets.dardanelli2010_measured import ESTIMATED, NOT_TOLD
 from bywire.brakes.motorcycle.trim import travel_at
 from bywire.core.errors import ParameterError, SolverError
-from bywire.identification.loss import rho
+from bywire.identification.least_squares import rho
 from bywire.reproduction.reproduction import Reproduction
 
 # At the lowest minimum two overshoots are met, and what they cost is not: T1 above 10 bar, k_brk_p

@@ -12,8 +12,8 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.identification.fitting.question import find_method
+from bywire.identification.measured import joined, split
 from bywire.identification.method import Effort, Identified, Method
-from bywire.identification.records import joined, split
 from bywire.identification.trust import trust
 
 Change = Callable[[xr.Dataset], xr.Dataset]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bywire.analysis.loop import Point
-from bywire.analysis.periodic.averaged_map import PeriodicModel, periodic_model, require_moving
+from bywire.analysis.periodic import PeriodicModel, periodic_model, require_moving
 from bywire.brakes.motorcycle.ecu import Stimulus
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
@@ -57,7 +57,7 @@ def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPla
     p
         Mean pressure [Pa], > 0.
     step
-        Substep [s]; see `averaged_map.STEPS`.
+        Substep [s]; see `periodic.STEPS`.
 
     Raises
     ------

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.reduction.error import ReductionError, reduction_error
+from bywire.analysis.reduction import ReductionError, reduction_error
 from bywire.brakes.motorcycle.linear.rational import Rational, first_orders
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.errors import ParameterError

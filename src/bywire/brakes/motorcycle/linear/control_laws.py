@@ -11,8 +11,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.sampled_loops import closed_loop
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import EcuParameters, MotorcycleParameters
 from bywire.brakes.motorcycle.trim import memory_at, state_at

@@ -31,10 +31,9 @@ from bywire.core.quantities import Current, Frequency, Pressure, Unit
 from bywire.core.typing import Array
 from bywire.data.labeled import labeled, over
 from bywire.identification.estimate import Estimate
+from bywire.identification.measured import joined, split
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
-from bywire.identification.records import joined, split
 from bywire.simulation.run import Run, simulate
-
 
 # Curves of the braking dynamics: magnitude, phase and step, measured, modeled, theoretical.
 

@@ -25,9 +25,9 @@ from bywire.identification.electrics.loop_records import (
 )
 from bywire.identification.electrics.winding import winding_trial
 from bywire.identification.least_squares import estimate
+from bywire.identification.measured import split
 from bywire.identification.method import Effort, Identified, Method
 from bywire.identification.output_error import output_error
-from bywire.identification.records import split
 from bywire.identification.unknown import parameters_of
 from bywire.simulation.run import simulate
 

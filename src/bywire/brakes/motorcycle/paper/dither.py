@@ -7,7 +7,7 @@ import numpy as np
 from bywire.analysis.response.harmonics import total_distortion
 from bywire.brakes.motorcycle.paper.fig5 import WITH, Loops
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, Runs, parameters
-from bywire.report.hysteresis_loop import hysteresis_loop
+from bywire.report.friction_figures import hysteresis_loop
 from bywire.reproduction.item import Item, found
 from bywire.reproduction.reproduction import Exhibit, Part
 

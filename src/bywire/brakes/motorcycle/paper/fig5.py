@@ -17,7 +17,7 @@ from bywire.bench.result import Result
 from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, FACTS
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, parameters
 from bywire.brakes.motorcycle.staircase import jumps
-from bywire.report.hysteresis_loop import hysteresis_loop
+from bywire.report.friction_figures import hysteresis_loop
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import kpis, peak, selected

@@ -16,8 +16,7 @@ from bywire.brakes.motorcycle.paper.identified import identified_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, before, parameters
 from bywire.brakes.motorcycle.paper.table4 import step_peak
 from bywire.core.typing import Array
-from bywire.report.line_role import Role
-from bywire.report.panels import Panel, Trace
+from bywire.report.panels import Panel, Role, Trace
 from bywire.report.time_traces import time_traces
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part

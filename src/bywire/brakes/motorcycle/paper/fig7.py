@@ -8,16 +8,14 @@ import numpy as np
 import xarray as xr
 
 from bywire.analysis.crossings import bandwidth, fall
-from bywire.analysis.response.dataset import complex_values
+from bywire.analysis.response.sweep import complex_values
 from bywire.bench.result import Result
 from bywire.brakes.motorcycle.linear.pressure_loop import BAND, PressureLoop, cancelling_pi
 from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, FACTS, REGIONS, table4_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, parameters
 from bywire.brakes.motorcycle.paper.sines import of_set_point
 from bywire.report.bode import Response, bode
-from bywire.report.step_marks import StepFacts, StepLimits
-from bywire.report.step_response import step_response
-from bywire.report.tracking import tracking
+from bywire.report.step_response import StepFacts, StepLimits, step_response, tracking
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import kpis

@@ -8,8 +8,8 @@ import numpy as np
 
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.margins import margins
-from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep
 from bywire.bench.bench import Bench
 from bywire.brakes.motorcycle.paper.facts import FACTS
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, Runs, parameters

@@ -8,8 +8,8 @@ from functools import cache
 import xarray as xr
 
 from bywire.analysis.loop import LOOPS, Point
-from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep
 from bywire.brakes.motorcycle.ecu import Stimulus
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.paper.runs import parameters

@@ -6,7 +6,7 @@ from bywire.brakes.motorcycle.paper.facts import FACTS
 from bywire.brakes.motorcycle.paper.runs import SETS, Runs, parameters
 from bywire.brakes.motorcycle.trim import travel_at
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.report.parameter_rows import parameter_rows
+from bywire.report.subject import parameter_rows
 from bywire.report.tables import parameter_table
 from bywire.reproduction.item import Item, compared
 from bywire.reproduction.reproduction import Part

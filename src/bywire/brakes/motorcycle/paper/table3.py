@@ -12,8 +12,8 @@ from bywire.brakes.motorcycle.paper.runs import MAIN, Runs, parameters
 from bywire.control import dither
 from bywire.identification.method import Effort, Identified
 from bywire.plant import ball_screw_gear, seal_friction
-from bywire.report.method_curve import method_curve
-from bywire.report.stribeck_curve import stribeck_curve
+from bywire.report.estimate_figures import method_curve
+from bywire.report.friction_figures import stribeck_curve
 from bywire.reproduction.item import Fact, Item, compared
 from bywire.reproduction.reproduction import Exhibit, Part
 

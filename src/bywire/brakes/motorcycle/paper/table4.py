@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.analysis.crossings import fall
-from bywire.analysis.response.dataset import complex_values
+from bywire.analysis.response.sweep import complex_values
 from bywire.brakes.motorcycle.linear.brake import theoretical
 from bywire.brakes.motorcycle.linear.rational import Rational
 from bywire.brakes.motorcycle.paper import identified as dardanelli2010_identified

@@ -14,7 +14,7 @@ from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.bench_figures import FigureKind, Shown
-from bywire.report.line_role import Role
+from bywire.report.panels import Role
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from bywire.analysis.response.saturation import Saturation
+from bywire.analysis.loop import Saturation
 
 Causes = Mapping[str, Mapping[str, Any]]
 

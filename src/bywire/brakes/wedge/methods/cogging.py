@@ -25,13 +25,13 @@ from bywire.core.typing import Array
 from bywire.data.labeled import over
 from bywire.identification.confidence import uncertainty
 from bywire.identification.differentiation import differentiated, low_passed
+from bywire.identification.equation import windows
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.output_error import even_interval
 from bywire.identification.sensed import Sensor, sensed
-from bywire.identification.steady_motion import windows
 from bywire.identification.unknown import Unknown
 from bywire.plant import axial_bearing, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed

@@ -26,19 +26,19 @@ from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.data.labeled import at_own_places, over
 from bywire.identification.differentiation import differentiated
-from bywire.identification.equation import Equation
-from bywire.identification.estimate import Estimate
-from bywire.identification.least_squares import Problem
-from bywire.identification.method import Check, Curve, Effort, Identified, Method
-from bywire.identification.records import joined, split
-from bywire.identification.residuals import lack_of_fit
-from bywire.identification.sensed import Sensor, sensed
-from bywire.identification.steady_motion import (
+from bywire.identification.equation import (
+    Equation,
     Motions,
     motions,
     steady_dynamics,
     window_residuals,
 )
+from bywire.identification.estimate import Estimate
+from bywire.identification.least_squares import Problem
+from bywire.identification.measured import joined, split
+from bywire.identification.method import Check, Curve, Effort, Identified, Method
+from bywire.identification.residuals import lack_of_fit
+from bywire.identification.sensed import Sensor, sensed
 from bywire.identification.unknown import Unknown, parameters_of
 from bywire.plant import servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
@@ -61,7 +61,7 @@ class Reading:
         Low-pass before the angle is differentiated [Hz].
     slowest, margin, length
         Of the motion [rad/s], and times [s]; see
-        :func:`bywire.identification.steady_motion.windows`.
+        :func:`bywire.identification.equation.windows`.
     """
 
     cutoff: float

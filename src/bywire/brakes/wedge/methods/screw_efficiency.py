@@ -27,22 +27,21 @@ from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.data.labeled import at_own_places, over
 from bywire.identification.differentiation import differentiated
-from bywire.identification.equation import Equation
-from bywire.identification.estimate import Estimate
-from bywire.identification.measured import wrong_sign
-from bywire.identification.method import Check, Curve, Effort, Identified, Method
-from bywire.identification.residuals import lack_of_fit
-from bywire.identification.sensed import sensed
-from bywire.identification.steady_motion import (
+from bywire.identification.equation import (
+    Equation,
     Motions,
     motions,
     steady_dynamics,
     window_residuals,
 )
+from bywire.identification.estimate import Estimate
+from bywire.identification.measured import wrong_sign
+from bywire.identification.method import Check, Curve, Effort, Identified, Method
+from bywire.identification.residuals import lack_of_fit
+from bywire.identification.sensed import sensed
 from bywire.identification.unknown import parameters_of
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
-
 
 # Strokes of a screw that drives and is driven back: what is read of each, and left over.
 

@@ -37,13 +37,13 @@ from bywire.brakes.wedge.rigs.rig_case import slope_of
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.data.labeled import over
+from bywire.identification.equation import steady_dynamics
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem
+from bywire.identification.measured import joined, split
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
-from bywire.identification.records import joined, split
 from bywire.identification.residuals import lack_of_fit
 from bywire.identification.sensed import Sensor, sensed
-from bywire.identification.steady_motion import steady_dynamics
 from bywire.identification.unknown import Unknown, parameters_of
 from bywire.plant import shaft_encoder
 

@@ -10,8 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.sweep import Sweep
 from bywire.brakes.wedge.paper.runs import parameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array

@@ -354,7 +354,7 @@ STUDY = Study(
     defaults=DEFAULTS,
     compute=compute,
     ruled={
-        "wedge.mu_B": "the study takes several; set its option mu_B, e.g. --set mu_B=0.3,0.5",
+        "wedge.mu_B": "the study takes several; set its option mu_B, e.g. mu_B=0.3,0.5",
         "control.moment.omega_gap": "set the study's option omega_gap",
         "command.mode": "the study demands moments",
         "rig": "it belongs to the rigs",

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from bywire.core.typing import Array
-from bywire.identification.confidence import uncertainty
+from bywire.identification.confidence import notes_of, uncertainty
 from bywire.identification.estimate import Estimate, Kept
-from bywire.identification.identifiability import notes_of
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.unknown import Unknown, moved
 

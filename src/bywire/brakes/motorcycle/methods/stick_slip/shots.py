@@ -10,6 +10,7 @@ import numpy as np
 from bywire.brakes.motorcycle.methods.stick_slip.slips import Slip, moving_mean
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import state_at
+from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 
@@ -126,7 +127,8 @@ def cut_out(
         raise ParameterError(
             f"none of the {len(slips)} slips has {_LEAST} samples, a rest before it, and a current "
             "that ramps toward it: they are noise, or the signal's unit is wrong; check the unit, "
-            "and raise what counts as a slip (--option least=...)"
+            "and raise what counts as a slip "
+            f"({option('options', {'least': '...'})})"
         )
     return shots
 

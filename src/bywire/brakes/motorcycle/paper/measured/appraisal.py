@@ -20,9 +20,7 @@ from bywire.brakes.motorcycle.paper.measured.unknowns import unknowns
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
-from bywire.identification.least_squares import estimate
-from bywire.identification.loss import influence
-from bywire.identification.problem import Problem
+from bywire.identification.least_squares import Problem, estimate, influence
 from bywire.identification.unknown import moved
 
 Par = MotorcycleParameters

@@ -13,9 +13,8 @@ from bywire.brakes.motorcycle.paper.measured.unknowns import brake, unknowns
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.errors import ParameterError, SolverError
 from bywire.core.typing import Array
-from bywire.identification.leftover import Part
-from bywire.identification.loss import Loss, rho
-from bywire.identification.problem import Problem
+from bywire.identification.estimate import Part
+from bywire.identification.least_squares import Loss, Problem, rho
 from bywire.identification.unknown import Unknown
 
 Par = MotorcycleParameters

@@ -17,9 +17,9 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.identification.differentiation import low_passed
+from bywire.identification.equation import windows
 from bywire.identification.measured import wrong_sign
 from bywire.identification.output_error import even_interval
-from bywire.identification.steady_motion import windows
 from bywire.identification.unknown import Unknown
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 
@@ -92,7 +92,7 @@ class Reading:
         Low-pass of the speed [Hz].
     slowest, margin, length
         Of the closing speed [rad/s], and times [s]; see
-        :func:`bywire.identification.steady_motion.windows`.
+        :func:`bywire.identification.equation.windows`.
     speed
         Of one motor, that the current is stated at [rad/s]; the record's mean by default.
     """

@@ -1,0 +1,421 @@
+"""Periodic operating points, such as of a dithered brake, and exact linear models about them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.loop import Loop, Point
+from bywire.core.errors import ParameterError, SolverError
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import signals_of
+from bywire.core.typing import Array, Complex
+from bywire.simulation.run import Run
+from bywire.simulation.stroboscope import Derivatives, Stroboscope
+
+TOLERANCE = 1e-5
+"""distance from the orbit that counts as none, over the usual magnitude of each signal; steps of
+time leave motions with stick and slip a play of their own"""
+DRIFT = 1e-5
+"""drift per period along directions without restoring action, in the same measure"""
+_SETTLE, _ROUNDS, _NEWTON = 50, 12, 8  # periods simulated between trials of Newton's iteration
+_NEUTRAL = 1e-7  # of the largest singular value: directions along which orbits lie side by side
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicOrbit:
+    """A motion that repeats itself.
+
+    Parameters
+    ----------
+    stroboscope
+        The map from period to period.
+    start
+        What the engine carries at the beginning of a period, shape (n,).
+    rows
+        Recorded signals over the period, its end left out, shape (rows, signals).
+    distance
+        Estimated distance of ``start`` from the orbit, over the usual magnitude of each signal:
+        Newton's next step.
+    drift
+        Change over a period that no step undoes, in the same measure: directions along which
+        nothing is restored, such as the amount of fluid enclosed.
+    stuck
+        Share of the time in which every dry friction sticks; 0 where there is none.
+    periods
+        Periods that were simulated to find it.
+    """
+
+    stroboscope: Stroboscope
+    start: Array
+    rows: Array
+    distance: float
+    drift: float
+    stuck: float
+    periods: int
+
+
+def period_of(frequencies: Sequence[float], intervals: Sequence[float], step: float) -> float:
+    """Return the shortest time [s] that holds whole sample times and whole periods.
+
+    Parameters
+    ----------
+    frequencies
+        Of what is periodic [Hz]; may be none.
+    intervals
+        Sample times [s].
+    step
+        Substep [s].
+
+    Raises
+    ------
+    ParameterError
+        When a frequency's period is no whole number of substeps.
+    """
+    wanted = [*intervals, *(1.0 / f for f in frequencies)]
+    counts = [round(interval / step) for interval in wanted]
+    for f in frequencies:
+        count = 1.0 / (f * step)
+        if abs(count - round(count)) > 1e-6 * count:
+            raise ParameterError(
+                f"a period of 1/({f:g} Hz) = {1e3 / f:.6g} ms is no whole number of substeps of "
+                f"{step * 1e6:g} us, and never repeats with them: take a frequency that divides "
+                "the sample rate"
+            )
+    return math.lcm(*counts) * step
+
+
+def find_orbit(stroboscope: Stroboscope, run: Run) -> PeriodicOrbit:
+    r"""Return the orbit that the system settles to.
+
+    Period after period is simulated. In between Newton's iteration with the exact derivative A of
+    the map P tries
+
+    .. math:: (I - A) \Delta z = P(z) - z
+
+    and is kept where it brings the motion closer to a repetition: a slow loop needs minutes to
+    settle to what that finds in a few periods. Directions without restoring action (the amount
+    of fluid enclosed, for instance) stay where the simulation brought them.
+
+    Parameters
+    ----------
+    stroboscope
+        The map.
+    run
+        What the map was made of: its signals' usual magnitudes scale all changes.
+
+    Raises
+    ------
+    SolverError
+        When no motion repeats itself: it hunts, drifts, or sticks and slips out of step.
+    """
+    scale = magnitudes(run)
+    z, periods = stroboscope.start, 0
+    for _ in range(_ROUNDS):
+        for _ in range(_SETTLE):
+            z = stroboscope.advance(z).end
+        candidate = _polished(stroboscope, z, scale)
+        periods += _SETTLE + candidate.periods
+        z = candidate.start
+        if candidate.distance <= TOLERANCE and candidate.drift <= DRIFT:
+            rows = stroboscope.advance(z).rows
+            v = stroboscope.velocities(z)
+            stuck = float(np.mean((v == 0.0).all(axis=1))) if v.size else 0.0
+            return PeriodicOrbit(
+                stroboscope, z, rows, candidate.distance, candidate.drift, stuck, periods
+            )
+    apart = np.abs((stroboscope.advance(z).end - z) / scale)
+    raise SolverError(
+        f"{run.model.name}: no motion repeats itself with the period {run.duration * 1e3:g} ms: "
+        f"after {periods} periods {stroboscope.names[int(np.argmax(apart))]} still changes by "
+        f"{apart.max():.2g} of its usual magnitude per period; it hunts or drifts, as a loop does "
+        "whose dither is too weak to keep it moving: raise the dither's gain, or move the "
+        "operating point"
+    )
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """A candidate: its distance from the orbit, its drift over a period, periods that it took."""
+
+    start: Array
+    distance: float
+    drift: float
+    periods: int
+
+
+def _polished(stroboscope: Stroboscope, z: Array, scale: Array) -> _Tried:
+    """Return where Newton's iteration ends, as far as it comes closer to a repetition."""
+    distance, drift, step = _judged(stroboscope, z, scale)
+    for taken in range(_NEWTON):
+        if distance <= 1e-2 * TOLERANCE:
+            return _Tried(z, distance, drift, taken)
+        moved = _judged(stroboscope, z + step, scale)
+        if not moved[0] < 0.5 * distance:  # no number fails, too
+            return _Tried(z, distance, drift, taken + 1)
+        z = z + step
+        distance, drift, step = moved
+    return _Tried(z, distance, drift, _NEWTON)
+
+
+def _judged(stroboscope: Stroboscope, z: Array, scale: Array) -> tuple[float, float, Array]:
+    """Return the distance from the orbit, the drift that no step undoes, and Newton's step."""
+    residual = stroboscope.advance(z).end - z
+    A = stroboscope.derivatives(z).A
+    step = restored(A, residual, scale)
+    drift = residual - (step - A @ step)
+    return float(np.max(np.abs(step / scale))), float(np.max(np.abs(drift / scale))), step
+
+
+def restored(A: Array, residual: Array, scale: Array) -> Array:
+    """Return the smallest x for which (I - A) x is the residual, carried values left alone.
+
+    Parameters
+    ----------
+    A
+        Derivative of a map over one period, shape (n, n).
+    residual
+        Shape (n,).
+    scale
+        Usual magnitudes, shape (n,).
+    """
+    n = len(A)
+    eye = np.eye(n)
+    moving = np.flatnonzero((eye != A).any(axis=1))  # the others keep their value for ever
+    gap = (eye - A)[np.ix_(moving, moving)] * scale[moving] / scale[moving, None]
+    step = np.zeros(n)
+    scaled = np.linalg.lstsq(gap, residual[moving] / scale[moving], rcond=_NEUTRAL)[0]
+    step[moving] = scaled * scale[moving]
+    return step
+
+
+def magnitudes(run: Run) -> Array:
+    """Return the usual magnitudes of states, their increments, and memory, shape (n,)."""
+    states = [signal.nominal for signal in signals_of(run.model.State).values()]
+    held = [signal.nominal for signal in signals_of(run.model.Memory).values()]
+    return np.array([*states, *states, *held])
+
+
+# --- Linear models: friction and dither left on
+
+STEPS = (10e-6, 5e-6, 2.5e-6)
+"""substeps [s], the next one where a motion does not repeat itself with the one before: the longer
+they are, the more they disturb a piston that rests and breaks away by a hair; at the first one
+the gain of the dithered pressure loop is within 2 % of what short steps give"""
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicModel:
+    r"""Deviations from a periodic orbit, over one period and tick by tick within it.
+
+    .. math:: z_{k+1} = A z_k + \sum_j B_j u_{k,j}, \quad
+        y_{k,r} = C_r z_k + \sum_j D_{r,j} u_{k,j}
+
+    with the state z at the beginning of period k, the input u at its ticks j, and the output y
+    at its instants r: the lifted form of a periodic system. The derivatives are those of what is
+    simulated, every decision between stick and slip included; they hold for deviations that
+    change none of the decisions but their instants.
+
+    Parameters
+    ----------
+    run
+        One period of the system: its duration.
+    inputs, output
+        Signals.
+    orbit
+        The operating point.
+    derivatives
+        A, B, C, D over the period.
+    """
+
+    run: Run
+    inputs: tuple[str, ...]
+    output: str
+    orbit: PeriodicOrbit
+    derivatives: Derivatives
+
+    @property
+    def mean(self) -> float:
+        """Mean of the output over a period, SI."""
+        return float(self.orbit.rows[:, 0].mean())
+
+    @property
+    def ripple(self) -> float:
+        """Output from peak to peak over a period, SI."""
+        return float(np.ptp(self.orbit.rows[:, 0]))
+
+    @cached_property
+    def averaged(self) -> LinearModel:
+        """The model from an input held over a period to the output's mean over that period."""
+        d = self.derivatives
+        return self._model("averaged", d.C[:, 0].mean(axis=0), d.D[:, 0].sum(axis=1).mean())
+
+    @cached_property
+    def sampled(self) -> LinearModel:
+        """The model from an input held over a period to the output at the period's beginning."""
+        d = self.derivatives
+        return self._model("sampled", d.C[0, 0], d.D[0, 0].sum())
+
+    def _model(self, kind: str, C: Array, D: float) -> LinearModel:
+        model = self.run.model
+        states, held = signals_of(model.State), signals_of(model.Memory)
+        units = [signal.unit for signal in states.values()]
+        return LinearModel(
+            f"{model.name}, {kind} over {self.run.duration * 1e3:g} ms",
+            self.derivatives.A,
+            self.derivatives.B.sum(axis=1, keepdims=True),
+            C[None, :],
+            np.array([[D]]),
+            (*states, *(f"d({name})" for name in states), *(f"{name}[k]" for name in held)),
+            self.inputs[:1],
+            (self.output,),
+            (*units, *units, *(signal.unit for signal in held.values())),
+            (signals_of(model.Stimulus)[self.inputs[0]].unit,),
+            (signals_of(model.Output)[self.output].unit,),
+            np.zeros(len(self.derivatives.A)),
+            self.run.duration,
+        )
+
+    @property
+    def steady_gain(self) -> float:
+        """Change of the output's mean over that of a constant input, SI."""
+        d = self.derivatives
+        moved = restored(d.A, d.B.sum(axis=1), magnitudes(self.run))
+        return float(d.C[:, 0].mean(axis=0) @ moved + d.D[:, 0].sum(axis=1).mean())
+
+    def response(self, frequencies: Array) -> Complex:
+        r"""Return the answer at the frequency of a sine in the input, ticks and all.
+
+        A periodic system answers at f + k/T as well; what is returned is the line at f,
+
+        .. math:: Y = \frac{1}{n_r} \sum_r (C_r Z + D_r U) e^{-j \omega t_r}, \quad
+            (e^{j \omega T} I - A) Z = B U, \quad U_j = e^{j \omega t_j}
+
+        which is what `frequency_response` measures at small amplitude.
+
+        Parameters
+        ----------
+        frequencies
+            Frequencies [Hz], not 0, shape (m,); below the Nyquist frequency of the ticks.
+
+        Returns
+        -------
+        numpy.ndarray
+            Output over input, SI, shape (m,).
+        """
+        d, T = self.derivatives, self.run.duration
+        rows, ticks = d.D.shape[0], d.D.shape[2]
+        lines = []
+        for f in np.asarray(frequencies, dtype=float):
+            # A zero-order hold at the ticks, not the sine itself: that is what a controller reads.
+            U = np.exp(2j * np.pi * f * T / ticks * np.arange(ticks))
+            Z = np.linalg.solve(np.exp(2j * np.pi * f * T) * np.eye(len(d.A)) - d.A, d.B @ U)
+            wave = np.exp(-2j * np.pi * f * T / rows * np.arange(rows))
+            lines.append(wave @ (d.C[:, 0] @ Z + d.D[:, 0] @ U) / rows)
+        return np.array(lines, dtype=np.complex128)
+
+
+def periodic_model(
+    point: Point,
+    inputs: Sequence[str],
+    output: str,
+    whole: Sequence[float],
+    step: float | None = None,
+) -> PeriodicModel:
+    """Return the linear model about the orbit that a system settles to.
+
+    Parameters
+    ----------
+    point
+        Where it starts; stays within what the orbit attracts.
+    inputs
+        Signals of the stimulus that move together.
+    output
+        Signal that answers; its mean is taken over samples at the fastest controller's ticks.
+    whole
+        Frequencies [Hz] of what is periodic, such as a dither. None: the orbit is a rest, the
+        period the common sample time.
+    step
+        Substep [s]; one of `STEPS` unless given.
+
+    Raises
+    ------
+    SolverError
+        When no motion repeats itself.
+    ParameterError
+        When a period is no whole number of substeps, or a controller rounds what it samples.
+    CompilerError
+        When there is no compiler.
+    """
+    *trials, last = STEPS if step is None else (step,)
+    for substep in trials:
+        with suppress(SolverError):
+            return _about(point, inputs, output, whole, substep)
+    return _about(point, inputs, output, whole, last)
+
+
+def _about(
+    point: Point, inputs: Sequence[str], output: str, whole: Sequence[float], step: float
+) -> PeriodicModel:
+    intervals = [task.period for task in point.model.tasks(point.par)]
+    duration = period_of(whole, intervals, step)
+    run = replace(point.run(step), duration=duration, record=min(intervals))
+    stroboscope = Stroboscope(run, inputs, (output,))
+    orbit = find_orbit(stroboscope, run)
+    derivatives = stroboscope.derivatives(orbit.start)
+    return PeriodicModel(run, tuple(inputs), output, orbit, derivatives)
+
+
+def dithered_loop(
+    loop: Loop, par: ParameterSet, value: float, step: float | None = None
+) -> PeriodicModel:
+    """Return a closed loop's linear model with friction and dither, about its periodic orbit.
+
+    Parameters
+    ----------
+    loop, par, value
+        The loop and its operating point. Converters and encoders count as ideal: what is rounded
+        has no derivative.
+    step
+        As in `periodic_model`.
+
+    Raises
+    ------
+    InputError, SolverError, CompilerError
+        As `periodic_model`, and when the operating point does not exist or all of it sticks.
+    """
+    ideal = unrounded(loop, par)
+    model = periodic_model(
+        loop.point(ideal, value), loop.inputs, loop.output, loop.whole(ideal), step
+    )
+    require_moving(model)
+    return model
+
+
+def require_moving(model: PeriodicModel) -> None:
+    """Refuse a motion that is none: what sticks throughout has no gain.
+
+    Raises
+    ------
+    SolverError
+        When all dry frictions stick during the whole period.
+    """
+    if model.orbit.stuck == 1.0:
+        raise SolverError(
+            f"{model.run.model.name}: it sticks during the whole period, and answers to nothing "
+            "small: raise the dither's gain"
+        )
+
+
+def unrounded(loop: Loop, par: ParameterSet) -> ParameterSet:
+    """Return parameters whose converters and encoders have no resolution."""
+    changes = {
+        name: law for off in loop.causes.values() for name, law in off.items() if law == "ideal"
+    }
+    return par.replace(changes)

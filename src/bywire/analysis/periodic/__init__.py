@@ -1,1 +1,0 @@
-"""Periodic orbits of a shaken brake, and the map averaged over them."""

@@ -1,0 +1,560 @@
+"""Reduced linear models whose error is stated: balanced, modal, or states of one's choice."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from bywire.analysis.linear.linear_model import LinearModel, rates
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.typing import Array
+
+Matrices = tuple[Array, Array, Array]
+Choice = Callable[[complex], bool]
+
+_BORDER = 1e-6  # of a pole's own size: this near to the border of stability it counts as on it
+_STILL = 1e-10  # of the largest pole: an integrator
+_LEAST = 1e-13  # of the largest Hankel singular value: below it there is rounding alone
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """A model in two parts that do not act on each other, and add up.
+
+    Parameters
+    ----------
+    first, second
+        (A, B, C) of each.
+    """
+
+    first: Matrices
+    second: Matrices
+
+
+@dataclass(frozen=True, eq=False)
+class Balanced:
+    """A stable part whose controllability and observability Gramians are equal and diagonal.
+
+    Parameters
+    ----------
+    A, B, C
+        Matrices; states by falling singular value.
+    hankel
+        Hankel singular values of the scaled signals, shape (n,).
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    hankel: Array
+
+
+def split(model: LinearModel, first: Choice) -> Parts:
+    """Return a model in two parts, told apart by their poles.
+
+    Parameters
+    ----------
+    model
+        Continuous or sampled.
+    first
+        ``first(pole) -> bool``: whether a pole belongs to the first part.
+
+    Notes
+    -----
+    An ordered real Schur form A = Q T Q^T puts the first part on top; a Sylvester equation then
+    removes what the second does to it.
+    """
+    from scipy.linalg import matrix_balance, schur, solve_sylvester
+
+    A, (scale, _) = matrix_balance(model.A, permute=False, separate=True)
+    B, C = model.B / scale[:, None], model.C * scale
+    ordered: Any = schur  # its stubs know no function of real and imaginary part
+    T, Q, count = ordered(A, output="real", sort=lambda x, y=0.0: first(complex(x, y)))
+    B, C = Q.T @ B, C @ Q
+    n = len(T)
+    X = np.zeros((count, n - count))  # T_11 X - X T_22 = -T_12: then both parts are apart
+    if 0 < count < n:
+        X = solve_sylvester(T[:count, :count], -T[count:, count:], -T[:count, count:])
+    return Parts(
+        first=(T[:count, :count], B[:count] - X @ B[count:], C[:, :count]),
+        second=(T[count:, count:], B[count:], C[:, :count] @ X + C[:, count:]),
+    )
+
+
+def lasting(model: LinearModel) -> Choice:
+    """Return the test whether a pole is unstable or on the border of stability."""
+    largest = float(np.max(np.abs(model.poles()), initial=0.0))
+
+    def test(pole: complex) -> bool:
+        if model.period:
+            return bool(abs(pole) >= 1.0 - _BORDER)
+        return bool(pole.real >= -max(_BORDER * abs(pole), _STILL * largest))
+
+    return test
+
+
+def balanced(part: Matrices, period: float) -> Balanced:
+    """Return a balanced realization of a stable part, what does not show left out.
+
+    Parameters
+    ----------
+    part
+        (A, B, C), stable.
+    period
+        Sample time [s]; 0 for a continuous one.
+
+    Notes
+    -----
+    Square-root method: only factors of the Gramians are multiplied.
+
+    References
+    ----------
+    M. S. Tombs, I. Postlethwaite, "Truncated balanced realization of a stable non-minimal
+    state-space system", International Journal of Control 46 (1987).
+    """
+    A, B, C = part
+    if not len(A):
+        return Balanced(A, B, C, np.zeros(0))
+    R, S = _factor(A, B, period), _factor(A.T, C.T, period)
+    U, hankel, Vt = np.linalg.svd(S.T @ R)
+    count = int(np.sum(hankel > _LEAST * hankel[0])) if hankel[0] > 0.0 else 0
+    root = np.sqrt(hankel[:count])
+    left, right = U[:, :count].T @ S.T / root[:, None], R @ Vt[:count].T / root
+    return Balanced(left @ A @ right, left @ B, C @ right, hankel[:count])
+
+
+def _factor(A: Array, B: Array, period: float) -> Array:
+    """Return L with L L^T the controllability Gramian."""
+    from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
+
+    Q = B @ B.T
+    X = solve_discrete_lyapunov(A, Q) if period else solve_continuous_lyapunov(A, -Q)
+    values, vectors = np.linalg.eigh(0.5 * (X + X.T))
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+# --- What a reduced model leaves out: its largest error over a band, channel by channel
+
+_POINTS = 300
+_DECADES = 4.0  # below the band's end at which the search begins
+_NOTHING = 1e-12  # of the largest response: a channel below it has no gain to compare
+
+
+@dataclass(frozen=True)
+class ReductionError:
+    r"""Largest differences of two models over a band, in the worst of all channels.
+
+    Parameters
+    ----------
+    low, high
+        The band [Hz].
+    relative
+        Largest :math:`|\hat G - G| / |G|`.
+    gain
+        Largest difference of magnitude [dB].
+    phase
+        Largest difference of phase [degree].
+    at
+        Frequency of the largest relative error [Hz].
+    channel
+        Output and input of the largest relative error.
+    poles
+        Largest distance of a pole within the band from the nearest one of the full model, as a
+        share of its own size; NaN where no pole lies there.
+    """
+
+    low: float
+    high: float
+    relative: float
+    gain: float
+    phase: float
+    at: float
+    channel: tuple[str, str]
+    poles: float
+
+
+def reduction_error(full: LinearModel, reduced: LinearModel, high: float) -> ReductionError:
+    """Return how far a model is off another one, from four decades below a frequency up to it.
+
+    Parameters
+    ----------
+    full, reduced
+        Models of the same inputs, outputs and sample time.
+    high
+        End of the band [Hz].
+
+    Raises
+    ------
+    ParameterError
+        When the signals differ, or the band does not exist.
+
+    Notes
+    -----
+    Besides a logarithmic grid the frequencies of all poles are looked at, where peaks are.
+    Channels without gain are left out.
+    """
+    f = frequencies(full, reduced, high)
+    exact, other = full.response(f), reduced.response(f)
+    size = np.abs(exact)
+    peak = np.max(size, axis=0)
+    # A channel has its own unit: what counts as nothing is told by its inputs and outputs.
+    seen = peak > _NOTHING * np.sqrt(np.outer(np.max(peak, axis=1), np.max(peak, axis=0)))
+    if not seen.any():
+        return ReductionError(
+            float(f[0]), float(f[-1]), 0.0, 0.0, 0.0, float(f[0]), ("", ""), math.nan
+        )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(seen[None], other / exact, 1.0)
+        relative = np.abs(ratio - 1.0)
+        gain = np.abs(20.0 * np.log10(np.abs(ratio)))
+        phase = np.abs(np.degrees(np.angle(ratio)))
+    k, i, j = np.unravel_index(int(np.argmax(relative)), relative.shape)
+    return ReductionError(
+        float(f[0]),
+        float(f[-1]),
+        float(relative[k, i, j]),
+        float(np.max(gain)),
+        float(np.max(phase)),
+        float(f[k]),
+        (full.outputs[i], full.inputs[j]),
+        _pole_error(full, reduced, float(f[0]), high),
+    )
+
+
+def frequencies(full: LinearModel, reduced: LinearModel, high: float) -> Array:
+    """Return the frequencies [Hz] at which two models are compared, ascending."""
+    same = ("inputs", "outputs", "period")
+    if any(getattr(full, name) != getattr(reduced, name) for name in same):
+        raise ParameterError(
+            f"{full.name} and {reduced.name} have other inputs, outputs or sample times: "
+            "only models of the same signals compare"
+        )
+    nyquist = 0.5 / full.period if full.period else math.inf
+    if not 0.0 < high < math.inf:
+        raise ParameterError(f"band = {high:g} Hz is not admissible: it must be > 0 Hz and finite")
+    if high > nyquist:
+        raise ParameterError(
+            f"band = {high:g} Hz is not admissible: it must be <= {nyquist:g} Hz, half the "
+            "sampling frequency"
+        )
+    low = high * 10.0**-_DECADES
+    corners = np.concatenate([natural(full), natural(reduced)])
+    inside = corners[(corners > low) & (corners < high)]
+    return np.unique(np.concatenate([np.geomspace(low, high, _POINTS), inside]))
+
+
+def _pole_error(full: LinearModel, reduced: LinearModel, low: float, high: float) -> float:
+    """Return the largest relative distance of the poles in a band [Hz]."""
+    known, kept = rates(full), rates(reduced)
+    inside = kept[np.abs(kept) <= 2.0 * math.pi * high]
+    if not inside.size or not known.size:
+        return math.nan
+    distance = np.abs(inside[:, None] - known).min(axis=1)
+    return float(np.max(distance / np.maximum(np.abs(inside), 2.0 * math.pi * low)))
+
+
+def natural(model: LinearModel) -> Array:
+    """Return the frequencies of a model's poles [Hz]; 0 for dead beats and integrators."""
+    poles = model.poles()
+    if not model.period:
+        return np.asarray(np.abs(poles) / 2.0 / math.pi)
+    live = poles[np.abs(poles) > np.finfo(float).tiny]
+    return np.asarray(np.abs(np.log(live)) / 2.0 / math.pi / model.period)
+
+
+# --- States of one's choice, the others quasi-static
+
+_NO_REST = 1e14  # condition of the equation for the rest beyond which there is none
+
+
+def residualized(
+    model: LinearModel, keep: Sequence[str], *, corrected: bool = False
+) -> LinearModel:
+    r"""Return a model with some of its states, the others always at their rest (quasi-static).
+
+    .. math:: A_{11} - A_{12} A_{22}^{-1} A_{21}, \quad \text{and so on for } B, C, D
+
+    Exact at rest; good as long as what is left out is faster than what is looked at. Corrected,
+
+    .. math:: x_2 = -A_{22}^{-1} (A_{21} x_1 + B_2 u) - A_{22}^{-2} A_{21} \dot x_1
+
+    what is left out follows the kept states with its first lag; the poles are then one order
+    better in the ratio of both speeds. Its lag behind the inputs stays left out.
+
+    Parameters
+    ----------
+    model
+        Continuous, or sampled (there :math:`I - A_{22}` takes the place of :math:`-A_{22}`).
+    keep
+        Names of the states to keep.
+    corrected
+        Whether the first lag behind the kept states counts; continuous models only.
+
+    Raises
+    ------
+    UnknownNameError
+        When a state is unknown.
+    ParameterError
+        When the others have no rest of their own, as an integrator has none.
+
+    References
+    ----------
+    P. Kokotovic, H. K. Khalil, J. O'Reilly, "Singular Perturbation Methods in Control" (1986):
+    slow manifold, to the zeroth and the first order.
+    """
+    for name in keep:
+        if name not in model.states:
+            raise unknown_name("state", name, model.states)
+    first = [model.states.index(name) for name in keep]
+    second = [k for k in range(len(model.states)) if k not in first]
+    inner = np.eye(len(second)) * (1.0 if model.period else 0.0) - model.A[np.ix_(second, second)]
+    size = np.abs(inner).max(axis=1, initial=0.0)
+    if second and (np.any(size == 0.0) or np.linalg.cond(inner / size[:, None]) > _NO_REST):
+        names = ", ".join(model.states[k] for k in second)
+        raise ParameterError(
+            f"{model.name}: the states left out ({names}) have no rest of their own: one of them "
+            "integrates; keep it"
+        )
+    if corrected and model.period:
+        raise ParameterError(f"{model.name}: only continuous models are corrected, this is sampled")
+    A21, A12 = model.A[np.ix_(second, first)], model.A[np.ix_(first, second)]
+    C2 = model.C[:, second]
+    drift = model.rate[second, None]
+    rest = np.linalg.solve(inner, np.hstack([A21, model.B[second], drift]))
+    by_x, by_u, by_1 = np.split(rest, [len(first), len(first) + model.B.shape[1]], axis=1)
+    A, B = model.A[np.ix_(first, first)] + A12 @ by_x, model.B[first] + A12 @ by_u
+    rate = model.rate[first] + (A12 @ by_1)[:, 0]
+    C, D = model.C[:, first] + C2 @ by_x, model.D + C2 @ by_u
+    if corrected:
+        lag = np.linalg.solve(inner, by_x)
+        body = np.eye(len(first)) + A12 @ lag
+        A, B, rate = (np.linalg.solve(body, M) for M in (A, B, rate))
+        C, D = C - C2 @ lag @ A, D - C2 @ lag @ B
+    return replace(
+        model,
+        A=A,
+        B=B,
+        C=C,
+        D=D,
+        rate=rate,
+        states=tuple(keep),
+        state_units=tuple(model.state_units[k] for k in first),
+    )
+
+
+# --- Reduction
+
+Method = Literal["balanced", "modal"]
+
+_DEAD = 1e-12  # poles of sampled models below it are dead beats
+_NEAR_REST = 1e-6  # frequency that stands for rest [Hz]
+
+TOLERANCE = 0.01
+"""relative error over the band that is admissible where nothing else is said"""
+_FAR = 1e3  # of the fastest corner: a response so far beyond it is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """A reduced model, and what it leaves out.
+
+    Parameters
+    ----------
+    model
+        Same signals, fewer states.
+    error
+        Measured over a band.
+    kept
+        Number of its states that are unstable or on the border of stability, and always kept.
+    hankel
+        Hankel singular values of the rest of the full model, every signal in units of its
+        largest response; shape (n,). Empty where they were not needed.
+    bound
+        What no response of the reduced model is further off at any frequency, in SI units,
+        shape (outputs, inputs): twice the sum of the singular values left out. NaN where the
+        method has no such bound.
+    """
+
+    model: LinearModel
+    error: ReductionError
+    kept: int
+    hankel: Array
+    bound: Array
+
+
+def reduce(
+    model: LinearModel,
+    *,
+    order: int | None = None,
+    band: float | None = None,
+    tolerance: float = TOLERANCE,
+    method: Method = "balanced",
+) -> Reduced:
+    """Return a model with fewer states, of a given order or as good as a band asks for.
+
+    Parameters
+    ----------
+    model
+        Continuous or sampled, stable or not: integrators, undamped swings and unstable poles
+        are split off first and kept.
+    order
+        Number of states; as few as `tolerance` allows where it is not given.
+    band
+        Frequency [Hz] up to which the error counts; by default that of the fastest pole, or 0.4
+        of the sampling frequency (at half of it many a sampled model has a zero).
+    tolerance
+        Admissible relative error over the band, where no order is given.
+    method
+        ``"balanced"``: states that show least are taken as always at rest (singular perturbation
+        of the balanced realization: exact at rest, with a bound at every frequency).
+        ``"modal"``: the same with the fastest modes; the poles that are kept are those of the
+        model.
+
+    Raises
+    ------
+    ParameterError
+        When order, band or tolerance are out of range, or no order meets the tolerance.
+
+    References
+    ----------
+    Y. Liu, B. D. O. Anderson, "Singular perturbation approximation of balanced systems",
+    International Journal of Control 50 (1989): bound and exactness at rest.
+    """
+    # What no input moves stays at the operating point; what no output sees may go.
+    acting = [model.states[k] for k in model.effective()]
+    full = model.reduced(acting, held=True)
+    high, n = _band(full, band), len(acting)
+    if not acting:
+        raise ParameterError(
+            f"{full.name}: no input reaches an output (what sticks does not move): there is "
+            "nothing to reduce"
+        )
+    lasts = lasting(full)
+    kept = sum(lasts(pole) for pole in full.poles())
+    least = max(kept, 1)
+    if order is not None and not least <= order <= n:
+        raise ParameterError(
+            f"order = {order} is not admissible: {full.name} has {n} states that act, {kept} of "
+            f"them unstable or on the border of stability: it must be >= {least} and <= {n}"
+        )
+    if not 0.0 < tolerance < 1.0:
+        raise ParameterError(f"tolerance = {tolerance:g} is not admissible: it must be > 0 and < 1")
+    rungs = _balanced(full) if method == "balanced" else _modal(full)
+    best = math.inf
+    for size in range(least, n + 1) if order is None else (order,):
+        rung = rungs(size)
+        error = reduction_error(full, rung.model, high)
+        if order is not None or error.relative <= tolerance:
+            return Reduced(rung.model, error, kept, rung.hankel, rung.bound)
+        best = min(best, error.relative)
+    raise ParameterError(
+        f"{full.name}: no order is within {100.0 * tolerance:g} % up to {high:g} Hz, the best is "
+        f"{100.0 * best:.2g} % off; allow more, or take a lower band"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Rung:
+    """A model of one order, and what is known of it without looking at its response."""
+
+    model: LinearModel
+    hankel: Array
+    bound: Array
+
+
+def _balanced(full: LinearModel) -> Callable[[int], _Rung]:
+    """Return the balanced reduction to any order."""
+    parts = split(full, lasting(full))
+    fixed = len(parts.first[0])
+    A, B, C = parts.second
+    rows, columns = _peaks(parts.second, full)
+    realization = balanced((A, B / columns, C / rows[:, None]), full.period)
+    second = (realization.A, realization.B * columns, realization.C * rows[:, None])
+    whole = _joined(full, parts.first, second)
+
+    def at(order: int) -> _Rung:
+        reduced = residualized(whole, whole.states[:order])
+        tail = realization.hankel[max(order - fixed, 0) :]
+        bound = 2.0 * float(tail.sum()) * np.outer(rows, columns)
+        return _Rung(reduced, realization.hankel, bound)
+
+    return at
+
+
+def _modal(full: LinearModel) -> Callable[[int], _Rung]:
+    """Return the reduction to the slowest modes, pairs whole, the others at rest."""
+    lasts = lasting(full)
+    sizes = np.sort([_rate(pole, full, lasts) for pole in full.poles()])
+
+    def at(order: int) -> _Rung:
+        limit = (1.0 + 1e-9) * sizes[order - 1]
+        parts = split(full, lambda pole: _rate(pole, full, lasts) <= limit)
+        whole = _joined(full, parts.first, parts.second)
+        reduced = residualized(whole, whole.states[: len(parts.first[0])])
+        return _Rung(reduced, np.zeros(0), np.full(full.D.shape, np.nan))
+
+    return at
+
+
+def _rate(pole: complex, full: LinearModel, lasts: Choice) -> float:
+    """Return how fast a mode is [1/s]; 0 for what must be kept."""
+    if lasts(pole):
+        return 0.0
+    if not full.period:
+        return abs(pole)
+    return abs(np.log(complex(pole))) / full.period if abs(pole) > _DEAD else math.inf
+
+
+def _peaks(part: Matrices, full: LinearModel) -> tuple[Array, Array]:
+    """Return units of outputs and inputs in which the largest response of each is about 1."""
+    A, B, C = part
+    n = len(A)
+    labels = tuple(map(str, range(n)))
+    stable = replace(
+        full, A=A, B=B, C=C, D=0.0 * full.D, states=labels, state_units=labels, rate=np.zeros(n)
+    )
+    corners = natural(stable)
+    nyquist = 0.5 / full.period if full.period else math.inf
+    f = np.unique(np.append(corners[(corners > 0.0) & (corners < nyquist)], _NEAR_REST))
+    size = np.abs(stable.response(f)).max(axis=0)
+    rows = size.max(axis=1)
+    rows[rows == 0.0] = 1.0
+    columns = (size / rows[:, None]).max(axis=0)
+    columns[columns == 0.0] = 1.0
+    return rows, columns
+
+
+def _joined(full: LinearModel, first: Matrices, second: Matrices) -> LinearModel:
+    """Return both parts side by side, their states without a meaning of their own."""
+    from scipy.linalg import block_diag
+
+    n = len(first[0]) + len(second[0])
+    A = block_diag(*(part[0] for part in (first, second) if len(part[0])))
+    return replace(
+        full,
+        A=A,
+        B=np.vstack([first[1], second[1]]),
+        C=np.hstack([first[2], second[2]]),
+        states=tuple(f"z_{k + 1}" for k in range(n)),
+        state_units=("1",) * n,
+        rate=np.zeros(n),
+    )
+
+
+def _band(model: LinearModel, band: float | None) -> float:
+    """Return the end of the band [Hz]."""
+    if band is not None:
+        most = _FAR * float(natural(model).max(initial=0.0))
+        if not model.period and band > most > 0.0:
+            raise ParameterError(
+                f"band = {band:g} Hz is not admissible: it must be <= {most:.3g} Hz, {_FAR:g} "
+                f"times the fastest corner of {model.name}"
+            )
+        return band
+    if model.period:
+        return 0.4 / model.period
+    return float(natural(model).max(initial=0.0)) or 1.0

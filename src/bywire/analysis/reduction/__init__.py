@@ -1,1 +1,0 @@
-"""Smaller linear models, with the error that they make."""

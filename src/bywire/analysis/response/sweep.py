@@ -1,0 +1,392 @@
+"""Sweeps of sines: what one asks for, its cases and windows, and its result as a dataset."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.analysis.loop import Saturation
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.signals import signals_of
+from bywire.core.typing import Array, Complex
+from bywire.core.units import shown
+from bywire.simulation.engine import structure_of
+from bywire.simulation.ensemble import Variations, case_matrix
+from bywire.simulation.repetition import KEPT
+from bywire.simulation.run import Run
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What shakes a loop, and how its answer is judged.
+
+    Parameters
+    ----------
+    inputs
+        Signals of the Stimulus that are shaken together; the first gives the unit.
+    output
+        Signal of the Output that answers.
+    frequencies
+        Wanted frequencies [Hz], ascending; each is rounded so that a window holds whole periods.
+    amplitudes
+        Amplitudes of the sine, in the input's SI unit, > 0.
+    variations
+        Dotted name of a parameter -> one value per variant; empty for the run's own parameters.
+    flags
+        Outputs that are 0 or 1, whose share of the time is reported, such as ``"stuck"``.
+    saturations
+        Limits that the model has no such output for, reported likewise.
+    least
+        Periods in a window, at least.
+    shortest
+        Length of a window [s], at least.
+    whole
+        Other frequencies [Hz] of which a window holds whole periods, such as that of a dither.
+    tolerance
+        A response is settled when the complex amplitude of a window differs from that of the one
+        before by less than this share. An encoder's resolution alone may scatter it by 0.3 %.
+    most
+        Windows after which a response is given up.
+    """
+
+    inputs: Sequence[str]
+    output: str
+    frequencies: Sequence[float]
+    amplitudes: Sequence[float]
+    variations: Variations | None = None
+    flags: Sequence[str] = ("stuck",)
+    saturations: Sequence[Saturation] = ()
+    least: int = 2
+    shortest: float = 0.05
+    whole: Sequence[float] = ()
+    tolerance: float = 1e-3
+    most: int = 60
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """Outputs that a run must record: the answer first, then flags, then what is limited."""
+        limited = [name for limit in self.saturations for name in limit.signals]
+        return (self.output, *self.flags, *limited)
+
+    def shares(self, values: Array, matrix: Array, names: Sequence[str]) -> dict[str, Array]:
+        """Return the share of the time of every flag and limit, shape (cases,) each.
+
+        Parameters
+        ----------
+        values
+            What was recorded, shape (cases, rows, signals).
+        matrix, names
+            Parameter vectors, shape (parameters, cases), and the names of their rows.
+        """
+        k = 1 + len(self.flags)
+        means = values[:, :, 1:k].mean(axis=1)
+        shares = {f"share_{name}": means[:, j] for j, name in enumerate(self.flags)}
+        for limit in self.saturations:
+            signals = values[:, :, k : k + len(limit.signals)]
+            shares[f"share_{limit.name}"] = limit.share(signals, matrix, names)
+            k += len(limit.signals)
+        return shares
+
+
+def as_dataset(
+    run: Run, sweep: Sweep, frequencies: list[float], done: list[dict[str, Array]]
+) -> xr.Dataset:
+    """Return the figures of all frequencies, each of shape (variants, amplitudes), as a dataset."""
+    stimuli, outputs = signals_of(run.model.Stimulus), signals_of(run.model.Output)
+    ratio = f"({outputs[sweep.output].unit})/({stimuli[sweep.inputs[0]].unit})"
+    units = {"phase": "degree", "gain": ratio}
+    stacked = {name: np.stack([figures[name] for figures in done], axis=2) for name in done[0]}
+    stacked["phase"] = _unwrapped(stacked["phase"])
+    variables: dict[str, Any] = {
+        name: (("variant", "amplitude", "frequency"), value, {"units": units.get(name, "1")})
+        for name, value in stacked.items()
+    }
+    coordinates: Mapping[str, Any] = {
+        "frequency": ("frequency", frequencies, {"units": "Hz"}),
+        "amplitude": (
+            "amplitude",
+            np.asarray(sweep.amplitudes, dtype=float),
+            {"units": stimuli[sweep.inputs[0]].unit},
+        ),
+        **{
+            name: ("variant", np.asarray(values, dtype=float))
+            for name, values in (sweep.variations or {}).items()
+        },
+    }
+    attributes = {
+        "model": run.model.name,
+        "inputs": " ".join(sweep.inputs),
+        "output": sweep.output,
+        "step": run.step,
+    }
+    return xr.Dataset(variables, coords=dict(coordinates), attrs=attributes)
+
+
+def _unwrapped(phase: Array) -> Array:
+    """Return phases without jumps along frequency, gaps of what sticks left out."""
+    unwrapped = phase.copy()
+    for index in np.ndindex(phase.shape[:2]):
+        known = np.isfinite(phase[index])
+        unwrapped[index][known] = np.unwrap(phase[index][known], period=360.0)
+    return unwrapped
+
+
+def complex_values(response: xr.Dataset) -> Complex:
+    """Return gain and phase of a response as complex numbers, NaN where the output sticks."""
+    return np.asarray(response["gain"].values * np.exp(1j * np.radians(response["phase"].values)))
+
+
+def response_data(response: xr.Dataset, variant: int = 0, amplitude: int = 0) -> Any:
+    """Return one variant and amplitude as ``control.FrequencyResponseData``.
+
+    Frequencies at which the output stuck are left out.
+    """
+    import control
+
+    part = response.isel(variant=variant, amplitude=amplitude)
+    values = complex_values(part)
+    known = np.isfinite(values)
+    return control.frd(values[known], 2.0 * math.pi * part["frequency"].values[known])
+
+
+# --- Cases: every variant with every amplitude, each at its own operating point
+
+
+@dataclass(frozen=True, eq=False)
+class Cases:
+    """Cases that run side by side, amplitudes within variants.
+
+    Parameters
+    ----------
+    matrix
+        Parameter vectors, shape (parameters, cases).
+    starts
+        State and memory that each case starts from.
+    rest
+        Stimulus that the excitation is added to, shape (cases, nu).
+    sizes
+        Amplitudes, SI, shape (cases,).
+    shape
+        Numbers of variants and amplitudes.
+    """
+
+    matrix: Array
+    starts: list[tuple[Any, Any]]
+    rest: Array
+    sizes: Array
+    shape: tuple[int, int]
+
+
+def cases_of(run: Run, sweep: Sweep, points: Sequence[Run] | None) -> Cases:
+    """Return the cases of a sweep.
+
+    Parameters
+    ----------
+    run
+        The loop at its operating point.
+    sweep
+        Amplitudes, and variations of the run's parameters, which keep its operating point.
+    points
+        Variants with operating points of their own, in place of variations.
+
+    Raises
+    ------
+    ParameterError
+        When a variant has other sample times or choices than the run, or both kinds are given.
+    """
+    sizes = np.asarray(sweep.amplitudes, dtype=float)
+    if points is None:
+        variations = dict(sweep.variations or {})
+        matrix = case_matrix(run, variations) if variations else _column(run)[:, None]
+        runs = [run] * matrix.shape[1]
+    else:
+        _require_alike(run, sweep, points)
+        matrix, runs = np.stack([_column(variant) for variant in points], axis=1), list(points)
+    n = sizes.size
+    return Cases(
+        matrix=np.repeat(matrix, n, axis=1),
+        starts=[(variant.state, variant.memory) for variant in runs for _ in range(n)],
+        rest=np.repeat(np.concatenate([run.stimulus(np.zeros(1)) for run in runs]), n, axis=0),
+        sizes=np.tile(sizes, len(runs)),
+        shape=(len(runs), n),
+    )
+
+
+def _column(run: Run) -> Array:
+    return np.array(list(run.par.leaves().values()))
+
+
+def _require_alike(run: Run, sweep: Sweep, points: Sequence[Run]) -> None:
+    if sweep.variations:
+        raise ParameterError("variants: give variations of one point or points, not both")
+    if not points:
+        raise ParameterError("variants: give at least one operating point")
+    structure, tasks = structure_of(run.model, run.par), run.model.tasks(run.par)
+    for k, variant in enumerate(points):
+        if structure_of(variant.model, variant.par) != structure:
+            raise ParameterError(f"variant {k} is another model or makes another choice")
+        if [t.period for t in variant.model.tasks(variant.par)] != [t.period for t in tasks]:
+            raise ParameterError(f"variant {k} has other sample times: they cannot vary in a sweep")
+
+
+# --- Windows over which a periodic response is evaluated: how long, how far they scatter
+
+MOST_SAMPLES = 10_000_000
+"""samples of a window: 160 MB, at a kilohertz the period of a frequency of 0.2 mHz twice"""
+_LOWEST = 10  # periods of the lowest frequency in a window of lines: it is rounded to one of them
+_CHOICES = 24  # numbers of periods tried for a window close to the wanted frequency
+_CLOSE = 1e-4  # share that a frequency may be off before a longer window is worth its time
+
+
+def require_measurable(run: Run, sweep: Sweep) -> None:
+    """Refuse unknown signals, and frequencies and amplitudes that cannot be measured.
+
+    Raises
+    ------
+    UnknownNameError
+        When a signal is unknown.
+    ParameterError
+        When frequencies or amplitudes are not positive, or a frequency is above half the rate at
+        which the slowest controller samples.
+    """
+    for name in sweep.inputs:
+        if name not in run.model.Stimulus._fields:
+            raise unknown_name("signal of the stimulus", name, run.model.Stimulus._fields)
+    for name in sweep.recorded:
+        if name not in run.model.Output._fields:
+            raise unknown_name("signal", name, run.model.Output._fields)
+    unit = signals_of(run.model.Stimulus)[sweep.inputs[0]].unit
+    wanted = (("frequencies", sweep.frequencies, "Hz"), ("amplitudes", sweep.amplitudes, unit))
+    for kind, values, symbol in wanted:
+        if not len(values) or not all(math.isfinite(v) and v > 0 for v in values):
+            given = ", ".join(shown(float(v), symbol) for v in values) or "none"
+            raise ParameterError(f"{kind} = {given}: positive numbers are wanted")
+    limit, highest = nyquist(run), max(sweep.frequencies)
+    if highest >= limit:
+        raise ParameterError(
+            f"frequency {highest:g} Hz is not below the Nyquist frequency of the controller, "
+            f"{limit:g} Hz: ask for lower frequencies"
+        )
+
+
+def nyquist(run: Run) -> float:
+    """Return the slowest controller's Nyquist frequency [Hz]: any may take the input."""
+    return 0.5 / max(task.period for task in run.model.tasks(run.par))
+
+
+def interval(run: Run) -> float:
+    """Return the sample time of the fastest task [s]: the excitation steps with it."""
+    return min(task.period for task in run.model.tasks(run.par))
+
+
+def common_interval(run: Run, whole: Sequence[float]) -> float:
+    """Return the shortest time [s] that holds whole sample times and periods.
+
+    Parameters
+    ----------
+    whole
+        Frequencies [Hz] whose periods count too.
+    """
+    periods = [task.period for task in run.model.tasks(run.par)] + [1.0 / w for w in whole]
+    return math.lcm(*(round(period / run.step) for period in periods)) * run.step
+
+
+def sine_window(run: Run, f: float, sweep: Sweep) -> tuple[float, int]:
+    """Return length [s] and periods of a window close to a frequency [Hz].
+
+    What is measured is told of the frequency that the window holds. Windows that come within 1e-4
+    of the wanted one are alike; up to twice as long as the shortest of them, the closest counts.
+    Where none does, the closest of all.
+    """
+    common = common_interval(run, sweep.whole)
+    least = max(sweep.least, math.ceil(sweep.shortest * f))
+    choices = []
+    for n in range(least, least + _CHOICES):
+        length = max(round(n / f / common), 1) * common
+        whole = max(round(f * length), 1)
+        # Rounded: of windows that fit alike, the shortest.
+        choices.append((round(abs(whole / length / f - 1.0), 9), length, whole))
+    close = [length for off, length, _ in choices if off <= _CLOSE]
+    longest = 2.0 * min(close, default=math.inf)
+    _, length, whole = min(choice for choice in choices if choice[1] <= longest)
+    _require_short(run, length, f, length * f)
+    return length, whole
+
+
+def _require_short(run: Run, length: float, f: float, periods: float) -> None:
+    """Refuse a window of more samples than are held at once, before anything is computed."""
+    samples = length / interval(run)
+    if not samples <= MOST_SAMPLES:
+        lowest = periods / (MOST_SAMPLES * interval(run))
+        raise ParameterError(
+            f"frequency {shown(f, 'Hz')}: its window would hold {samples:.3g} samples, and "
+            f"{MOST_SAMPLES:.0e} are taken at most: ask for frequencies from "
+            f"{shown(float(f'{lowest:.2g}'), 'Hz')} on, or a lower sample rate"
+        )
+
+
+def line_window(run: Run, sweep: Sweep) -> tuple[float, list[int]]:
+    """Return length [s] of a window with a line near every frequency, and their numbers.
+
+    Frequencies are multiples of 1/length; between two of them at least one line is left.
+
+    Raises
+    ------
+    ParameterError
+        When the frequencies do not ascend, or one is so low that its window is too long.
+    """
+    f = list(sweep.frequencies)
+    apart = [b - a for a, b in itertools.pairwise(f)]
+    if any(step <= 0 for step in apart):
+        raise ParameterError(f"frequencies = {f}: write them in ascending order")
+    common = common_interval(run, sweep.whole)
+    wanted = max(max(sweep.least, _LOWEST) / f[0], sweep.shortest, *(2.0 / step for step in apart))
+    # Half a line more: rounded to lines, neighbors keep one between them.
+    _require_short(run, wanted * 1.25, f[0], wanted * 1.25 * f[0])
+    length = math.ceil(wanted * 1.25 / common) * common
+    return length, [math.floor(frequency * length + 0.5) for frequency in f]
+
+
+def kept(figures: Complex, settled: NDArray[np.bool_]) -> np.ma.MaskedArray[Any, Any]:
+    """Return the windows that count: the last two of what repeats, else all that are kept.
+
+    Parameters
+    ----------
+    figures
+        Complex amplitudes of the last windows, shape (cases, KEPT, lines); see
+        ``simulation.repetition``.
+    settled
+        Which cases repeat, shape (cases,).
+    """
+    old = np.arange(KEPT)[None] < np.where(settled, KEPT - 2, 0)[:, None]
+    return np.ma.array(figures, mask=np.isnan(figures) | old[:, :, None])
+
+
+def spread_of(figures: Complex, settled: NDArray[np.bool_]) -> tuple[Complex, Array]:
+    """Return complex amplitudes and their scatter.
+
+    Parameters
+    ----------
+    figures, settled
+        As in `kept`.
+
+    Returns
+    -------
+    tuple
+        Amplitudes, shape (cases, lines): those of the last window where they repeat, else the
+        mean of the windows that count. Their scatter as a share of that: root mean square of the
+        windows' distance from their mean. A drift counts as scatter.
+    """
+    seen = kept(figures, settled)
+    mean = seen.mean(axis=1)
+    apart = np.sqrt((np.abs(seen - mean[:, None]) ** 2).mean(axis=1))
+    value = np.where(settled[:, None], figures[:, -1], np.ma.filled(mean, np.nan))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return value, np.asarray(np.ma.filled(apart, np.nan) / np.abs(value))

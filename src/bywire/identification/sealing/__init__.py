@@ -1,1 +1,0 @@
-"""Strokes of a sealed piston, and the friction that they show."""

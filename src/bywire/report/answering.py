@@ -1,0 +1,32 @@
+"""Public functions that return an answer: they check arguments and warn of what it warns of."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
+
+Asked = ParamSpec("Asked")
+Given = TypeVar("Given")
+
+
+def answering(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
+    """Have a function warn of what its answer warns of, so that nothing coarse passes in silence.
+
+    Arguments of another kind than its signature says are refused before it begins. Commands take
+    warnings, notes and failures from the answer, and print each in its place.
+    """
+
+    @wraps(function)
+    def warned(*args: Asked.args, **kwargs: Asked.kwargs) -> Given:
+        from bywire.core.arguments import require_kinds
+        from bywire.report.answer import AnswerWarning
+
+        require_kinds(warned, args, kwargs)
+        answer: Any = function(*args, **kwargs)
+        for text in (*answer.warnings, *answer.notes, *answer.failures):
+            warnings.warn(text, AnswerWarning, stacklevel=2)
+        return answer  # type: ignore[no-any-return]
+
+    return warned

@@ -1,0 +1,440 @@
+"""Figures of a loop gain: Bode plot, Nyquist plot, Nichols chart, sensitivities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Patch
+from matplotlib.ticker import MultipleLocator, NullFormatter
+
+from bywire.analysis.loop_curves import Family, LoopCurve, disk
+from bywire.core.typing import Array
+from bywire.report import style
+from bywire.report.legend import legend_outside
+from bywire.report.panels import Role
+from bywire.report.style import value_color, value_scale
+from bywire.report.wording import amount
+
+Points = Callable[[LoopCurve], tuple[Array, Array]]
+
+
+def draw_family(
+    axes: Axes, family: Family, points: Points, *, stable_only: bool = False, label: str = ""
+) -> None:
+    """Draw one line per curve; unstable loops dashed, the worst one on top with its value.
+
+    Parameters
+    ----------
+    axes
+        Where to draw.
+    family
+        Curves.
+    points
+        Abscissa and ordinate of a curve.
+    stable_only
+        Leave out unstable loops, for quantities that mean nothing there.
+    label
+        What the legend calls a single curve.
+    """
+    for k, curve in enumerate(family.curves):
+        stable = curve.margins.stable
+        if stable_only and not stable:
+            continue
+        top = k == family.worst
+        color = (
+            style.BLUE
+            if not family.name
+            else style.VERMILLION
+            if top
+            else value_color(family.values, k)
+        )
+        axes.plot(
+            *points(curve),
+            color=color,
+            linestyle="-" if stable else "--",
+            linewidth=1.8 if top else 0.9,
+            zorder=3.5 if top else 3.0,
+            label=_name(family, label) if top else "_",
+        )
+
+
+def value_bar(figure: Figure, panels: list[Axes], family: Family) -> None:
+    """Put the scale of the varied parameter beside the panels; nothing for a single curve."""
+    if family.name and len(family.curves) >= 2:
+        value_scale(figure, panels, family.name, family.unit, family.values)
+
+
+def _name(family: Family, label: str) -> str:
+    curve = family.curves[family.worst]
+    state = "" if curve.margins.stable else "unstable"
+    if not family.name:
+        return style.plain(f"{label}, {state}" if state else label)
+    value = amount(family.values[family.worst], family.unit, 3)
+    return style.plain(f"worst: {family.name} = {value}" + (f", {state}" if state else ""))
+
+
+# --- Bode plot with margins
+
+
+def loop_gain(family: Family) -> Figure:
+    """Draw magnitude and phase of the loop gain; margins of the worst curve as vertical spans."""
+    figure, (upper, lower) = style.new_figure(5.0, (1.0, 1.0))
+    draw_family(upper, family, _magnitude, label="loop gain L")
+    draw_family(lower, family, _phase)
+    upper.axhline(0.0, color=style.GRAY, linewidth=0.8, zorder=1)
+    lower.axhline(-180.0, color=style.GRAY, linewidth=0.8, zorder=1)
+    _spans(upper, lower, family.curves[family.worst])
+    upper.set_xscale("log")
+    upper.margins(x=0.0)
+    lower.xaxis.set_major_formatter(lambda hertz, _: f"{hertz:g}")
+    lower.xaxis.set_minor_formatter(NullFormatter())
+    span = max(float(np.ptp(curve.phase)) for curve in family.curves)
+    lower.yaxis.set_major_locator(MultipleLocator(45.0 if span < 300.0 else 90.0))
+    upper.set_ylabel("magnitude of L [dB]")
+    lower.set_ylabel("phase of L [°]")
+    lower.set_xlabel(style.axis_label("frequency", "Hz"))
+    value_bar(figure, [upper, lower], family)
+    style.legend_above(upper)
+    figure.align_ylabels([upper, lower])
+    return figure
+
+
+def _spans(upper: Axes, lower: Axes, worst: LoopCurve) -> None:
+    """Draw phase margin and gain margin as the spans that they are, with their frequencies."""
+    margins = worst.margins
+    if math.isfinite(margins.phase_at):
+        text = f"phase margin {margins.phase:.3g}° at {margins.phase_at:.3g} Hz"
+        lower.plot(
+            [margins.phase_at] * 2,
+            [-180.0, margins.phase - 180.0],
+            color=style.GREEN,
+            linewidth=2.2,
+            zorder=4,
+        )
+        _line(upper, lower, margins.phase_at, style.GREEN, text)
+    factors = (
+        ("gain margin", margins.gain, margins.gain_at, style.PURPLE),
+        ("lower gain margin", margins.lower_gain, margins.lower_gain_at, style.SKY),
+    )
+    for name, factor, at, color in factors:
+        if not 0.0 < factor < math.inf:
+            continue
+        text = f"{name} {factor:.3g} at {at:.3g} Hz"
+        if at > 0.0:  # rest lies beyond the axis
+            upper.plot(
+                [at] * 2, [-20.0 * math.log10(factor), 0.0], color=color, linewidth=2.2, zorder=4
+            )
+            _line(upper, lower, at, color, text)
+        else:
+            upper.plot([], [], color=color, linestyle="--", label=text)
+
+
+def _line(upper: Axes, lower: Axes, frequency: float, color: str, text: str) -> None:
+    for axes in (upper, lower):
+        axes.axvline(
+            frequency,
+            color=color,
+            linewidth=0.9,
+            linestyle="--",
+            zorder=1.6,
+            label=text if axes is upper else "_",
+        )
+
+
+def _magnitude(curve: LoopCurve) -> tuple[Array, Array]:
+    return curve.frequency, 20.0 * np.log10(np.abs(curve.L))
+
+
+def _phase(curve: LoopCurve) -> tuple[Array, Array]:
+    return curve.frequency, curve.phase
+
+
+# --- Nyquist plot with the disk that the disk margin keeps free
+
+_LEFT, _RIGHT, _HALF = -3.2, 1.6, 1.9  # what of the plane is shown
+
+
+def nyquist(family: Family) -> Figure:
+    """Draw the loop gain in the complex plane near -1.
+
+    The mirror image of negative frequencies is left out. The disk belongs to the worst curve; a
+    loop gain outside it tolerates changes of gain and phase at once. Unstable loops have none.
+    """
+    figure, (axes,) = style.new_figure(5.2)
+    worst = family.curves[family.worst]
+    _disk(axes, worst)
+    turn = np.linspace(0.0, 2.0 * np.pi, 200)
+    axes.plot(
+        np.cos(turn), np.sin(turn), color=style.GRAY, linewidth=0.7, linestyle=":", label="gain 1"
+    )
+    draw_family(axes, family, _in_the_plane, label="loop gain L")
+    _mark_on_the_circle(axes, worst)
+    axes.plot(
+        -1.0,
+        0.0,
+        "+",
+        color=style.BLACK,
+        markersize=10,
+        markeredgewidth=1.6,
+        zorder=5,
+        label="-1",
+        linestyle="none",
+    )
+    axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
+    axes.axvline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
+    axes.set_xlim(_LEFT, _RIGHT, auto=True)  # fixed ones matplotlib would complain about
+    axes.set_ylim(-_HALF, _HALF, auto=True)
+    axes.set_aspect("equal", adjustable="datalim")  # more is shown where there is room
+    axes.set_xlabel("real part of L [-]")
+    axes.set_ylabel("imaginary part of L [-]")
+    value_bar(figure, [axes], family)
+    legend_outside(figure, axes.get_legend_handles_labels()[0], columns=3)
+    return figure
+
+
+def _in_the_plane(curve: LoopCurve) -> tuple[Array, Array]:
+    return curve.L.real, curve.L.imag
+
+
+def _disk(axes: Axes, worst: LoopCurve) -> None:
+    if not worst.margins.stable:
+        return
+    free = disk(min(worst.margins.disk, 2.0))
+    look: dict[str, Any] = {
+        "facecolor": style.SHADE,
+        "edgecolor": style.VERMILLION,
+        "linestyle": ":",
+        "label": f"disk margin {worst.margins.disk:.2f}",
+        "zorder": 1.2,
+    }
+    if math.isinf(free.radius):
+        axes.axvspan(10.0 * _LEFT, 0.0, **look)
+    else:
+        axes.add_patch(Circle((free.middle, 0.0), free.radius, **look))
+
+
+def _mark_on_the_circle(axes: Axes, worst: LoopCurve) -> None:
+    """Mark where phase and gain margin are read."""
+    margins = worst.margins
+    if math.isfinite(margins.phase_at):
+        angle = math.radians(margins.phase - 180.0)
+        axes.plot(
+            math.cos(angle),
+            math.sin(angle),
+            "o",
+            color=style.BLACK,
+            markersize=5,
+            zorder=5,
+            linestyle="none",
+            label=f"phase margin {margins.phase:.3g}° at {margins.phase_at:.3g} Hz",
+        )
+    factors = (
+        ("gain margin", "s", margins.gain, margins.gain_at),
+        ("lower gain margin", "D", margins.lower_gain, margins.lower_gain_at),
+    )
+    for name, mark, factor, at in factors:
+        if 0.0 < factor < math.inf:
+            axes.plot(
+                -1.0 / factor,
+                0.0,
+                mark,
+                color=style.BLACK,
+                markersize=5,
+                zorder=5,
+                linestyle="none",
+                label=f"{name} {factor:.3g} at {at:.3g} Hz",
+            )
+
+
+# --- Nichols chart with contours of the closed loop's magnitude
+
+CONTOURS = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.0, 1.0, 3.0, 6.0, 12.0)
+"""magnitudes of T = L/(1 + L) that are drawn [dB]"""
+_LOW, _HIGH = -40.0, 40.0  # gains that are shown, dB
+_TURN = 90.0  # the chart ends at multiples of it, degree
+_GRID = 361
+
+
+def nichols(family: Family) -> Figure:
+    """Draw the loop gain over its phase, with contours of constant magnitude of T.
+
+    The area around -180° is what the disk margin of the worst curve keeps free: there
+    ``|S - T|`` is larger than its largest value on the curve.
+    """
+    figure, (axes,) = style.new_figure(5.0)
+    left, right = _phases(family)
+    phase, gain = np.meshgrid(np.linspace(left, right, _GRID), np.linspace(_LOW, _HIGH, _GRID))
+    L = 10.0 ** (gain / 20.0) * np.exp(1j * np.radians(phase))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        T = 20.0 * np.log10(np.abs(L / (1.0 + L)))
+        apart = np.abs((1.0 - L) / (1.0 + L))
+    lines = axes.contour(
+        phase, gain, T, levels=CONTOURS, colors=style.GRAY, linewidths=0.6, linestyles="-"
+    )
+    axes.clabel(lines, fmt="%g dB", fontsize=0.85 * style.TEXT_SIZE)
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], color=style.GRAY, linewidth=0.6, label="|T| constant")
+    ]
+    worst = family.curves[family.worst]
+    if worst.margins.stable:
+        limit = 2.0 / worst.margins.disk
+        axes.contourf(phase, gain, apart, levels=[limit, np.inf], colors=[style.SHADE], zorder=0.9)
+        axes.contour(
+            phase,
+            gain,
+            apart,
+            levels=[limit],
+            colors=style.VERMILLION,
+            linestyles=":",
+            linewidths=1.0,
+        )
+        handles.append(
+            Patch(
+                facecolor=style.SHADE,
+                edgecolor=style.VERMILLION,
+                linestyle=":",
+                label=f"disk margin {worst.margins.disk:.2f}",
+            )
+        )
+    draw_family(axes, family, _in_decibels, label="loop gain L")
+    _mark_on_the_chart(axes, worst)
+    axes.set_xlim(left, right)
+    axes.set_ylim(_LOW, _HIGH)
+    axes.xaxis.set_major_locator(MultipleLocator(45.0 if right - left <= 540.0 else 180.0))
+    axes.set_xlabel("phase of L [°]")
+    axes.set_ylabel("magnitude of L [dB]")
+    value_bar(figure, [axes], family)
+    gain_lines = [h for h in axes.get_legend_handles_labels()[0] if isinstance(h, Line2D)]
+    style.legend_above(axes, [*gain_lines, *handles])
+    return figure
+
+
+def _phases(family: Family) -> tuple[float, float]:
+    """Return the ends of the abscissa: all phases of gains that are shown, and -180 degrees."""
+    shown = [np.array([-225.0, -90.0])]
+    for curve in family.curves:
+        size = 20.0 * np.log10(np.abs(curve.L))
+        shown.append(curve.phase[(size > _LOW) & (size < _HIGH)])
+    every = np.concatenate(shown)
+    return (
+        _TURN * math.floor(float(every.min()) / _TURN),
+        _TURN * math.ceil(float(every.max()) / _TURN),
+    )
+
+
+def _in_decibels(curve: LoopCurve) -> tuple[Array, Array]:
+    return curve.phase, 20.0 * np.log10(np.abs(curve.L))
+
+
+def _mark_on_the_chart(axes: Axes, worst: LoopCurve) -> None:
+    """Mark -1 and where phase and gain margin are read."""
+    margins = worst.margins
+    axes.plot(
+        -180.0,
+        0.0,
+        "+",
+        color=style.BLACK,
+        markersize=10,
+        markeredgewidth=1.6,
+        zorder=5,
+        linestyle="none",
+        label="-1",
+    )
+    if math.isfinite(margins.crossover):
+        axes.plot(
+            margins.phase - 180.0,
+            0.0,
+            "o",
+            color=style.BLACK,
+            markersize=5,
+            zorder=5,
+            linestyle="none",
+            label=f"phase margin {margins.phase:.3g}°",
+        )
+    factors = (
+        ("gain margin", "s", margins.gain, margins.gain_at),
+        ("lower gain margin", "D", margins.lower_gain, margins.lower_gain_at),
+    )
+    for name, mark, factor, frequency in factors:
+        if not 0.0 < factor < math.inf:
+            continue
+        phase = float(np.interp(frequency, worst.frequency, worst.phase))
+        at = 360.0 * round((phase - 180.0) / 360.0) + 180.0  # the odd half turn next to it
+        axes.plot(
+            at,
+            -20.0 * math.log10(factor),
+            mark,
+            color=style.BLACK,
+            markersize=5,
+            zorder=5,
+            linestyle="none",
+            label=f"{name} {factor:.3g}",
+        )
+
+
+# --- Sensitivity and complementary sensitivity, with their usual limits
+
+MOST_S, MOST_T = 2.0, 1.25
+"""usual limits of max |S| and max |T|: S. Skogestad, I. Postlethwaite, "Multivariable Feedback
+Control", 2nd ed. 2005, section 2.4.3"""
+_LOWEST = -60.0  # what is drawn, dB
+
+
+def sensitivity(family: Family) -> Figure:
+    """Draw the magnitudes of S and T over frequency; unstable loops have none."""
+    figure, panels = style.new_figure(4.8, (1.0, 1.0))
+    for axes, quantity, limit in ((panels[0], "S", MOST_S), (panels[1], "T", MOST_T)):
+        _panel(axes, family, quantity, limit)
+    panels[1].set_xlabel(style.axis_label("frequency", "Hz"))
+    panels[1].set_xscale("log")
+    panels[1].xaxis.set_major_formatter(lambda hertz, _: f"{hertz:g}")
+    panels[1].xaxis.set_minor_formatter(NullFormatter())
+    f = family.curves[0].frequency
+    panels[1].set_xlim(f[0], f[-1])
+    value_bar(figure, panels, family)
+    for axes in panels:
+        style.legend_above(axes)
+    figure.align_ylabels(panels)
+    return figure
+
+
+def _panel(axes: Axes, family: Family, quantity: str, limit: float) -> None:
+    def points(curve: LoopCurve) -> tuple[Array, Array]:
+        return curve.frequency, 20.0 * np.log10(np.abs(getattr(curve, quantity)))
+
+    look = style.STROKES[Role.LIMIT]
+    axes.axhline(
+        20.0 * math.log10(limit),
+        color=look.color,
+        linestyle=look.linestyle,
+        linewidth=look.linewidth,
+        label=f"usual limit {limit:g}",
+    )
+    axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
+    draw_family(axes, family, points, stable_only=True, label=f"|{quantity}|")
+    worst = family.curves[family.worst]
+    if worst.margins.stable:
+        size = np.abs(getattr(worst, quantity))
+        k = int(np.argmax(size))
+        axes.plot(
+            worst.frequency[k],
+            20.0 * math.log10(size[k]),
+            "o",
+            color=style.BLACK,
+            markersize=5,
+            zorder=5,
+            linestyle="none",
+            label=f"max |{quantity}| {size[k]:.3g}",
+        )
+    lowest = min((float(points(c)[1].min()) for c in family.curves), default=0.0)
+    highest = max(
+        (float(points(c)[1].max()) for c in family.curves if c.margins.stable), default=0.0
+    )
+    axes.set_ylim(max(lowest, _LOWEST) - 2.0, max(highest, 20.0 * math.log10(limit)) + 3.0)
+    axes.set_ylabel(f"|{quantity}| [dB]")

@@ -1,1 +1,0 @@
-"""A model drawn as boxes and wires, from its own equations."""

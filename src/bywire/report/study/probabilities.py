@@ -1,0 +1,266 @@
+"""Figures: how key figures are spread over the cases of a study, and how probable values are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
+
+from bywire.core.typing import Array
+from bywire.report import style
+from bywire.report.legend import legend_outside
+from bywire.report.panels import Role
+from bywire.report.readable_axis import (
+    beyond,
+    few_labels,
+    limit_text,
+    name_beyond,
+    scale_of,
+    size_of,
+    write_out,
+)
+from bywire.studies.statistics import Share
+
+_COLUMNS = 2
+_HEIGHT = 1.5  # of a panel [inch]
+_ROOM = 2.7  # width of a panel [inch]
+_BINS = 60  # at most
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A key figure over the cases.
+
+    Parameters
+    ----------
+    values
+        In ``unit``, shape (cases,); NaN where it is not defined.
+    unit
+        SI unit, or ``"%"``.
+    nominal
+        What the bench itself gives; NaN where it is not defined.
+    limit
+        Limit that is required; None where there is none.
+    """
+
+    values: Array
+    unit: str
+    nominal: float
+    limit: float | None = None
+
+
+def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
+    """Draw a histogram of every key figure, by name, each in a panel of its own.
+
+    Dashed the bench itself, dotted the limit.
+
+    Parameters
+    ----------
+    spreads
+        By name.
+    has_band
+        Whether a shaded band holds 90 % of the cases: of those that were drawn.
+    """
+    rows = -(-len(spreads) // _COLUMNS)
+    figure = Figure(
+        figsize=(style.WIDTH, 0.5 + _HEIGHT * rows), layout="constrained", facecolor="white"
+    )
+    grid = figure.subplots(rows, _COLUMNS, squeeze=False)
+    bound, own = style.STROKES[Role.LIMIT], style.STROKES[Role.SET_POINT]
+    has_limit = False
+    for axes, (name, spread) in zip(grid.flat, spreads.items(), strict=False):
+        style.dress(axes)
+        scale = scale_of(spread.values, spread.unit)
+        values = scale(spread.values[np.isfinite(spread.values)])
+        _draw_counts(axes, values)
+        if has_band:
+            axes.axvspan(*np.quantile(values, (0.05, 0.95)), color=style.SHADE, zorder=0)
+        for at, look in ((spread.nominal, own), (spread.limit, bound)):
+            if at is None or not np.isfinite(at):
+                continue
+            if look is bound and (far := beyond(scale(at), values)):
+                text = limit_text(at, spread.unit, size_of(spread.values))
+                name_beyond(axes, text, far, look.color)
+                continue
+            has_limit |= look is bound
+            axes.axvline(
+                scale(at), color=look.color, linestyle=look.linestyle, linewidth=look.linewidth
+            )
+        style.few_ticks(axes, 3)
+        few_labels(axes.xaxis, _ROOM)
+        axes.set_xlabel(scale.label(name.replace("_", " ")))
+        axes.set_ylabel("cases")
+    for spare in list(grid.flat)[len(spreads) :]:
+        spare.set_visible(False)
+    lines: list[Artist] = [
+        Line2D([], [], color=own.color, linestyle="--", label="the bench itself")
+    ]
+    if has_limit:
+        lines.append(Line2D([], [], color=bound.color, linestyle=":", label="limit"))
+    if has_band:
+        lines.append(Patch(color=style.SHADE, label="90 % of the cases"))
+    legend_outside(figure, lines)
+    return figure
+
+
+def _draw_counts(axes: Axes, values: Array) -> None:
+    """Fill the outline of the counts of values.
+
+    As a patch, its limits would be sought like those of curves: half as long as to lay out and
+    draw the panel.
+    """
+    counts, edges = np.histogram(values, _bins(values))
+    heights = np.concatenate([[0.0], np.repeat(counts, 2), [0.0]])
+    outline = np.column_stack([np.repeat(edges, 2), heights])
+    area = Polygon(outline, facecolor=style.BLUE, alpha=0.75)
+    area.sticky_edges.y.append(0.0)
+    axes.add_artist(area)
+    axes.update_datalim(outline)
+    axes.autoscale_view()
+
+
+def _bins(values: Array) -> int:
+    """Return how many bins show the shape of values and not their scatter."""
+    edges = np.histogram_bin_edges(values, bins="auto") if np.ptp(values) > 0 else values[:2]
+    return int(np.clip(edges.size - 1, 1, _BINS))
+
+
+# --- How probable it is that a key figure comes worse than a value, down to rare ones
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A key figure and the probability that it comes worse.
+
+    Parameters
+    ----------
+    name, unit
+        The figure, in SI or ``"%"``.
+    limit, admitted
+        What it has to keep, and the probability with which it may not.
+    values
+        Shape (points,).
+    probability, low, high
+        Estimate and interval at each value; NaN where there is none.
+    """
+
+    name: str
+    unit: str
+    limit: float
+    admitted: float
+    values: Array
+    probability: Array
+    low: Array
+    high: Array
+
+
+def exceedance(curves: Sequence[Curve]) -> Figure:
+    """Draw every curve over a logarithmic probability, a panel with an abscissa of its own each."""
+    figure, panels = style.new_figure(0.5 + 2.0 * len(curves), [1.0] * len(curves), is_shared=False)
+    look = style.STROKES[Role.LIMIT]
+    for axes, each in zip(panels, curves, strict=True):
+        known = each.probability > 0.0
+        scale = scale_of(np.append(each.values[known], each.limit), each.unit)
+        values, limit = scale(each.values[known]), scale(each.limit)
+        axes.fill_between(
+            values, each.low[known], each.high[known], color=style.SHADE, label="interval"
+        )
+        axes.plot(values, each.probability[known], color=style.BLUE, label="estimate")
+        axes.axvline(
+            limit,
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            label="limit, admitted",
+        )
+        axes.axhline(
+            each.admitted, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth
+        )
+        axes.set_yscale("log")
+        axes.set_ylabel("probability [-]")
+        axes.set_ylim(top=2.0, bottom=0.3 * float(np.min(each.probability[known], initial=0.1)))
+        few_labels(axes.xaxis, style.WIDTH - 1.0)
+        axes.set_xlabel(scale.label(each.name.replace("_", " ")))
+    style.legend_above(panels[0])
+    return figure
+
+
+# --- How the estimate of a probability came about, case by case
+
+_MARGIN = 8.0  # shown at most of an interval, in what the wanted probability leaves to failure
+_LONG = 10.0  # ratio of numbers of cases from which they are drawn by decades
+
+
+def convergence(
+    shares: Mapping[str, Sequence[Share]], wanted: Mapping[str, float | None], first: int = 1
+) -> Figure:
+    """Draw the share of the first cases that meet a requirement, over their number.
+
+    Ordinates reach from what decides, which is close to the wanted probability, to 100 %.
+
+    Parameters
+    ----------
+    shares
+        Text of a requirement -> the share of ever more cases, with its interval.
+    wanted
+        Probability that it has to be met with; dotted where there is one.
+    first
+        Cases from which on it is drawn: the interval of a few says nothing.
+    """
+    figure, panels = style.new_figure(0.5 + 1.4 * len(shares), [1.0] * len(shares))
+    look = style.STROKES[Role.LIMIT]
+    entries: dict[str, Artist] = {}
+    for axes, (text, each) in zip(panels, shares.items(), strict=True):
+        drawn = [s for s in each if s.cases >= min(first, each[-1].cases // 2)]
+        count = [share.cases for share in drawn]
+        (entries["estimate"],) = axes.plot(
+            count, [100.0 * s.value for s in drawn], color=style.BLUE
+        )
+        entries["interval"] = axes.fill_between(
+            count,
+            [100.0 * s.low for s in drawn],
+            [100.0 * s.high for s in drawn],
+            color=style.SHADE,
+        )
+        if (probability := wanted[text]) is not None:
+            entries["wanted"] = axes.axhline(
+                100.0 * probability,
+                color=look.color,
+                linestyle=look.linestyle,
+                linewidth=look.linewidth,
+            )
+        bottom = 100.0 * _lowest(drawn, probability)
+        margin = 0.05 * (100.0 - bottom)
+        axes.set_ylim(bottom - margin, 100.0 + margin)
+        style.few_ticks(axes, 4)
+        write_out(axes.yaxis)
+        axes.set_ylabel("probability [%]")
+        axes.set_title(style.plain(text), fontsize=style.TEXT_SIZE, loc="left")
+        if count[-1] > count[0]:
+            axes.set_xlim(count[0], count[-1])
+    last = panels[-1]
+    low, high = last.get_xlim()
+    if high > _LONG * low > 0.0:
+        last.set_xscale("log")
+        style.log_ticks(last.xaxis)
+    else:
+        few_labels(last.xaxis, style.WIDTH - 1.0)
+    last.set_xlabel("cases [-]")
+    for text, artist in entries.items():
+        artist.set_label(text)
+    legend_outside(figure, list(entries.values()), columns=3)
+    return figure
+
+
+def _lowest(drawn: Sequence[Share], wanted: float | None) -> float:
+    """Return the least probability that is shown."""
+    reached = min(s.low for s in drawn)
+    if wanted is not None:
+        reached = max(min(reached, wanted), 1.0 - _MARGIN * (1.0 - wanted))
+    return max(0.0, min(reached, drawn[-1].low, *(s.value for s in drawn)))

@@ -1,0 +1,134 @@
+"""What several use cases ask for."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from bywire.usecases.declare import Ask
+
+if TYPE_CHECKING:
+    from bywire.bench.bench import Bench
+
+LoopName = Annotated[str, Ask("Loop, see 'bywire list'.", "Loop", known=("loops",))]
+ParameterSetName = Annotated[
+    str, Ask("Parameter set, e.g. roberts2003.", "Parameter set", known=("parameter_sets",))
+]
+At = Annotated[str, Ask("Operating point, e.g. '20 bar'.", "Operating point")]
+Changes = Annotated[
+    Mapping[str, Any],
+    Ask(
+        "Change a parameter, e.g. motor.R_m=0.4ohm.",
+        "Changes",
+        name="set",
+        metavar="KEY=VALUE",
+        completes="changes",
+    ),
+]
+Frequencies = Annotated[str, Ask("Frequencies, e.g. '1 Hz:150 Hz:20', or a list.", "Frequencies")]
+Side = Annotated[
+    str,
+    Ask(
+        "Side of the corner at which the point lies: above, below, or FILE:LINE=above.",
+        "Side of corners",
+    ),
+]
+
+BenchName = Annotated[
+    "Bench | str | Path",
+    Ask(
+        "Bench file (TOML), or an experiment.",
+        "Bench",
+        metavar="BENCH",
+        known=("experiments", "generic_experiments"),
+        files=".toml",
+        offered=("benches",),
+    ),
+]
+BENCH_CHANGES = Ask(
+    "Change the bench, e.g. motor.R_m=0.4ohm.",
+    "Changes",
+    name="set",
+    metavar="KEY=VALUE",
+    completes="changes",
+)
+BenchChanges = Annotated[Mapping[str, str], BENCH_CHANGES]
+ErrorEstimate = Annotated[
+    bool,
+    Ask(
+        "Run in other steps too, for the error of all figures.",
+        "Estimate the error",
+        name="error_estimate",
+    ),
+]
+LastBenchChanges = Annotated[Mapping[str, str], replace(BENCH_CHANGES, is_last=True)]
+NeededCase = Annotated[str, Ask("Run of the experiment; needed where there are several.", "Run")]
+CaseName = Annotated[str, Ask("Run of the experiment; the first by default.", "Run")]
+OUT = Ask("Folder for recordings, figures and the report.", is_folder=True)
+OutFolder = Annotated[str | Path | None, OUT]
+LastOutFolder = Annotated[str | Path | None, replace(OUT, is_last=True)]
+ExportFolder = Annotated[str | Path, Ask("Folder of the export.", is_folder=True)]
+
+Cases = Annotated[
+    int | None,
+    Ask(
+        "Cases in place of the file's; more extend the study, fewer take back what is not "
+        "computed.",
+        "Cases",
+    ),
+]
+Workers = Annotated[int | None, Ask("Processes; one a core by default, where it is worth it.")]
+ClusterAddress = Annotated[str, Ask("Dask scheduler that computes instead.", metavar="ADDRESS")]
+EngineName = Annotated[str, Ask("What computes, e.g. cuda: a GPU.")]
+StudyFolder = Annotated[str | Path, Ask("Folder of the study.", metavar="FOLDER")]
+
+
+def require_study_folder(folder: Path, **others: Any) -> None:
+    """Refuse a file in the place of a study's folder, before anything is made for it."""
+    from bywire.studies.meant_study import require_no_file
+
+    del others
+    require_no_file(folder)
+
+
+STUDY_FOLDER: dict[str, Any] = {
+    "before": require_study_folder,
+    "writes": "folder",
+    "advice": "see that you may write there",  # its chunks are there
+}
+"""of commands that write into the folder of a study"""
+
+TestBench = Annotated[
+    "Bench | str | Path",
+    Ask(
+        "Bench file (TOML), or an experiment's name.",
+        "Bench",
+        known=("experiments", "generic_experiments"),
+        offered=("benches",),
+        is_flag=True,
+    ),
+]
+MeaningFile = Annotated[
+    str | Path | None,
+    Ask(
+        "What the columns mean (TOML).",
+        "What the columns mean",
+        name="map",
+        metavar="PATH",
+        offered=("maps",),
+    ),
+]
+Inputs = Annotated[
+    Mapping[str, str],
+    Ask(
+        "What drives the model, e.g. 'p_set=Demand [bar]'.",
+        "Inputs",
+        name="input",
+        kind="pairs",
+        metavar="STIMULUS=COLUMN",
+    ),
+]
+Time = Annotated[
+    str,
+    Ask("Column of the instants, e.g. 'Zeit [s]', or a rate, '1 kHz'.", "Time", metavar="COLUMN"),
+]

@@ -1,0 +1,384 @@
+"""Declare a use case by an annotated function: its command, form and public name follow from it.
+
+An argument's annotation holds its type and an `Ask`: the help of the flag and the hint of the
+form's field, its label, what completes. The first line of the docstring is the summary, which the
+help of the command, the form and the reference show. Messages name an argument by
+`bywire.core.callers.option`.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, ForwardRef, Literal, get_args, get_origin
+
+from bywire.core.callers import name_flag
+from bywire.report.answering import Asked, Given, answering
+
+Kind = Literal[
+    "text",
+    "whole",
+    "lines",
+    "pairs",
+    "changes",
+    "names",
+    "flag",
+    "choice",
+    "file",
+    "files",
+    "thing",
+    "things",
+]
+"""kinds of a form's fields; see `bywire.server.field`"""
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+"""default of an argument that maps names to values"""
+
+
+@dataclass(frozen=True)
+class Ask:
+    """What a command's flag and a form's field say and accept, beside the type of the argument.
+
+    Parameters
+    ----------
+    help
+        Help of the flag, hint of the field.
+    label
+        Label of the field; an argument without one has no field.
+    name
+        Of flag and field, where it differs from the argument's.
+    kind
+        Of the field, where it does not follow from the type.
+    metavar
+        What stands for the value in the command's help; derived from the type by default.
+    known
+        Kinds of things whose names are valid, as `bywire.overview` calls them: they complete.
+    files
+        Ending of files that are valid beside these names, for instance ``".toml"``.
+    offered
+        Parts of `bywire.server.contents.Contents` that the form offers.
+    words
+        All valid words: a tuple, or a function that returns them.
+    completes
+        ``"changes"`` or ``"parameters"`` of a bench, where these complete.
+    least, most
+        Range of a whole number.
+    ticked
+        Value for which a box of the form stands, in place of a field for any value.
+    is_flag
+        Whether a required argument is a flag of the command.
+    is_positional
+        Whether an argument with a default is none.
+    is_listing
+        Whether a command takes the parts between commas, in place of the flag several times.
+    is_text
+        Whether a command takes a text where the function also takes a path.
+    is_folder
+        Whether it names a folder that is written to.
+    is_last
+        Whether the command lists it behind all others.
+    shown_default
+        What the command's help says of the default; the default itself where None.
+    panel
+        Heading of the command's help under which it stands.
+    """
+
+    help: str
+    label: str = ""
+    name: str = ""
+    kind: Kind | None = None
+    metavar: str | None = None
+    known: tuple[str, ...] = ()
+    files: str = ""
+    offered: tuple[str, ...] = ()
+    words: tuple[str, ...] | Callable[[], Sequence[str]] = ()
+    completes: Literal["", "changes", "parameters"] = ""
+    least: int | None = None
+    ticked: str = ""
+    is_flag: bool = False
+    is_positional: bool = False
+    is_listing: bool = False
+    is_text: bool = False
+    is_folder: bool = False
+    is_last: bool = False
+    shown_default: str | bool | None = None
+    panel: str | None = None
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command of a use case.
+
+    Parameters
+    ----------
+    words
+        What is typed behind ``bywire``.
+    help
+        What it does, where a second command of the same use case does something else; the summary
+        of the use case by default.
+    status_1
+        When the exit status is 1, to end the sentence "exit status 1 ...".
+    before
+        ``before(**asked)``: refuses what must not even make the folder of results.
+    writes
+        Argument that names the folder into which the result is written; nothing is written where
+        empty. A flag ``--out`` is added where no argument is called ``out``.
+    default_folder
+        ``default_folder(**asked)``: returns that folder where none is named.
+    advice
+        What to do about a folder that cannot be written.
+    first
+        Arguments that it lists first.
+    without
+        Arguments for which it has no flag.
+    required
+        Arguments that it needs although the function has a default, with the help of each.
+    """
+
+    words: str
+    help: str = ""
+    status_1: str = ""
+    before: Callable[..., None] | None = None
+    writes: str = "out"
+    default_folder: Callable[..., Path] | None = None
+    advice: str = ""
+    first: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+    required: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Form:
+    """The form of a use case in ``bywire serve``.
+
+    Parameters
+    ----------
+    title, action
+        Heading, and label of the button.
+    subject
+        Field after which the result's folder is named.
+    name
+        Of the task; the words of the command by default.
+    fields
+        Fields in their order, where these are not all arguments with a label in theirs.
+    is_listed
+        Whether it has a page of its own, to which the start page leads.
+    is_kept
+        Whether the same subject is continued in the same folder.
+    is_file
+        Whether ``out`` is a file that the use case writes itself.
+    """
+
+    title: str
+    action: str
+    subject: str = "bench"
+    name: str = ""
+    fields: tuple[str, ...] = ()
+    is_listed: bool = True
+    is_kept: bool = False
+    is_file: bool = False
+
+
+@dataclass(frozen=True)
+class Argument:
+    """An argument of a use case.
+
+    Parameters
+    ----------
+    argument
+        Its name in Python.
+    ask
+        What is asked for.
+    type, default
+        Of the function's signature.
+    is_many
+        Whether it stands for any number of positional arguments.
+    """
+
+    argument: str
+    ask: Ask
+    type: Any
+    default: Any
+    is_many: bool
+
+    @property
+    def name(self) -> str:
+        """Name of the field, and of the flag without its dashes."""
+        return self.ask.name or self.argument
+
+    @property
+    def flag(self) -> str:
+        """Flag of the command."""
+        return f"--{self.name.replace('_', '-')}"
+
+    @property
+    def is_required(self) -> bool:
+        """Whether there is no default."""
+        return self.default is inspect.Parameter.empty
+
+    @property
+    def is_positional(self) -> bool:
+        """Whether a command takes it without a flag."""
+        return self.is_many or self.ask.is_positional or (self.is_required and not self.ask.is_flag)
+
+    @property
+    def is_path(self) -> bool:
+        """Whether a command takes a path."""
+        names = str(self.type)
+        return "Path" in names and not self.ask.is_text
+
+    @property
+    def kind(self) -> Kind:
+        """Kind of the field; `ticked` apart, also how a command reads it."""
+        ask, outer = self.ask, get_origin(self.type)
+        if ask.kind is not None:
+            return ask.kind
+        if self.is_many:
+            return "things"
+        if ask.offered:
+            return "thing"
+        if ask.known or ask.words:
+            return "choice"
+        kinds: dict[Any, Kind] = {
+            Mapping: "changes",
+            Sequence: "lines",
+            bool: "flag",
+            int: "whole",
+        }
+        parts = (self.type, outer, *get_args(self.type), *map(get_origin, get_args(self.type)))
+        return next((kinds[part] for part in parts if part in kinds), "text")
+
+
+@dataclass(frozen=True)
+class UseCase:
+    """A use case as declared; see `use_case`.
+
+    Parameters
+    ----------
+    public, function
+        The public function, and what command and form call: most often the same.
+    arguments
+        What they ask for.
+    commands, form, check, holds
+        As declared.
+    takes
+        Names of all arguments of ``function``.
+    """
+
+    public: Callable[..., Any]
+    function: Callable[..., Any]
+    arguments: tuple[Argument, ...]
+    commands: tuple[Command, ...]
+    form: Form | None
+    check: Callable[..., Any] | None
+    holds: Callable[[Path, Any], bool] | None
+    takes: frozenset[str]
+
+    @property
+    def name(self) -> str:
+        """Name in Python."""
+        return self.public.__name__
+
+    @property
+    def summary(self) -> str:
+        """What it does: the first line of the docstring."""
+        return (inspect.getdoc(self.public) or "").partition("\n")[0]
+
+    def call(self, asked: Mapping[str, Any], **more: Any) -> Any:
+        """Call the function with what was asked by the names of fields, and what else it takes."""
+        others = {name: value for name, value in more.items() if name in self.takes}
+        given = {a.argument: asked[a.name] for a in self.arguments if a.name in asked}
+        many = [value for a in self.arguments if a.is_many for value in given.pop(a.argument, ())]
+        return self.function(*many, **given, **others)
+
+    def read(self, asked: Mapping[str, Any]) -> Any:
+        """Check what was asked, by the names of fields, and compute nothing.
+
+        Raises
+        ------
+        InputError
+            For what does not fit.
+        """
+        if self.check is None:
+            return None
+        taken = inspect.signature(self.check).parameters
+        given = {
+            a.argument: asked.get(a.name, a.default) for a in self.arguments if a.argument in taken
+        }
+        many = [value for a in self.arguments if a.is_many for value in given.pop(a.argument, ())]
+        return self.check(*many, **given)
+
+
+DECLARED: dict[str, UseCase] = {}
+"""use cases that were declared so far, by the names of their functions"""
+
+
+def use_case(
+    *commands: str | Command,
+    form: Form | None = None,
+    check: Callable[..., Any] | None = None,
+    holds: Callable[[Path, Any], bool] | None = None,
+    asked: Callable[..., Any] | None = None,
+) -> Callable[[Callable[Asked, Given]], Callable[Asked, Given]]:
+    """Declare a use case: its function warns of what its answer warns of, and checks its arguments.
+
+    Parameters
+    ----------
+    commands
+        Commands, or the words behind ``bywire`` of one.
+    form
+        Its form.
+    check
+        ``check(...)``: reads arguments of its choice and computes nothing.
+    holds
+        ``holds(folder, read)``: returns whether a folder holds what ``check`` read, to go on in it.
+    asked
+        Function whose arguments command and form ask for, and which they call, where these are not
+        the public ones.
+    """
+
+    def declare(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
+        public = answering(function)
+        called = public if asked is None else asked
+        arguments = tuple(_arguments(function if asked is None else asked))
+        setattr(public, "__signature__", _bare_signature(function))  # noqa: B010
+        made = tuple(Command(each) if isinstance(each, str) else each for each in commands)
+        takes = frozenset(inspect.signature(called).parameters)
+        case = UseCase(public, called, arguments, made, form, check, holds, takes)
+        for each in arguments:
+            if not each.is_positional:
+                name_flag(each.argument, each.flag)
+        DECLARED[case.name] = case
+        return public
+
+    return declare
+
+
+def _arguments(function: Callable[..., Any]) -> list[Argument]:
+    found = []
+    for name, each in inspect.signature(function).parameters.items():
+        if get_origin(each.annotation) is Annotated:
+            kind, ask = get_args(each.annotation)[:2]
+            found.append(Argument(name, ask, kind, each.default, each.kind is each.VAR_POSITIONAL))
+    return found
+
+
+def _bare_signature(function: Callable[..., Any]) -> inspect.Signature:
+    """Return a signature with types alone, as texts: what `help` and checks of arguments read."""
+    written = inspect.signature(function)
+    bare = [p.replace(annotation=_bare(p.annotation)) for p in written.parameters.values()]
+    return written.replace(parameters=bare)
+
+
+def _bare(annotation: Any) -> str:
+    kind = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
+    if isinstance(kind, str | ForwardRef):
+        return kind if isinstance(kind, str) else kind.__forward_arg__
+    return (
+        inspect.formatannotation(kind)
+        .replace("typing.", "")
+        .replace("pathlib.", "")
+        .replace("collections.abc.", "")
+    )

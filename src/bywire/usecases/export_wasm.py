@@ -1,0 +1,70 @@
+"""A bench's run as WebAssembly."""
+
+from typing import TYPE_CHECKING
+
+from bywire.usecases.asks import BenchName, ExportFolder, LastBenchChanges, NeededCase
+from bywire.usecases.declare import NOTHING, Command, use_case
+
+if TYPE_CHECKING:
+    from bywire.api.export_wasm import ExportedWasm
+
+
+@use_case(Command("export wasm", writes=""))
+def export_wasm(
+    bench: BenchName,
+    out: ExportFolder,
+    overrides: LastBenchChanges = NOTHING,
+    *,
+    case: NeededCase = "",
+) -> "ExportedWasm":
+    """Write a run as WebAssembly with a loader: parameters in, recording out.
+
+    Parameters
+    ----------
+    bench
+        A `Bench`, the path of a bench file, or the name of an experiment.
+    out
+        Folder of the files; those that are there are replaced.
+    overrides
+        Changes of a bench file or experiment, as ``--set`` takes them.
+    case
+        Which run of the experiment is exported; may be left out where there is but one.
+
+    Returns
+    -------
+    ExportedWasm
+        The files: ``NAME.wasm``, ``NAME.json`` (parameters, signals, stimulus, all SI), and the
+        loader ``bywire.mjs`` with its types.
+
+    Raises
+    ------
+    InputError
+        When the bench cannot be exported, or files cannot be written.
+    CompilerError
+        Without the extra ``compiler``.
+    """
+    import os
+
+    from bywire.api.export_folder import export_folder
+    from bywire.api.export_wasm import ExportedWasm
+    from bywire.bench import bench_file
+    from bywire.bench.bench import Bench
+    from bywire.core.scratch import scratch_folder
+
+    if not isinstance(bench, Bench):
+        bench = bench_file.read(bench, overrides)
+    elif overrides:
+        bench = bench.with_overrides(overrides)
+    from bywire.export.exported import exported
+    from bywire.export.interface import identifier_of
+    from bywire.export.wasm.module import module_files
+
+    made = exported(bench, case)
+    contents = module_files(made, identifier_of(bench.name or bench.experiment))
+    with export_folder(out) as folder, scratch_folder(folder) as scratch:  # all, or none
+        for name, content in contents.items():
+            (scratch / name).write_bytes(content)
+        paths = tuple(folder / name for name in contents)
+        for path in paths:
+            os.replace(scratch / path.name, path)
+    return ExportedWasm(paths, made, len(next(iter(contents.values()))))

@@ -1,0 +1,370 @@
+"""Parameters with their confidence, from measured or simulated experiments."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from bywire.core.blas import on_one_thread
+from bywire.core.callers import option
+from bywire.core.errors import ParameterError
+from bywire.usecases.asks import (
+    CaseName,
+    Changes,
+    Inputs,
+    LastOutFolder,
+    MeaningFile,
+    ParameterSetName,
+    Time,
+)
+from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from bywire.api.identification import Identification
+    from bywire.api.trust import TrustStudy
+    from bywire.core.typing import Progress
+    from bywire.identification.fitting.question import Question
+
+_ANY_BENCH = "Methods of any bench"
+MethodName = Annotated[str, Ask("Method, see 'bywire list'.", "Method", known=("methods",))]
+Measurements = Annotated[
+    Sequence[Path],
+    Ask(
+        "Measurement files.",
+        "Measurements",
+        kind="files",
+        metavar="[MEASUREMENT]...",
+        is_positional=True,
+    ),
+]
+MethodOptions = Annotated[
+    Mapping[str, Any],
+    Ask(
+        "Its options: 'bywire list METHOD'.",
+        "Options of the method",
+        name="option",
+        metavar="KEY=VALUE",
+    ),
+]
+Starts = Annotated[
+    int | None,
+    Ask("Starts of the search: 16; with --study 1.", "Starts of the search", least=1),
+]
+Seed = Annotated[
+    int, Ask("Seed of the starts, or the study's first.", "Seed of the starts", least=0)
+]
+Synthetic = Annotated[
+    int | None,
+    Ask(
+        "Identify a simulated measurement instead.",
+        "Simulated measurement",
+        metavar="SEED",
+        least=0,
+    ),
+]
+Experiments = Annotated[
+    int | None, Ask("Try the method on many simulated ones.", metavar="COUNT", least=2)
+]
+AnyBench = Annotated[
+    Path | None,
+    Ask(
+        "Bench file (TOML), or an experiment's name.",
+        "Bench",
+        known=("experiments", "generic_experiments"),
+        offered=("benches",),
+        panel=_ANY_BENCH,
+    ),
+]
+NoisyOutputs = Annotated[
+    Mapping[str, str],
+    Ask(
+        "Measured output, its column or noise: 'p_mc=Pressure [psi] +- 0.02 bar'.",
+        "Outputs",
+        name="output",
+        kind="names",
+        metavar="SIGNAL[=COLUMN]",
+        panel=_ANY_BENCH,
+    ),
+]
+Unknowns = Annotated[
+    Mapping[str, str],
+    Ask(
+        "What is searched, e.g. 'motor.R_m=0.1..1 ohm', offset.i_meas.",
+        "Unknowns",
+        name="unknown",
+        kind="names",
+        metavar="NAME[=LOW..HIGH]",
+        panel=_ANY_BENCH,
+    ),
+]
+Priors = Annotated[
+    Mapping[str, str],
+    Ask(
+        "What is known of it, e.g. 'motor.R_m=0.35 +- 0.02 ohm'.",
+        "Known before",
+        name="prior",
+        kind="pairs",
+        metavar="NAME=VALUE+-DEV",
+        panel=_ANY_BENCH,
+    ),
+]
+States = Annotated[
+    Sequence[str],
+    Ask(
+        "State whose initial value is unknown, e.g. omega.",
+        "Unknown initial values",
+        name="estimate_start",
+        metavar="STATE",
+        panel=_ANY_BENCH,
+    ),
+]
+Loss = Annotated[
+    str,
+    Ask(
+        "linear, soft_l1, huber or cauchy.",
+        "Loss",
+        words=("linear", "soft_l1", "huber", "cauchy"),
+        panel=_ANY_BENCH,
+    ),
+]
+Holdout = Annotated[
+    Path | None,
+    Ask(
+        "Measurement that is not fitted: validation.",
+        "Measurement for validation",
+        kind="file",
+        panel=_ANY_BENCH,
+    ),
+]
+
+
+def _asked(
+    method: MethodName,
+    measurements: Measurements = (),
+    mapping: MeaningFile = None,
+    time: Time = "",
+    parameters: ParameterSetName = "",
+    overrides: Changes = NOTHING,
+    options: MethodOptions = NOTHING,
+    starts: Starts = None,
+    seed: Seed = 1,
+    synthetic: Synthetic = None,
+    study: Experiments = None,
+    bench: AnyBench = None,
+    inputs: Inputs = NOTHING,
+    outputs: NoisyOutputs = NOTHING,
+    unknowns: Unknowns = NOTHING,
+    priors: Priors = NOTHING,
+    states: States = (),
+    case: CaseName = "",
+    loss: Loss = "",
+    holdout: Holdout = None,
+    out: LastOutFolder = None,
+    progress: "Progress | None" = None,
+) -> "Identification | TrustStudy":
+    """Identify parameters, or try a method on many simulated experiments.
+
+    A command names what a `Question` holds one by one.
+    """
+    from bywire.api.trust import trust
+    from bywire.identification.fitting.question import Question
+
+    question = Question(bench, inputs, outputs, unknowns, priors, states, case, holdout, loss)
+    shared: dict[str, Any] = {
+        "parameters": parameters,
+        "overrides": overrides,
+        "question": question,
+        "options": options,
+        "seed": seed,
+        "folder": out,
+        "progress": progress,
+    }
+    if study is None:
+        return identify(
+            method,
+            measurements,
+            mapping=mapping,
+            time=time,
+            starts=starts or 16,
+            synthetic=synthetic,
+            **shared,
+        )
+    if measurements or synthetic is not None:
+        raise ParameterError(
+            f"{method}: give only one of measurement files, {option('synthetic')} SEED, "
+            f"{option('study')} COUNT"
+        )
+    for name, value in {"mapping": mapping, "time": time or None, "holdout": holdout}.items():
+        if value is not None:
+            raise ParameterError(f"{option(name)} is for measurement files: leave it out")
+    return trust(method, study, starts=starts or 1, **shared)
+
+
+@use_case(
+    Command("identify", status_1="if a check fails"),
+    form=Form(
+        "Identify parameters",
+        "Identify",
+        "method",
+        fields=(
+            "method",
+            "measurements",
+            "synthetic",
+            "map",
+            "time",
+            "bench",
+            "input",
+            "output",
+            "unknown",
+            "prior",
+            "estimate_start",
+            "holdout",
+            "loss",
+            "case",
+            "option",
+            "starts",
+            "seed",
+            "parameters",
+            "set",
+        ),
+    ),
+    asked=_asked,
+)
+@on_one_thread()
+def identify(
+    method: str,
+    measurements: "str | Path | xr.Dataset | Sequence[str | Path | xr.Dataset]" = (),
+    parameters: str = "",
+    overrides: Mapping[str, Any] = NOTHING,
+    *,
+    question: "Question | None" = None,
+    mapping: str | Path | None = None,
+    time: str = "",
+    options: Mapping[str, Any] = NOTHING,
+    starts: int = 16,
+    seed: int = 1,
+    synthetic: int | None = None,
+    folder: str | Path | None = None,
+    progress: "Progress | None" = None,
+) -> "Identification":
+    """Identify parameters with their confidence from measurements.
+
+    Parameters
+    ----------
+    method
+        Name of the method, see ``bywire list``.
+    measurements
+        A measurement or several records of it: files, or what `bywire.read_measurement` gives.
+    parameters, overrides
+        Parameter set from which the search begins (of the method's brake, the main one by
+        default), and what of it is changed: SI numbers, or texts with units.
+    question
+        For methods of any bench: which one, what is measured there, and what is unknown. Of a
+        method of a brake's own, ``outputs`` may name the columns of its signals.
+    mapping
+        File that says what the columns of measurement files mean.
+    time
+        Column of the instants, such as ``"Zeit [s]"``, or a sample rate; that of the file by
+        default.
+    options
+        Options of the method, likewise.
+    starts, seed
+        Starts of the search, and the seed of all but the first.
+    synthetic
+        Seed of a simulated measurement, which is identified in place of a measured one.
+    folder
+        Where the result will be written: a folder with the result of another method is refused, an
+        earlier result is removed, and finished starts are kept there, so that an interrupted
+        search goes on.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Returns
+    -------
+    Identification
+        Parameters in SI units with their 95 % intervals, the checks of the result, and what it was
+        identified from.
+
+    Raises
+    ------
+    InputError
+        When something that is asked for does not fit, or a measurement cannot be used.
+    KeyboardInterrupt
+        When interrupted.
+
+    Examples
+    --------
+    >>> import bywire
+    >>> found = bywire.identify("seal-friction", synthetic=1)
+    >>> found.holds
+    True
+    >>> list(found.tables()["Seal friction"]["parameter"])
+    ['A', 'F_0', 'f']
+    """
+    from bywire.api import earlier_result
+    from bywire.api.identification import Identification
+    from bywire.api.identify import (
+        STARTS,
+        begun_at,
+        data_of,
+        far_off,
+        require_one_source,
+        search,
+        start_of,
+    )
+    from bywire.api.method_choice import Source, choose, columns_of
+    from bywire.data.file_format import no_progress
+    from bywire.identification.fitting.question import Question
+    from bywire.identification.method import Effort
+    from bywire.identification.trust import put_in
+
+    question = Question() if question is None else question
+    sources = [measurements] if isinstance(measurements, Source) else list(measurements)
+    shown = no_progress if progress is None else progress
+    chosen = choose(
+        method,
+        parameters,
+        overrides,
+        options,
+        question,
+        measurements=sources,
+        mapping=mapping,
+        time=time,
+        progress=shown,
+    )
+    named = columns_of(chosen.method, question, time)
+    require_one_source(chosen, sources, synthetic, mapping, time)
+    place = None if folder is None else Path(folder)
+    if place is not None:
+        earlier_result.require_own(place, method)
+    data, source = data_of(chosen, sources, mapping, named, synthetic, shown)
+    files = tuple(
+        Path(each) for each in (*sources, question.holdout) if isinstance(each, str | Path)
+    )
+    if place is not None:
+        earlier_result.remove(place, files)
+    start = start_of(chosen, synthetic)
+    store = None if place is None else place / STARTS
+    effort = Effort(starts=starts, seed=seed, store=store, progress=shown)
+    identified = search(chosen, start, data.data, effort)
+    notes = [*data.notes]
+    if chosen.par is not None:
+        notes += far_off(identified.parameters, chosen.par.leaves())
+    truth: Mapping[str, float] = {}
+    if synthetic is not None:
+        try:
+            truth = put_in(chosen.method, chosen.par, chosen.options)
+        except ParameterError as error:
+            notes.append(str(error))
+    return Identification(
+        chosen,
+        identified,
+        data.data,
+        source,
+        begun_at(chosen, start, identified),
+        truth,
+        tuple(notes),
+        synthetic is not None,
+        files,
+    )

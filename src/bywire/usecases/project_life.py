@@ -1,0 +1,86 @@
+"""How a brake wears over thousands of stops, and when its life ends."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from bywire.usecases.asks import BenchChanges
+from bywire.usecases.declare import NOTHING, Ask, Form, use_case
+
+if TYPE_CHECKING:
+    from bywire.api.life import LifeResult
+    from bywire.core.typing import Progress
+    from bywire.life.life_file import LifePlan
+
+LifeName = Annotated[
+    str | Path,
+    Ask(
+        "Life file (TOML), or the name of a life.",
+        "Life",
+        name="life",
+        known=("lives",),
+        files=".toml",
+        offered=("lives",),
+    ),
+]
+CheckedStops = Annotated[
+    int,
+    Ask("Stops to run one by one as well, to check the projection.", "Stops one by one", least=0),
+]
+
+
+def _read(source: str | Path, overrides: Mapping[str, str], check: int) -> "LifePlan":
+    from bywire.api.life import require_checkable
+    from bywire.life.life_file import read_life
+
+    plan = read_life(source, overrides)
+    require_checkable(check, plan)
+    return plan
+
+
+@use_case("life", form=Form("Life", "Project", "life"), check=_read)
+def project_life(
+    source: LifeName,
+    overrides: BenchChanges = NOTHING,
+    *,
+    check: CheckedStops = 0,
+    progress: "Progress | None" = None,
+) -> "LifeResult":
+    """Project how a brake wears over thousands of stops, and when its life ends.
+
+    Parameters
+    ----------
+    source
+        Life file, see ``docs/life.md``; or the name of a life.
+    overrides
+        Changes of the bench, of wear (``wear.NAME``) and of what is between stops
+        (``stop.NAME``), as texts with units.
+    check
+        Stops that are also run one by one, to check the projection, in whole rounds of the
+        population; none by default.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Returns
+    -------
+    LifeResult
+        Stops until the end, with an interval; slow states after every stop in SI units.
+
+    Raises
+    ------
+    InputError
+        For a life file that does not fit, and a brake that is at its end from the start.
+    RunError
+        When a run fails, or a stop lacks a key figure that wear is computed from.
+    KeyboardInterrupt
+        When interrupted.
+    """
+    from bywire.api.life import LifeResult
+    from bywire.core.typing import silent
+    from bywire.life.projection import one_by_one, projected
+
+    shown = progress or silent
+    plan = _read(source, overrides, check)
+    made = projected(plan, shown)
+    rounds = min(check, made.stops) // plan.count
+    return LifeResult(made, one_by_one(plan, rounds * plan.count, shown) if rounds else {})

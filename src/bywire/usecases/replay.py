@@ -1,0 +1,176 @@
+"""A measured demand that drives the model, compared with what was measured."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from bywire.usecases.asks import (
+    BENCH_CHANGES,
+    CaseName,
+    ErrorEstimate,
+    Inputs,
+    MeaningFile,
+    TestBench,
+    Time,
+)
+from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from bywire.api.replay_answer import Replay
+    from bywire.core.typing import Progress
+
+MeasurementFile = Annotated[
+    "str | Path | xr.Dataset", Ask("Measurement file.", "Measurement", kind="file")
+]
+ModelChanges = Annotated[Mapping[str, Any], BENCH_CHANGES]
+Outputs = Annotated[
+    Sequence[str] | Mapping[str, str],
+    Ask(
+        "What is compared, e.g. 'p_mc=Pressure [psi]'; by default all.",
+        "Outputs",
+        name="output",
+        kind="names",
+        metavar="SIGNAL[=COLUMN]",
+    ),
+]
+Tolerances = Annotated[
+    Sequence[str],
+    Ask(
+        "Tolerance, e.g. 'nrmse <= 5 %', 'p_mc.max_error <= 2 bar'.", "Tolerances", name="tolerance"
+    ),
+]
+Segments = Annotated[
+    str | Path,
+    Ask(
+        "Judge stretches: auto (steps and holds), or a TOML file.",
+        "Judge steps and holds each for itself",
+        is_text=True,
+        ticked="auto",
+    ),
+]
+Tracked = Annotated[
+    Sequence[str], Ask("Track a drifting parameter as well, e.g. mu_B.", "Drifting parameters")
+]
+
+
+def _read(bench: Path, overrides: Mapping[str, Any]) -> None:
+    from bywire.bench import bench_file
+
+    bench_file.read(bench, overrides)
+
+
+@use_case(
+    Command("replay", status_1="if a tolerance is missed", first=("measurement", "bench", "map")),
+    form=Form(
+        "Replay a measurement",
+        "Replay",
+        fields=(
+            "bench",
+            "measurement",
+            "input",
+            "output",
+            "tolerance",
+            "map",
+            "time",
+            "case",
+            "segments",
+            "track",
+            "set",
+        ),
+        is_listed=False,
+    ),
+    check=_read,
+)
+def replay(
+    measurement: MeasurementFile,
+    bench: TestBench,
+    overrides: ModelChanges = NOTHING,
+    *,
+    mapping: MeaningFile = None,
+    inputs: Inputs = NOTHING,
+    outputs: Outputs = (),
+    time: Time = "",
+    case: CaseName = "",
+    tolerances: Tolerances = (),
+    segments: Segments = "",
+    track: Tracked = (),
+    progress: "Progress | None" = None,
+    estimate_error: ErrorEstimate = True,
+) -> "Replay":
+    """Drive the model with a measured demand and compare.
+
+    Parameters
+    ----------
+    measurement
+        A file, or what `bywire.read_measurement` gives.
+    bench, overrides
+        A `Bench`, the path of a bench file, or an experiment's name; and what of it is changed,
+        as ``--set`` takes it.
+    mapping
+        File that says what the columns of a measurement file mean.
+    inputs
+        Stimulus of the model -> measured signal, or column such as ``"Demand [bar]"``; by default
+        all of the same name.
+    outputs
+        What is compared; by default all that are measured and tell how well the model fits. A
+        mapping names their columns: ``{"p_mc": "Pressure [psi]"}``, empty for the same name.
+    time
+        Column of the instants, such as ``"Zeit [s]"``, or a sample rate; that of the file by
+        default.
+    case
+        Run of the experiment; the first by default.
+    tolerances
+        Such as ``"nrmse <= 5 %"`` or ``"p_mc.max_error <= 2 bar"``.
+    segments
+        Stretches that are judged: ``"auto"`` for steps and holds, or a TOML file; by default the
+        whole record.
+    track
+        Parameters that drift and are tracked, for instance ``"mu_B"``.
+    progress
+        Called with a label and the finished share, 0 to 1.
+    estimate_error
+        Whether the model runs in half and double steps too, for the error of the figures from the
+        step. A tolerance that is closer than this error is undecided, neither met nor missed.
+
+    Returns
+    -------
+    Replay
+        Measurement and model by signal, in SI units, with the figures of their difference.
+
+    Raises
+    ------
+    InputError
+        When something that is asked for does not fit, or the measurement cannot be used.
+    """
+    from bywire.api.replay import columns_of_bench, driven_bench, stretches_of, units_of
+    from bywire.api.replay_answer import Replay
+    from bywire.data.file_format import no_progress
+    from bywire.identification.measured import measured, name_of
+    from bywire.identification.replaying import bench_replay, tracking
+    from bywire.identification.replaying.bench_replay import case_of
+    from bywire.identification.replaying.fit import judged
+    from bywire.identification.replaying.tolerances import read_tolerances
+
+    shown = no_progress if progress is None else progress
+    driven = driven_bench(bench, overrides)
+    limits = read_tolerances(tolerances)
+    columns = {n: c for n, c in outputs.items() if c} if isinstance(outputs, Mapping) else {}
+    units = units_of(case_of(driven, case).model, inputs, outputs)
+    named = columns_of_bench(inputs, columns, time, units)
+    read = measured([measurement], mapping, gaps=True, named=named, progress=shown)
+    shown("replay", 0.0)
+    replayed = bench_replay.replay(
+        driven,
+        read.data,
+        inputs or None,
+        list(outputs) or None,
+        case,
+        estimate_error=estimate_error,
+    )
+    shown("replay", 1.0)
+    stretches = stretches_of(segments, replayed.inputs, limits)
+    fits = judged(replayed.outputs, stretches, replayed.others)
+    tracks = [tracking.track(name, read.data, replayed.run.par) for name in track]
+    return Replay(driven, name_of(measurement), replayed, fits, tuple(tracks), tuple(read.notes))

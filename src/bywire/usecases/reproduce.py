@@ -1,0 +1,49 @@
+"""A paper's tables and figures: stated, computed, agrees or not."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+from bywire.core.blas import on_one_thread
+from bywire.usecases.declare import Ask, Form, use_case
+
+if TYPE_CHECKING:
+    from bywire.core.typing import Progress
+    from bywire.reproduction.reproduction import Reproduction
+
+
+def _sources() -> Sequence[str]:
+    from bywire.reproduction.reproduction import SOURCES
+
+    return sorted(SOURCES.all())
+
+
+SourceName = Annotated[str, Ask("Published source, e.g. dardanelli2010.", "Source", words=_sources)]
+
+
+@use_case("reproduce", form=Form("Reproduce a source", "Reproduce", "source"))
+@on_one_thread()
+def reproduce(source: SourceName, *, progress: "Progress | None" = None) -> "Reproduction":
+    """Make a paper's tables and figures: stated, computed, agrees or not.
+
+    Parameters
+    ----------
+    source
+        Name of the source, for instance ``"dardanelli2010"``.
+    progress
+        Called with the label of a table or figure and its finished share, 0 to 1.
+
+    Returns
+    -------
+    Reproduction
+        What is stated beside what is computed, each in the unit of the statement.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known sources.
+    RunError
+        When a run fails.
+    """
+    from bywire.reproduction.reproduction import SOURCES
+
+    return SOURCES.find(source).reproduce(progress)

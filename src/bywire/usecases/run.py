@@ -1,0 +1,150 @@
+"""A bench or an experiment, run and judged."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, overload
+
+from bywire.core.callers import option
+from bywire.core.errors import InputError
+from bywire.usecases.asks import BenchChanges, BenchName, ErrorEstimate
+from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
+
+if TYPE_CHECKING:
+    from bywire.api.run import BenchResult
+    from bywire.api.run_over import BenchRange
+    from bywire.bench.bench import Bench
+    from bywire.core.typing import Progress
+
+Over = Annotated[str, Ask("Run for each value, e.g. motor.R_m=0.2ohm:0.6ohm:9.")]
+Faults = Annotated[
+    Sequence[str],
+    Ask(
+        "What fails, see 'bywire list faults'.",
+        "Faults",
+        name="fault",
+        metavar="NAME[=VALUE][@ONSET]",
+    ),
+]
+Engine = Annotated[str, Ask("What computes, e.g. sil: the ECU's compiled C in the loop.")]
+Animate = Annotated[bool, Ask("Write pages that play the runs, with --out.")]
+
+
+def _read(bench: Path, overrides: Mapping[str, str], faults: Sequence[str]) -> None:
+    from bywire.api.run import faulty
+    from bywire.bench import bench_file
+
+    _ = faulty(bench_file.read(bench, overrides), faults).injections
+
+
+def _require_folder(animate: bool, out: Path | None, **others: Any) -> None:
+    del others
+    if animate and out is None:
+        raise InputError(f"{option('animate')} writes into a folder: give one by {option('out')}")
+
+
+@overload
+def run(
+    bench: "Bench | str | Path",
+    overrides: Mapping[str, str] = ...,
+    *,
+    faults: Sequence[str] = ...,
+    progress: "Progress | None" = None,
+    engine: str = "auto",
+    estimate_error: bool = True,
+    animate: bool = ...,
+) -> "BenchResult": ...
+
+
+@overload
+def run(
+    bench: "Bench | str | Path",
+    overrides: Mapping[str, str] = ...,
+    *,
+    over: str,
+    faults: Sequence[str] = ...,
+    progress: "Progress | None" = None,
+    engine: str = "auto",
+    estimate_error: bool = True,
+    animate: bool = ...,
+) -> "BenchRange": ...
+
+
+@use_case(
+    Command("run", status_1="unless every requirement is met", before=_require_folder),
+    form=Form("Run with Python", "Run", fields=("bench", "set", "fault"), is_listed=False),
+    check=_read,
+)
+def run(
+    bench: BenchName,
+    overrides: BenchChanges = NOTHING,
+    *,
+    over: Over = "",
+    faults: Faults = (),
+    progress: "Progress | None" = None,
+    engine: Engine = "auto",
+    estimate_error: ErrorEstimate = True,
+    animate: Animate = False,
+) -> "BenchResult | BenchRange":
+    """Run a bench file or an experiment.
+
+    Parameters
+    ----------
+    bench
+        What is tested: a `Bench`, the path of a bench file, or the name of an experiment, which
+        is then run with its defaults and the main parameter set of its brake.
+    overrides
+        Changes of a bench file or experiment, as ``--set`` takes them.
+    over
+        Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"options.p_to=20 bar, 30 bar"``:
+        the values run side by side, and the result is a `BenchRange`.
+    faults
+        What fails beside what the bench says, as ``--fault`` takes it, for instance
+        ``"pressure.stuck=20 bar@1 s"``.
+    progress
+        Called with the run's label and its finished share, 0 to 1.
+    engine
+        ``compiled``, ``virtual-machine``, or the compiled C of the ECU in the loop, ``sil``
+        (double precision) or ``sil-single``; ``auto`` is what the bench says.
+    estimate_error
+        Whether all runs are made in half and double steps too, for the error from the step of key
+        figures and recorded signals. A requirement that is closer to its limit than this error
+        is undecided, neither met nor missed.
+    animate
+        Whether the result's folder gets a page that plays each run, where its assembly has one.
+
+    Returns
+    -------
+    BenchResult
+        Recordings and key figures in SI units, verdicts on what was required, books of energy in J.
+    BenchRange
+        Over a range: the same of every value.
+
+    Raises
+    ------
+    InputError
+        When the experiment cannot be set up.
+    RunError
+        When a run fails.
+    """
+    from dataclasses import fields
+
+    from bywire.api.run import BenchResult, faulty
+    from bywire.bench import bench_file, running
+    from bywire.bench.bench import Bench
+
+    if not isinstance(bench, Bench):
+        bench = bench_file.read(bench, overrides)
+    elif overrides:
+        bench = bench.with_overrides(overrides)
+    bench = faulty(bench, faults)
+    if animate:
+        from bywire.api.animation import require_scene
+
+        require_scene(bench, over)
+    if over:
+        from bywire.api.run_over import run_over
+
+        return run_over(bench, over, progress, engine, estimate_error)
+    result = running.run(bench, progress, engine, estimate_error)
+    given = {each.name: getattr(result, each.name) for each in fields(result)}
+    return BenchResult(**given, animated=animate)

@@ -1,0 +1,96 @@
+"""A campaign of faults, which continues fault by fault."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from bywire.usecases.asks import BenchChanges, LastOutFolder
+from bywire.usecases.declare import NOTHING, Ask, Form, use_case
+
+if TYPE_CHECKING:
+    from bywire.api.run_faults import FaultCampaign
+    from bywire.campaigns.plan import CampaignPlan
+    from bywire.core.typing import Progress
+
+CampaignName = Annotated[
+    str | Path,
+    Ask(
+        "Campaign file (TOML), or a campaign's name, e.g. motorcycle.",
+        "Campaign",
+        known=("campaigns",),
+        files=".toml",
+        offered=("campaigns",),
+        is_text=True,
+    ),
+]
+
+
+def _read(campaign: str | Path, overrides: Mapping[str, str]) -> "CampaignPlan":
+    from bywire.campaigns.campaign_file import read_campaign
+
+    return read_campaign(campaign, overrides)
+
+
+def _holds(folder: Path, plan: "CampaignPlan") -> bool:
+    from bywire.campaigns.running import CampaignStore
+
+    return CampaignStore(folder).holds(plan)
+
+
+@use_case(
+    "faults",
+    form=Form("Fault campaign", "Run, or go on", "campaign"),
+    check=_read,
+    holds=_holds,
+)
+def run_faults(
+    campaign: CampaignName,
+    out: LastOutFolder = None,
+    overrides: BenchChanges = NOTHING,
+    *,
+    progress: "Progress | None" = None,
+) -> "FaultCampaign":
+    """Let every part fail in a maneuver: what it does, when it is seen, what is covered.
+
+    Parameters
+    ----------
+    campaign
+        Campaign file, see ``docs/faults.md``; or the name of one that comes with a brake.
+    out
+        Folder in which outcomes are kept, so that the same call goes on after an interrupt;
+        nothing is kept by default.
+    overrides
+        Changes of the bench, as texts with units.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Returns
+    -------
+    FaultCampaign
+        Of every fault its effect, fault tolerant time, time to detection [s] and class;
+        diagnostic coverage, false alarms.
+
+    Raises
+    ------
+    InputError
+        For a campaign that does not fit, and a folder that holds another one.
+    RunError
+        When a run fails.
+    KeyboardInterrupt
+        When interrupted; finished faults stay in the folder.
+    """
+    from bywire.api.run_faults import FaultCampaign
+    from bywire.campaigns.running import CampaignStore, complete
+    from bywire.core.typing import silent
+
+    plan = _read(campaign, overrides)
+    store = CampaignStore(None if out is None else Path(out))
+    try:
+        return FaultCampaign(complete(plan, store, progress or silent), store.folder)
+    except KeyboardInterrupt:
+        if store.folder is None:
+            raise
+        kept = sum(store.kept(number) is not None for number in range(len(plan.faults)))
+        raise KeyboardInterrupt(
+            f"{kept} of {len(plan.faults)} faults are kept: the same command goes on"
+        ) from None

@@ -1,0 +1,103 @@
+"""Designs of a brake compared at equal demands: a sizing study."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from bywire.core.blas import on_one_thread
+from bywire.core.errors import UnknownNameError, unknown_name
+from bywire.usecases.asks import ParameterSetName
+from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
+
+if TYPE_CHECKING:
+    from bywire.api.study import AskedStudy, StudyResult
+    from bywire.core.typing import Progress
+
+SizingName = Annotated[
+    str, Ask("Sizing study, see 'bywire list'.", "Sizing study", known=("studies",))
+]
+SizingChanges = Annotated[
+    Mapping[str, Any],
+    Ask(
+        "Change an option or a parameter, e.g. t_90=120ms.",
+        "Changes",
+        name="set",
+        metavar="KEY=VALUE",
+    ),
+]
+
+
+def _read(name: str, parameters: str, overrides: Mapping[str, Any]) -> "AskedStudy":
+    from bywire.api.study import asked_study
+
+    return asked_study(name, parameters, overrides)
+
+
+def _require_sizing(name: str, **others: Any) -> None:
+    """Refuse a word that is no sizing study, with what was perhaps meant: a study file."""
+    from bywire.core.brake import loaded_files
+    from bywire.studies.meant_study import meant_study
+    from bywire.synthesis.study import STUDIES
+
+    del others
+    if STUDIES.get(name) is not None:
+        return
+    file = meant_study(Path(name))
+    if file is not None:
+        raise UnknownNameError(
+            f"unknown sizing study {name!r}: the study file {file} is run by 'bywire study run "
+            f"{file}'"
+        )
+    if loaded_files():
+        raise STUDIES.unknown(name)  # with how a brake of one's own declares one
+    error = str(unknown_name("sizing study", name, STUDIES.all()))
+    more = (
+        "; one of a brake of your own takes --system PATH, and a study file is run by 'bywire "
+        "study run FILE'"
+    )
+    raise UnknownNameError(error if error.endswith("?") else error + more)
+
+
+@use_case(
+    Command("study size", before=_require_sizing),
+    form=Form("Sizing study", "Compare designs", "name", name="size"),
+    check=_read,
+)
+@on_one_thread()
+def study(
+    name: SizingName,
+    parameters: ParameterSetName = "",
+    overrides: SizingChanges = NOTHING,
+    *,
+    progress: "Progress | None" = None,
+) -> "StudyResult":
+    """Compare designs of a brake at equal demands: the best, what limits it, at what price.
+
+    Parameters
+    ----------
+    name
+        Name of the study.
+    parameters
+        Parameter set; the main one of the study's brake by default.
+    overrides
+        Changes: names with a dot are the brake's parameters, others the study's options; SI
+        numbers, or texts with units.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Returns
+    -------
+    StudyResult
+        The designs with their figures in SI units, the best, and what limits it.
+
+    Raises
+    ------
+    InputError
+        For names that are unknown, values out of range, and changes without effect.
+    """
+    from bywire.api.study import StudyResult
+    from bywire.core.typing import silent
+
+    definition, named, par, options = _read(name, parameters, overrides)
+    findings = definition.compute(par, options, progress or silent)
+    return StudyResult(definition, named, par, options, findings)

@@ -1,0 +1,84 @@
+"""Key figures between the cases of a study, by polynomials."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+from bywire.usecases.asks import StudyFolder, require_study_folder
+from bywire.usecases.declare import NOTHING, Ask, Command, use_case
+
+if TYPE_CHECKING:
+    from bywire.api.study_surrogate import StudySurrogates
+
+KeyFigures = Annotated[
+    str | Sequence[str],
+    Ask("Key figure; by default those of requirements.", name="kpi", metavar="NAME"),
+]
+Values = Annotated[
+    Mapping[str, Any],
+    Ask("Tell the figures here, e.g. motor.R_m=0.4ohm.", metavar="KEY=VALUE"),
+]
+
+
+@use_case(Command("study surrogate", before=require_study_folder, writes=""))
+def study_surrogates(
+    folder: StudyFolder,
+    kpis: KeyFigures = (),
+    at: Values = NOTHING,
+) -> "StudySurrogates":
+    """Tell key figures between the cases of a study by polynomials, with their error.
+
+    Parameters
+    ----------
+    folder
+        Folder of the study.
+    kpis
+        Key figure, or several; by default those that something is required of, or all.
+    at
+        Values of what varies at which to tell them: SI numbers, texts with units, or changes such
+        as ``"+5 %"`` of what the bench has; the others as in the bench.
+
+    Returns
+    -------
+    StudySurrogates
+        Each surrogate with its error in the key figure's unit; ``.surrogates["overshoot"]`` is
+        called with values or arrays [SI].
+
+    Raises
+    ------
+    InputError
+        When the folder holds no study, for names that are unknown, values beyond what the cases
+        have shown, or between those of a quantity that has single ones, too few cases, designs that
+        do not show what lies between their points, and structural choices among what varies.
+    """
+    from bywire.api.run_study import kept_study
+    from bywire.api.study_surrogate import StudySurrogates
+    from bywire.api.study_tables import shown_figures
+    from bywire.bench.relative_changes import share_of
+    from bywire.core.errors import ParameterError, unknown_name
+    from bywire.core.values import number
+    from bywire.studies.surrogate import Surrogate, require_fittable, surrogate_of
+
+    report = kept_study(folder)
+    require_fittable(report.plan)  # before values are read: those of a choice are no numbers
+    findings = report.findings
+    quantities = {v.name: v for v in report.plan.varied}
+    values: dict[str, float] = {}
+    for name, text in at.items():
+        if name not in quantities:
+            raise unknown_name("quantity of the study", name, quantities)
+        share = share_of(text)
+        change = (1.0 + share) * quantities[name].nominal if share is not None else text
+        values[name] = number(change, quantities[name].unit or "1", name)
+    surrogates: dict[str, Surrogate] = {}
+    refused: dict[str, str] = {}
+    wanted = [kpis] if isinstance(kpis, str) else kpis
+    required = [each.figure for each in report.plan.demands]
+    for kpi in wanted or shown_figures(findings) or required:
+        try:
+            surrogates[kpi] = surrogate_of(findings, kpi)
+        except ParameterError as error:
+            refused[kpi] = str(error)
+    if not surrogates:
+        why = "; ".join(dict.fromkeys(refused.values()))
+        raise ParameterError(why or f"{folder}: no case is computed yet")
+    return StudySurrogates(report, surrogates, values, refused)
