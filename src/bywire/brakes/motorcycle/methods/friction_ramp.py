@@ -302,8 +302,7 @@ def identify(
 
     References
     ----------
-    Dardanelli, Alli, Savaresi (2010), section 4.1; the loss is ours, see
-    ``bywire.brakes.motorcycle.methods.stick_slip.loss``.
+    Dardanelli, Alli, Savaresi (2010), section 4.1; the loss is ours, see `SlipLoss`.
     """
     shots = shots_of(data, options)
     require_reachable(shots, par)
