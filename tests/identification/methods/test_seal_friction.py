@@ -12,8 +12,7 @@ from bywire.core.errors import ParameterError
 from bywire.identification.confidence import uncertainty
 from bywire.identification.measured import joined, measured, split
 from bywire.identification.method import Effort
-from bywire.identification.methods.seal_friction import METHOD
-from bywire.identification.strokes import velocity
+from bywire.identification.methods.seal_friction import METHOD, velocity
 from bywire.identification.trust import trust
 
 MEASURED = Path(__file__).parents[4] / "shared" / "data" / "seal_friction"

@@ -187,6 +187,7 @@ def told(source: LoopSource) -> dict[str, Any]:
 _SCRIPTS = ("values.js", "controls.js", "curves.js", "bode.js", "bench.js")
 _WORKER = ("unpack.js", "figures.js", "loops.js", "margins.js", "worker.js")
 _NAME = "run"  # of the module, inside the page
+_MARGIN_UNITS = {"1": ("", 1.0), "s": ("ms", 1e3)}  # unit and factor, where not as they are
 # SI unit, exponents of kg, m, s, A, K, rad, and what people write for it.
 _UNITS = (
     ("1", (0, 0, 0, 0, 0, 0), "%"),
