@@ -251,8 +251,8 @@ class _Writer:
     def translated(self) -> Function:
         """Return the function in C."""
         node = self.node
-        if not isinstance(node, ast.FunctionDef):
-            self.refuse(node, "only a function is")
+        if not isinstance(node, ast.FunctionDef) or node.name != self.function.__name__:
+            self.refuse(node, "it is not a function, or its file was changed since it was loaded")
         a = node.args
         for each in (a.vararg, a.kwarg, *a.kwonlyargs, *a.posonlyargs):
             if each is not None:
