@@ -29,6 +29,18 @@ def is_command_line() -> bool:
     return bool(_commands)
 
 
+def flags() -> dict[str, str] | None:
+    """Return the flags that messages name, for a process that helps with a command."""
+    return dict(_flags) if _commands else None
+
+
+def speak_in(flags: dict[str, str] | None) -> None:
+    """Have this process word its messages as the one that started it does, see `flags`."""
+    if flags is not None:
+        _flags.update(flags)
+        _commands.append(None)
+
+
 def name_flag(argument: str, flag: str) -> None:
     """Declare which flag stands for an argument: the same one in every command.
 

@@ -21,7 +21,7 @@ from typing import Any
 
 from bywire.core.blas import keep_one_thread
 from bywire.core.brake import load_brakes, loaded_files
-from bywire.core.callers import is_command_line
+from bywire.core.callers import flags, is_command_line, speak_in
 from bywire.core.child_process import safe_start
 from bywire.core.errors import RunError
 
@@ -142,7 +142,10 @@ def processes_with_brakes(
     is_copied = may_copy()
     files = () if is_copied else loaded_files()  # a copy has them
     try:
-        with processes(count, _know, files, prepare, *arguments, is_copied=is_copied) as pool:
+        words = None if is_copied else flags()  # likewise
+        with processes(
+            count, _know, files, words, prepare, *arguments, is_copied=is_copied
+        ) as pool:
             yield pool
     except BrokenProcessPool:
         raise RunError(
@@ -150,8 +153,14 @@ def processes_with_brakes(
         ) from None
 
 
-def _know(files: Sequence[str], prepare: Callable[..., object] | None, *arguments: Any) -> None:
+def _know(
+    files: Sequence[str],
+    words: dict[str, str] | None,
+    prepare: Callable[..., object] | None,
+    *arguments: Any,
+) -> None:
     load_brakes(files)
+    speak_in(words)
     if prepare is not None:
         prepare(*arguments)
 

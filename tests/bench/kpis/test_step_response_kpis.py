@@ -100,6 +100,10 @@ def test_what_is_not_defined_is_nan_with_a_reason():
     assert_undefined(figures(1.1 * lag, T)["settling_time"], "never settles")
     late = figures(np.minimum(0.5 * AFTER, 1.0), T)["settling_time"]
     assert_undefined(late, "before the recording ends")
+    sooner = figures(np.minimum(AFTER / 1.79, 1.0), T)["settling_time"]  # 0.12 of the time before
+    assert sooner.value == pytest.approx(0.98 * 1.79, abs=1e-3)
+    twice = np.sort(np.append(T, 2.0))
+    assert_undefined(figures(np.append(lag, 1.0), twice)["rise_time"], "times do not increase")
     assert_undefined(figures(0.5 + lag, T)["dead_time"], "already at 50 %")
     assert_undefined(figures(lag, T, window=(7.0, 8.0))["ripple"], "holds < 2 samples")
     assert_undefined(figures(lag, T, end=None, window=(7.0, 8.0))["rise_time"], "< 2 samples")

@@ -100,6 +100,8 @@ COMPUTED = {
             whole += y[k] * (k - 1) / 2
         for k in range(len(y) - 1, 0, -1):
             whole -= y[k]
+        for k in range(len(y) - 1, 2, -3):
+            whole -= k * y[k]
         for x in y:
             whole += x
         return whole
@@ -129,7 +131,9 @@ COMPUTED = {
         k = bisect_left(t, setting.level)
         n = bisect_right(t[k:], 3.0 * setting.level)
         late = y[k : k + n]
-        return integral(t[k:][:n], late) + late[-1] if len(late) > 0 else max(y[-3:][:99])
+        end = y[-3:][:99]
+        whole = integral(t[k:][:n], late) + late[-1] if len(late) > 0 else 0.0
+        return whole + max(end) + len(end) + len(y[5:-2]) + len(y[9:4]) + min(y[-99:2])
     """,
     "lists": """
         twice = [2.0 * x for x in y[1:]]

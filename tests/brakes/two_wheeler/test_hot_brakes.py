@@ -9,8 +9,8 @@ from bywire.bench.experiment import as_run
 from bywire.bench.kpis import vehicle_stop
 from bywire.brakes.two_wheeler.case import rolling_case
 from bywire.brakes.two_wheeler.experiments import repeated_stops
+from bywire.brakes.two_wheeler.experiments.repeated_stops import WARM, cooled
 from bywire.brakes.two_wheeler.panels import PANELS
-from bywire.brakes.two_wheeler.stop_series import WARM, cooled
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.plant import disc_heat
 from bywire.report.time_traces import drawable

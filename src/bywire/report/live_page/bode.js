@@ -1,18 +1,13 @@
 /* Bode diagrams of the bench's loops with their margins, drawn when the sliders rest. */
 
 const LEAST = { decibel: -80, phase: -450 }; // below, nothing is decided
-const MARGINS = [ // name, title, unit, factor
-  ["gain", "gain margin", "", 1], ["lower_gain", "lower gain margin", "", 1], ["phase", "phase margin", "deg", 1], ["crossover", "crossover", "Hz", 1],
-  ["delay", "delay margin", "ms", 1e3], ["disk", "disk margin", "", 1],
-  ["sensitivity", "max |S|", "", 1], ["complementary", "max |T|", "", 1],
-];
 
-/** Return the margins in words, or why there are none. */
-function marginText({ reason, margins }) {
+/** Return the margins in words, or why there are none; `shown`: name, title, unit and factor of each. */
+function marginText({ reason, margins }, shown) {
   if (reason) return reason;
   if (margins.hasLoop === false) return "no loop with these values: the loop gain is 0 at all frequencies";
   if (!margins.isStable) return "the loop is unstable with these values";
-  return MARGINS.filter(([name]) => !Number.isNaN(margins[name])).map(([name, title, unit, factor]) =>
+  return shown.filter(([name]) => !Number.isNaN(margins[name])).map(([name, title, unit, factor]) =>
     `${title} ${margins[name] === Infinity ? "∞" : digits(margins[name] * factor)} ${unit}`.trim()).join(", ");
 }
 
@@ -67,7 +62,7 @@ function bodeView(place, loop) {
     draw(result = now) {
       if (!result) return;
       now = result;
-      text.textContent = marginText(result);
+      text.textContent = marginText(result, loop.margins);
       figure.hidden = !result.frequency;
       if (!result.frequency) return;
       const width = Math.max(280, place.clientWidth);

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bywire.analysis.loop import LOOPS
+from bywire.analysis.margins import MARGINS
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import bench_text
 from bywire.bench.experiment import Case
@@ -149,6 +150,9 @@ def loops_of(made: Exported) -> list[LoopSource]:
     return [source for source in sources if source is not None]
 
 
+_MARGIN_UNITS = {"1": ("", 1.0), "s": ("ms", 1e3)}  # unit and factor, where not as they are
+
+
 def told(source: LoopSource) -> dict[str, Any]:
     """Return what the page must know of a loop."""
     loop = source.loop
@@ -169,6 +173,11 @@ def told(source: LoopSource) -> dict[str, Any]:
         "frame": source.frame,
         "from": loop.band[0],
         "isAnalog": loop.analog,
+        "margins": [
+            [name, figure.heading, *_MARGIN_UNITS.get(figure.unit, (figure.unit, 1.0))]
+            for name, figure in MARGINS.items()
+            if name != "bandwidth"  # which takes the closed loop
+        ],
         "cut": {"isState": is_state, "at": names.index(loop.cut)},
     }
 
@@ -178,6 +187,7 @@ def told(source: LoopSource) -> dict[str, Any]:
 _SCRIPTS = ("values.js", "controls.js", "curves.js", "bode.js", "bench.js")
 _WORKER = ("unpack.js", "figures.js", "loops.js", "margins.js", "worker.js")
 _NAME = "run"  # of the module, inside the page
+_MARGIN_UNITS = {"1": ("", 1.0), "s": ("ms", 1e3)}  # unit and factor, where not as they are
 # SI unit, exponents of kg, m, s, A, K, rad, and what people write for it.
 _UNITS = (
     ("1", (0, 0, 0, 0, 0, 0), "%"),

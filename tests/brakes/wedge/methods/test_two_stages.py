@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from bywire.brakes.wedge.methods.drive_train.cogging_waves import waves
 from bywire.brakes.wedge.methods.drive_train.force_current import Squeeze
-from bywire.brakes.wedge.methods.drive_train.two_stages import Contacts, clear_of
-from bywire.brakes.wedge.methods.stiffness import METHOD, truth
+from bywire.brakes.wedge.methods.stiffness import METHOD, Contacts, clear_of, truth
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.catalog import parameters
 from bywire.identification.method import Effort

@@ -7,8 +7,14 @@ import pytest
 
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.margins import margins
-from bywire.brakes.wedge.stability import brake, controlled, motion, neutral
-from bywire.brakes.wedge.studies.stability import DEFAULTS, compute
+from bywire.brakes.wedge.studies.stability import (
+    DEFAULTS,
+    brake,
+    compute,
+    controlled,
+    motion,
+    neutral,
+)
 from bywire.core.catalog import parameters
 
 ROUGH = DEFAULTS.replace({"coefficients": 4, "slopes": 3, "mu_B_min": 0.15, "mu_B_max": 0.75})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Annotated
 
@@ -12,9 +13,7 @@ from pydantic import Field
 
 from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.experiments import friction_ramp
-from bywire.brakes.motorcycle.methods.stick_slip.curves import replayed, stribeck_band
-from bywire.brakes.motorcycle.methods.stick_slip.loss import Noise, SlipLoss
-from bywire.brakes.motorcycle.methods.stick_slip.shooting import Shooting
+from bywire.brakes.motorcycle.methods.stick_slip.shooting import Fitted, Shooting
 from bywire.brakes.motorcycle.methods.stick_slip.shots import (
     Shot,
     cut_out,
@@ -22,20 +21,232 @@ from bywire.brakes.motorcycle.methods.stick_slip.shots import (
     require_reachable,
 )
 from bywire.brakes.motorcycle.methods.stick_slip.slips import find_slips
+from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import memory_at, state_at
+from bywire.core import ops
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Pressure, Unit
 from bywire.core.typing import Array
+from bywire.data.labeled import labeled
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.multistart import Search, nearer, search
 from bywire.identification.noise import noise_of
-from bywire.identification.output_error import even_interval
+from bywire.identification.output_error import even_interval, trial
 from bywire.identification.unknown import Unknown, parameters_of, scattered
+from bywire.plant import seal_friction
 from bywire.simulation.run import simulate
+
+# Curves that show an identified friction: over the speed with its band, and the ramp once more.
+
+_SHARE = 1e-6
+
+
+def stribeck_band(
+    par: seal_friction.Parameters, estimate: Estimate, pressures: Sequence[float], omega: Array
+) -> xr.Dataset:
+    """Return friction torque over speed at several pressures, with 95 % bands.
+
+    ``par``: the identified friction; ``estimate``: estimate of ``seal.*`` parameters;
+    ``pressures``: [Pa]; ``omega``: shaft speeds [rad/s], shape (n,).
+
+    Returns
+    -------
+    xarray.Dataset
+        ``value``, ``low``, ``high`` [N m] over ``pressure`` and ``omega``; at zero speed NaN,
+        where the friction takes any value between its breakaway torques.
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eq. (16), Fig. 4.
+    """
+    seal = [k for k, u in enumerate(estimate.unknowns) if u.name.startswith("seal.")]
+    unknowns = [estimate.unknowns[k] for k in seal]
+    names = [u.name.removeprefix("seal.") for u in unknowns]
+    value = np.array([[_torque(par, w, p) for w in omega] for p in pressures])
+    slopes = []
+    for name, unknown in zip(names, unknowns, strict=True):
+        by = _SHARE * unknown.scale
+        up = par.replace({name: getattr(par, name) + by})
+        moved = np.array([[_torque(up, w, p) for w in omega] for p in pressures])
+        slopes.append((moved - value) / by)
+    G = np.array(slopes)
+    variance = np.einsum("ipw,ij,jpw->pw", G, estimate.covariance[np.ix_(seal, seal)], G)
+    half = 0.5 * np.diff(estimate.intervals(), axis=1).ravel() / estimate.deviations
+    reach = float(half[0]) * np.sqrt(np.maximum(variance, 0.0))
+    axes = {
+        "pressure": (np.array(pressures), "Pa", "pressure"),
+        "omega": (omega, "rad/s", "motor speed"),
+    }
+    band = {"value": value, "low": value - reach, "high": value + reach}
+    return labeled(axes, {name: (T, "N*m", "friction torque") for name, T in band.items()})
+
+
+def _torque(par: seal_friction.Parameters, omega: float, p: float) -> float:
+    if omega == 0.0:
+        return float("nan")
+    friction = seal_friction.output(seal_friction.Input(omega, p), par)
+    return float(ops.where(omega > 0.0, friction.T_p, -friction.T_n))
+
+
+def replayed(data: xr.Dataset, par: MotorcycleParameters, step: float) -> xr.Dataset:
+    """Return the pressure over the whole ramp, measured and modeled, driven by the current.
+
+    ``data``: ``i`` [A] and ``p_mc`` [Pa] over ``time`` [s]; ``step``: substep [s].
+    """
+    driven_par = par.replace({"drive.mode": "current-source"})
+    start = max(float(data["p_mc"][0]), 0.0)
+    whole = trial(
+        MotorcycleBrake(),
+        driven_par,
+        data,
+        {"i_set": "i"},
+        {"p_mc": 1.0},
+        state=state_at(start, driven_par),
+        memory=memory_at(start, driven_par),
+        step=step,
+    )
+    modeled = simulate(whole.run, ("p_mc",))["p_mc"]
+    attrs = {"units": "Pa", "long_name": "master-cylinder pressure"}
+    return xr.Dataset(
+        {"measured": ("time", data["p_mc"].values, attrs), "modeled": ("time", modeled, attrs)},
+        {"time": data["time"]},
+    )
+
+
+# What the slips of a ramp say of the friction: their shapes, and the currents that began them.
+
+_BLOCKS = 250  # at most
+
+
+class Whitening:
+    r"""Makes means of neighboring residuals independent, of size one.
+
+    .. math:: \Sigma = \sigma^2 I + P H H^T P \sigma_i^2
+
+    with the answer H of the pressure to every sample of the current, taken from that to a lasting
+    offset as if the slip answered alike at all times; P takes off what a shift in time takes up.
+
+    Parameters
+    ----------
+    one
+        A slip of the model.
+    sigma, sigma_i
+        Noise of a sample of the pressure [Pa], and of the current [A] that drives the slip; 0
+        where none does.
+    """
+
+    def __init__(self, fitted: Fitted, sigma: float, sigma_i: float) -> None:
+        self._block = max(-(-fitted.residuals.size // _BLOCKS), 1)
+        self._sigma = sigma / np.sqrt(self._block)
+        self._root = self._root_of(fitted, sigma_i) if sigma_i > 0.0 else None
+
+    def __call__(self, values: Array) -> Array:
+        """Return residuals or their Jacobian, shape (n,) or (n, p), as fewer independent rows."""
+        from scipy import linalg
+
+        means: Array = self._means(values) / self._sigma
+        if self._root is None:
+            return means
+        return np.asarray(linalg.solve_triangular(self._root, means, lower=True))
+
+    def _root_of(self, fitted: Fitted, sigma_i: float) -> Array:
+        """Return the root of the covariance, in units of the pressure's noise."""
+        answer = np.diff(self._means(fitted.answer), prepend=0.0)
+        count = answer.size
+        back = np.arange(count)[:, None] - np.arange(count)[None, :]
+        H = np.where(back >= 0, answer[np.clip(back, 0, count - 1)], 0.0)
+        v = self._means(fitted.speed)
+        H -= np.outer(v, v @ H) / max(float(v @ v), 1e-300)
+        H *= sigma_i / (np.sqrt(self._block) * self._sigma)
+        covariance = H @ H.T
+        covariance[np.diag_indices(count)] += 1.0
+        return np.asarray(np.linalg.cholesky(covariance), dtype=float)
+
+    def _means(self, values: Array) -> Array:
+        count = len(values) // self._block
+        parts = values[: count * self._block].reshape(count, self._block, *values.shape[1:])
+        return np.asarray(parts.mean(axis=1))
+
+
+@dataclass(frozen=True)
+class Noise:
+    """How sure the measurements are.
+
+    ``pressure``, ``current``: standard deviation of a sample's noise [Pa], [A]; ``scatter``:
+    standard deviation of the current that breaks away, from slip to slip [A].
+    """
+
+    pressure: float
+    current: float
+    scatter: float
+
+    def of_breakaway(self, shot: Shot) -> float:
+        """Return the standard deviation of the current [A] measured where a shot begins.
+
+        Of the end of a line through some noisy samples; of the current's own ripple at rest, since
+        which of its peaks breaks the piston away is chance; and of what else scatters.
+        """
+        read = 2.0 * self.current / np.sqrt(shot.seen)
+        ripple = np.sqrt(max(shot.unrest**2 - self.current**2, 0.0))
+        return float(np.sqrt(read**2 + ripple**2 + self.scatter**2))
+
+
+class SlipLoss:
+    """Weighted residuals of all slips by friction parameters, the current's zero, and its ripple.
+
+    Parameters
+    ----------
+    shooting, shots, noise
+        The model, the measured slips, and how sure they are.
+    weighted_at
+        Values at which the weights are taken; the slips are then driven by the measured current,
+        and the Jacobian does not know its noise: an instrument. None for the search: slips that
+        only the ramp drives, quick and with few minima.
+    """
+
+    def __init__(
+        self,
+        shooting: Shooting,
+        shots: Sequence[Shot],
+        noise: Noise,
+        weighted_at: Array | None = None,
+    ) -> None:
+        self._shooting, self._shots, self._noise = shooting, shots, noise
+        self._whitenings: list[Whitening] | None = None
+        if weighted_at is not None:
+            zero = float(weighted_at[-2])
+            fits = (shooting.fit(s, weighted_at[: shooting.count], zero) for s in shots)
+            self._whitenings = [Whitening(fitted, noise.pressure, noise.current) for fitted in fits]
+
+    def __call__(self, values: Array) -> tuple[Array, Array]:
+        """Return residuals and Jacobian: the slips' shapes, then one row for every beginning.
+
+        ``values``: friction parameters, reading of the current's sensor without current [A], and by
+        how much the current at its peaks exceeds its mean [A].
+        """
+        seal, zero, ripple = values[: self._shooting.count], float(values[-2]), float(values[-1])
+        driven = zero if self._whitenings is not None else None
+        residuals, slopes, begun, begun_slopes = [], [], [], []
+        for k, shot in enumerate(self._shots):
+            fitted, way = self._shooting.fit(shot, seal, driven), shot.slip.direction
+            whiten = (
+                Whitening(fitted, self._noise.pressure, 0.0)
+                if self._whitenings is None
+                else self._whitenings[k]
+            )
+            sure = self._noise.of_breakaway(shot)
+            residuals.append(whiten(fitted.residuals))
+            none = np.zeros(fitted.residuals.size)
+            slopes.append(whiten(np.column_stack((fitted.slopes, -fitted.by_current, none))))
+            begun.append((fitted.breakaway - zero + way * ripple) / sure)
+            begun_slopes.append(np.array([*fitted.breakaway_slopes, -1.0, way]) / sure)
+        return np.concatenate((*residuals, begun)), np.vstack((*slopes, *begun_slopes))
+
 
 _NAMES = ("T_pr", "f_cfr_p", "f_cfr_n", "k_brk_p", "k_brk_n", "c", "mu_T")
 _ZERO, _RIPPLE = "offset.i", "offset.i_ripple"

@@ -3,29 +3,164 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Annotated, Literal
 
 import numpy as np
 import xarray as xr
+from pydantic import Field, model_validator
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.sizing import trial as actuator_trial
 from bywire.brakes.motorcycle.sizing.demand import (
     Course,
+    Motion,
     breakaway_current,
     geared,
     motion,
     sine,
     step,
 )
-from bywire.brakes.motorcycle.sizing.map import SIZES, mapped, sizes_of
-from bywire.brakes.motorcycle.sizing.options import ASSUMPTIONS, Options
 from bywire.brakes.motorcycle.trim import highest_pressure
 from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Frequency, GearRatio, Pressure, Unit
 from bywire.core.typing import Array, Progress
-from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, edge_warnings
+from bywire.data.labeled import labeled
+from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, edge_warnings, require_ranges
+
+# Options and assumptions of the study of the motorcycle actuator's gear and motor.
+
+Count = Annotated[int, Unit("1", 41.0), Field(ge=3, le=401)]
+
+ASSUMPTIONS = (
+    "The gear ratio varies; motor, rotor inertia, battery, pistons, fluid and efficiency stay.",
+    "The seals' friction is a force at the piston: at the shaft it grows with the gear ratio.",
+    "The wanted pressure is reached exactly: flow through the pressure-volume curves of chamber, "
+    "pipeline and caliper gives the speed; pressure, friction, efficiency and inertia the torque.",
+    "Compliances are those at the middle of the course; the winding's inductance is left out.",
+    "The seals slide; the current that breaks them away at the peak pressure must be there too.",
+    "Dither is left out of the calculation; its current at the peak pressure is listed.",
+    "Limits: the pressure controller's current limit, and the bridge's voltage at that current.",
+    "On the bench the pressure controller's gains grow with the gear ratio; they are not tuned.",
+)
+
+
+class Options(ParameterSet):
+    """What the actuator must do, and the designs to compare."""
+
+    bandwidth: Frequency
+    """frequency at which a sine of the amplitude, or a step, is followed"""
+    p_peak: Pressure
+    """largest pressure: crest of the sine, end of the step"""
+    amplitude: Pressure
+    """amplitude of the sine"""
+    p_from: Pressure
+    """begin of the step"""
+    demand: Literal["sine", "step"]
+    """what sizes the actuator"""
+    k_g_min: GearRatio
+    """smallest gear ratio"""
+    k_g_max: GearRatio
+    """largest gear ratio"""
+    ratios: Count
+    """number of gear ratios, evenly spread in their logarithm"""
+    f_min: Frequency
+    """lowest bandwidth of the map"""
+    f_max: Frequency
+    """highest bandwidth of the map"""
+    frequencies: Count
+    """number of bandwidths, evenly spread in their logarithm"""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Options:
+        ratios, bandwidths = ("k_g_min", "k_g_max", "m/rad"), ("f_min", "f_max", "Hz")
+        require_ranges(self, (ratios, bandwidths, ("p_from", "p_peak", "Pa")))
+        if not 2.0 * self.amplitude <= self.p_peak:
+            raise ValueError(
+                f"amplitude = {self.amplitude / 1e5:g} bar must be <= half of p_peak = "
+                f"{self.p_peak / 1e5:g} bar: pressures cannot fall below zero"
+            )
+        return self
+
 
 Par = MotorcycleParameters
+
+# Many gear ratios of the motorcycle actuator beside each other, as a dataset.
+
+SIZES = {
+    "electrical": ("W", "largest electrical power"),
+    "mechanical": ("W", "largest mechanical power"),
+    "torque": ("N*m", "largest torque"),
+    "speed": ("rad/s", "largest speed"),
+    "current": ("A", "largest current"),
+    "inertia_share": ("1", "inertia's torque over the whole"),
+    "current_share": ("1", "current over its limit"),
+    "voltage_share": ("1", "voltage over what there is"),
+}
+"""unit and label of what a motion takes"""
+
+
+def sizes_of(par: Par, done: Motion, static: float) -> dict[str, float]:
+    """Return the largest values of a motion, SI.
+
+    Parameters
+    ----------
+    static
+        Current [A] that breaks the piston away at the peak pressure: torque, current and power
+        are at least what it takes.
+    """
+    torque = float(np.abs(done.torque).max())
+    current = max(torque / par.motor.K_e, static)
+    voltage = float(np.max(np.abs(done.voltage) / done.available))
+    return {
+        "electrical": max(float(done.electrical.max()), par.motor.R_m * static**2),
+        "mechanical": float(done.mechanical.max()),
+        "torque": max(torque, static * par.motor.K_e),
+        "speed": float(np.abs(done.omega).max()),
+        "current": current,
+        "inertia_share": float(np.abs(done.inertia).max()) / torque,
+        "current_share": current / par.ecu.pressure.i_max,
+        # Where no voltage is left at this current, the share would change its sign.
+        "voltage_share": voltage if bool((done.available > 0).all()) else np.inf,
+    }
+
+
+def mapped(
+    par: Par,
+    p_peak: float,
+    ratios: Array,
+    frequencies: Array,
+    course: Callable[[Par, float], Course],
+) -> xr.Dataset:
+    """Return what all designs take at all bandwidths.
+
+    Parameters
+    ----------
+    p_peak
+        Largest pressure [Pa], at which the seals must break away.
+    ratios, frequencies
+        Gear ratios [m/rad], shape (n,), and bandwidths [Hz], shape (m,).
+    course
+        ``course(par, f)``: the wanted pressure at a bandwidth.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``k_g`` and ``frequency``, the variables of `SIZES`.
+    """
+    rows: list[list[dict[str, float]]] = []
+    for k_g in ratios:
+        brake = geared(par, float(k_g))
+        static = breakaway_current(brake, p_peak)
+        rows.append(
+            [sizes_of(brake, motion(brake, course(brake, float(f))), static) for f in frequencies]
+        )
+    values = {name: [[sizes[name] for sizes in row] for row in rows] for name in SIZES}
+    axes = {"k_g": (ratios, "m/rad", "gear ratio"), "frequency": (frequencies, "Hz", "bandwidth")}
+    return labeled(axes, {name: (values[name], *SIZES[name]) for name in SIZES})
+
 
 _ROWS = 13  # gear ratios of the table
 _AT_EDGE = 1e-3  # share of an end of the range that counts as on it

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import xarray as xr
+from pydantic import Field, model_validator
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.motorcycle.dither.choice import NAMES, Candidate, best_of, candidates
@@ -18,17 +22,165 @@ from bywire.brakes.motorcycle.dither.map import (
     law,
     mapped,
 )
-from bywire.brakes.motorcycle.dither.options import ASSUMPTIONS, DEFAULTS, Options
-from bywire.brakes.motorcycle.dither.reach import admissible_frequencies
+from bywire.brakes.motorcycle.dither.reach import (
+    admissible_frequencies,
+    attenuation,
+    reach,
+    waveform,
+)
 from bywire.brakes.motorcycle.dither.trial import FIGURES, Trial, area_ratios, tried
-from bywire.brakes.motorcycle.dither.waveforms import compared
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import highest_pressure
 from bywire.core.errors import InputError, ParameterError, RunError
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Factor, Fraction, Frequency, Pressure, Unit
 from bywire.core.typing import Progress
-from bywire.synthesis.study import Findings, Map, Mark, Study
+from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, require_ranges, variable
+
+# What a dither must do, and the dithers to compare.
+
+Count = Annotated[int, Unit("1", 8.0), Field(ge=3, le=101)]
+Node = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Pressures = Annotated[tuple[Node, ...], Unit("Pa", 2e6), Field(min_length=1, max_length=20)]
+
+ASSUMPTIONS = (
+    "Each dither is tried on the nonlinear brake with the pressure loop closed, which takes the "
+    "pressure to the set point from below and from above.",
+    "The amplitude is the gain times the ECU's own eqs. (18) and (19): it follows the pressure.",
+    "Friction counts as overcome when the share of the time stuck and the dead band left (mean "
+    "current from above less that from below, over the band in which the piston may rest) stay "
+    "within their limits, at this gain and at all higher ones.",
+    "The price is the copper power beside that of the mean current, mean over the pressures; "
+    "figures between two gains of the grid are interpolated.",
+    "Periods are even numbers of the ECU's sample times.",
+    "Wear, noise and heat of motor and seals are left out.",
+)
+
+
+class Options(ParameterSet):
+    """Pressures, dithers and limits."""
+
+    pressures: Pressures
+    """pressures at which friction is to be overcome"""
+    gain_min: Factor
+    """smallest gain of the dither's law"""
+    gain_max: Factor
+    """largest gain of the dither's law"""
+    gains: Count
+    """number of gains, evenly spread"""
+    f_min: Frequency
+    """lowest frequency"""
+    f_max: Frequency
+    """highest frequency"""
+    frequencies: Count
+    """number of frequencies, about evenly spread in their logarithm"""
+    stuck_max: Fraction
+    """largest share of the time stuck"""
+    band_max: Fraction
+    """largest share of the dead band left"""
+    ripple_max: Pressure
+    """largest ripple of the caliper's pressure, peak to peak"""
+    approach: Pressure
+    """distance from which each pressure is approached"""
+    settle: Duration
+    """time until the pressure loop has settled"""
+    compare: Literal["waveforms", "none"]
+    """whether waveforms and places of the low-pass filter are compared"""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Options:
+        require_ranges(self, (("gain_min", "gain_max", "1"), ("f_min", "f_max", "Hz")))
+        if any(not a < b for a, b in pairwise(self.pressures)):
+            raise ValueError("pressures must be given in ascending order, none twice")
+        lowest = min(self.pressures)
+        if not self.approach < lowest:
+            raise ValueError(
+                f"approach = {self.approach / 1e5:g} bar must be below the lowest of the pressures,"
+                f" {lowest / 1e5:g} bar: the approach from below starts there"
+            )
+        return self
+
+
+DEFAULTS = Options(
+    pressures=(5e5, 20e5, 35e5),
+    gain_min=0.5,
+    gain_max=2.25,
+    gains=8,
+    f_min=20.0,
+    f_max=100.0,
+    frequencies=8,
+    stuck_max=0.1,
+    band_max=0.05,
+    ripple_max=0.5e5,
+    approach=2e5,
+    settle=4.0,
+    compare="waveforms",
+)
+
 
 Par = MotorcycleParameters
+
+# Sine, square and triangle against each other, filtered with the demand or past the filter.
+
+WAVEFORMS = ("sine", "square", "triangle")
+PLACES = ("after-dither", "before-dither")
+_UNITS = {"distortion": "%", "copper": "W", "ripple_caliper": "Pa"}
+
+
+def compared(
+    par: Par, grid: Grid, f: float, limits: Mapping[str, float], report: Callable[[float], None]
+) -> Cut:
+    """Return what each waveform takes to overcome the friction at one frequency [Hz].
+
+    Each has the least gain that is enough at every pressure; copper power is the mean over the
+    pressures, ripple the worst.
+    """
+    cases = [(shape, place) for place in PLACES for shape in WAVEFORMS]
+    rows: list[dict[str, Any]] = []
+    for k, (shape, place) in enumerate(cases):
+        shaped = par.replace({"ecu.dither.waveform": shape, "ecu.filter.place": place})
+        rows.append({"waveform": shape, "filter": place, **_row(shaped, grid, f, limits)})
+        report((k + 1) / len(cases))
+    index = np.arange(len(rows))
+    table = xr.Dataset(
+        {
+            name: variable(
+                np.array([row[name] for row in rows]), ("case",), _UNITS.get(name, "1"), name
+            )
+            for name in rows[0]
+        },
+        coords={"case": ("case", index)},
+    )
+    return Cut(
+        f"waveforms at {f:.4g} Hz, filter after or before the dither joins", table, tuple(rows[0])
+    )
+
+
+def distortion(par: Par, f: float, p: float) -> float:
+    """Return the total harmonic distortion of the motor current at a stuck shaft, in %.
+
+    Up to half the ECU's sampling rate, where the converter's hold and the winding leave little.
+    """
+    samples = waveform(par, f)
+    orders = np.arange(1, (samples.size + 1) // 2)
+    passed = attenuation(par, np.asarray(orders * f, dtype=np.float64), p)
+    size = np.abs(np.fft.rfft(samples)[orders]) * np.abs(passed)
+    return float(100.0 * np.sqrt(np.sum(size[1:] ** 2)) / size[0])
+
+
+def _row(par: Par, grid: Grid, f: float, limits: Mapping[str, float]) -> dict[str, Any]:
+    gains = np.asarray(grid.gains)
+    middle = grid.pressures[len(grid.pressures) // 2]
+    columns = [tried(par, p, grid.gains, (f,), grid.trial) for p in grid.pressures]
+    candidate = candidates(gains, columns, limits)[0]
+    return {
+        "reach": reach(par, f, middle),
+        "distortion": distortion(par, f, middle),
+        "gain": candidate.gain,
+        "copper": candidate.price,
+        "ripple_caliper": candidate.ripple,
+        "limit": candidate.verdict or "none",
+    }
 
 
 def compute(par: Par, options: Options, progress: Progress) -> Findings:

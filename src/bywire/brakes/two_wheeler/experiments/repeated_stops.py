@@ -8,29 +8,118 @@ order with error control in place of substeps of 20 us; the vehicle is back at i
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
 from pydantic import Field
+from scipy.integrate import solve_ivp
 
-from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.experiment import Case, Experiment, Recordings, as_run
 from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.two_wheeler import stop_series
 from bywire.brakes.two_wheeler.case import RidingSpeed, rolling_case
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
-from bywire.brakes.two_wheeler.stop_series import BRAKES, TEMPERATURES, WARM, Heat
 from bywire.core.errors import ParameterError
+from bywire.core.interrupts import interrupts_deferred
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Unit, Weight
 from bywire.core.signals import Signal, signals_of
 from bywire.core.typing import Array
 from bywire.plant import brake_disc, disc_heat
+from bywire.simulation.engine import prepare
+from bywire.simulation.run import simulate
 from bywire.vehicle.hot_brakes import cold_start
+
+# Stops of brakes that warm up, one after the other, and the ways between them.
+
+Heat = Mapping[str, disc_heat.State]
+"""temperatures of the brakes by their parts"""
+WARM = {"front.heat.law": "lumped", "rear.heat.law": "lumped"}
+BRAKES = {"front_heat": ("front", "_f"), "rear_heat": ("rear", "_r")}
+"""name and suffix of each brake, by the part that is its heat"""
+TEMPERATURES = tuple(n + end for _, end in BRAKES.values() for n in disc_heat.State._fields)
+_SUBSTEPS = 50  # of a sample time
+
+
+def braked(case: Case) -> dict[str, Array]:
+    """Return speed, place and temperatures of a stop, row by row to its standstill.
+
+    Raises
+    ------
+    ParameterError
+        When it does not come to one.
+    """
+    run = as_run(case, case.par.ecu.T_s / _SUBSTEPS)  # type: ignore[attr-defined]
+    with interrupts_deferred():
+        prepare(run.model, run.par).engine()
+    made = simulate(run, ("v", "x", *TEMPERATURES))
+    if made.status == "interrupted":
+        raise KeyboardInterrupt
+    end = vehicle_stop.standstill(made.time, made["v"])
+    if math.isnan(end):
+        raise ParameterError(
+            f"{case.label} does not come to a standstill within {case.duration:g} s: its brakes "
+            "have faded, or the road does not hold; take fewer stops, a longer options.pause or a "
+            "smaller options.deceleration"
+        )
+    t = np.append(made.time[made.time < end], end)
+    return {"time": t} | {
+        name: np.interp(t, made.time, made[name]) for name in ("v", "x", *TEMPERATURES)
+    }
+
+
+def cooled(heat: Heat, par: TwoWheelerParameters, v: float, t: Array) -> dict[str, Array]:
+    """Return temperatures [K] of open brakes by signal; those at the start are ``heat``.
+
+    Parameters
+    ----------
+    par
+        Parameters of a vehicle whose brakes warm up.
+    v
+        Speed of the vehicle [m/s].
+    t
+        Times [s], increasing from 0.
+    """
+    rows: dict[str, Array] = {"time": t}
+    for part, (brake, end) in BRAKES.items():
+        own: disc_heat.Parameters = par.value(f"{brake}.heat")
+        felt, capacities = disc_heat.Input(0.0, v, 0.0), np.array(disc_heat.mass(own))
+
+        def rate(_: float, T: Array, own: Any = own, u: Any = felt, C: Array = capacities) -> Array:
+            return np.array(disc_heat.balance(disc_heat.State(*T), u, own)) / C
+
+        span = (0.0, float(t[-1]))
+        got = solve_ivp(rate, span, heat[part], "DOP853", t_eval=t, rtol=1e-10, atol=1e-8)
+        rows |= {n + end: y for n, y in zip(disc_heat.State._fields, got.y, strict=True)}
+    return rows
+
+
+def at_end(rows: Mapping[str, Array]) -> Heat:
+    """Return the temperatures of the last row."""
+    return {part: heat_of(rows, end, -1) for part, (_, end) in BRAKES.items()}
+
+
+def heat_of(rows: Any, end: str, k: int) -> disc_heat.State:
+    """Return the temperatures of the brake of a suffix in row ``k`` of rows or a recording."""
+    return disc_heat.State(*(float(rows[n + end][k]) for n in disc_heat.State._fields))
+
+
+def peak_time(t: Array, T: Array) -> float | tuple[float, str]:
+    """Return when a temperature is highest [s], by a parabola through its highest rows."""
+    k = int(T.argmax())
+    if k + 1 == t.size:
+        return math.nan, "the fluid still warms up at the end: give a longer options.parked"
+    if k == 0:
+        return 0.0
+    bend, slope, _ = np.polyfit(t[k - 1 : k + 2] - t[k], T[k - 1 : k + 2] - T[k], 2)
+    return float(t[k] - 0.5 * slope / bend)
+
 
 _COURSE = "course-temperatures"
 _ROWS, _PARKED_ROWS = 40, 600  # of a pause, and of the time parked
@@ -110,13 +199,13 @@ def _series(par: TwoWheelerParameters, options: Options) -> tuple[_Stop, ...]:
     stops: list[_Stop] = []
     for k in range(round(options.stops)):
         if stops:
-            left, way = stop_series.at_end(stops[-1].rows), np.array([0.0, options.pause])
-            heat = stop_series.at_end(stop_series.cooled(left, par, options.v_pause, way))
+            left, way = at_end(stops[-1].rows), np.array([0.0, options.pause])
+            heat = at_end(cooled(left, par, options.v_pause, way))
         case = _case(par, options, heat, f"stop {k + 1}")
         try:
-            rows = stop_series.braked(case)
+            rows = braked(case)
         except ParameterError:  # faded brakes take longer
-            rows = stop_series.braked(replace(case, duration=case.duration * _LONGEST))
+            rows = braked(replace(case, duration=case.duration * _LONGEST))
         stops.append(_Stop(case, rows))
     return tuple(stops)
 
@@ -150,7 +239,7 @@ def static(par: TwoWheelerParameters, options: Options) -> dict[str, xr.Dataset]
         v = 0.0 if is_last else options.v_pause
         whole, count = (options.parked, _PARKED_ROWS) if is_last else (options.pause, _ROWS)
         t = np.linspace(0.0, whole, count + 1)
-        after = stop_series.cooled(stop_series.at_end(rows), warm, v, t)
+        after = cooled(at_end(rows), warm, v, t)
         inside = slice(1, None if is_last else -1)  # the next stop has the last instant
         rest = {name: y[inside] for name, y in after.items()}
         still = 0.0 * rest["time"]
@@ -192,7 +281,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
         for kpi in EACH(f"_{k}", disc_before=float(T[0]), disc_after=float(T[-1]))
     ]
     last = int(np.flatnonzero(number)[-1])
-    hot = stop_series.heat_of(course, "_f", last)
+    hot = heat_of(course, "_f", last)
     par = TwoWheelerParameters.model_validate_json(recordings["first"].attrs["parameters"])
     cold = options.share * _pressure(par, options, "front")
     fluid, t = course["T_fluid_f"].values, course["time"].values
@@ -209,7 +298,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
             pressure_cold=cold,
             pressure_hot=cold / disc_heat.friction(hot.T_disc, par.front.heat),
             fluid_peak=float(fluid.max()),
-            fluid_peak_time=stop_series.peak_time(t[last:] - t[last], fluid[last:]),
+            fluid_peak_time=peak_time(t[last:] - t[last], fluid[last:]),
         ),
     )
 

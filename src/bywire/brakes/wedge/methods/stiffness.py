@@ -7,22 +7,30 @@ close, through the wedge while they open, and nothing in between.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from bywire.brakes.wedge.experiments import force_cycle
-from bywire.brakes.wedge.methods.drive_train import force_current, two_stages
-from bywire.brakes.wedge.methods.drive_train.force_current import Reading, Squeeze, squeeze
+from bywire.brakes.wedge.methods.drive_train import cogging_waves, force_current
+from bywire.brakes.wedge.methods.drive_train.force_current import (
+    Reading,
+    Squeeze,
+    branches,
+    law,
+    squeeze,
+)
 from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
     SIGNALS,
     SIMULATED,
     RigOptions,
     drive_sensors,
 )
-from bywire.brakes.wedge.methods.drive_train.two_stages import TwoStages
 from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import slope_of
@@ -31,10 +39,201 @@ from bywire.core.typing import Array
 from bywire.data.labeled import over
 from bywire.identification.equation import steady_dynamics
 from bywire.identification.estimate import Estimate
+from bywire.identification.least_squares import Problem
 from bywire.identification.measured import joined, split
-from bywire.identification.method import Curve, Effort, Identified, Method
+from bywire.identification.method import Check, Curve, Effort, Identified, Method
+from bywire.identification.residuals import lack_of_fit
 from bywire.identification.sensed import Sensor, sensed
+from bywire.identification.unknown import Unknown, parameters_of
 from bywire.plant import shaft_encoder
+
+# The two-stage stiffness test as one fit: force over travel, and current over force, in both.
+
+_STIFFNESS = ("heart.K_S", "heart.K_W", "heart.K_C")
+_S, _W, _C, _ZERO, _CLOSED, _PLAY = range(6)
+_LAW = slice(6, 11)
+_SENSOR, _HEART, _LOOP = slice(11, 15), slice(15, 19), 19
+MEANINGS: Mapping[str, tuple[str, str]] = {
+    "zero_of_travel": ("m", "travel without force on the sensor, d_0"),
+    "tips_touch": ("m", "travel at which the tips touch, d_c"),
+    "free_play": ("m", "from there to where the wedge is pulled, d_c - d_t"),
+    **force_current.MEANINGS,
+    **cogging_waves.meanings("sensor"),
+    **cogging_waves.meanings("heart"),
+    "travel_loop": ("m", "by how much the encoders stay behind the motion, h"),
+}
+"""unknowns beside the stiffnesses -> SI unit and meaning"""
+
+_SHARE = 0.3  # of the largest current, beyond which a contact is surely closed
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Rough travels at which the tips touch, and the wedge [m]."""
+
+    closed: float
+    apart: float
+
+
+def started(par: WedgeParameters, sensor: Squeeze, heart: Squeeze, advice: str) -> Contacts:
+    """Return where the contacts roughly are: where lines through loading cross no force.
+
+    Raises
+    ------
+    ParameterError
+        When one of them is not reached.
+    """
+    values = np.array([u.start for u in force_current.unknowns(par)])
+    friction = values[2]
+    unknowns = []
+    for way, what in ((1.0, "tip to tip"), (-1.0, "through the wedge")):
+        level = way * heart.i
+        loading = (heart.way == way) & (level > _SHARE * np.abs(sensor.i).max())
+        if int(loading.sum()) < 3 or not np.ptp(heart.d[loading]) > 0.0:
+            raise ParameterError(
+                f"record heart: the screws do not load each other {what}: travel further; {advice}"
+            )
+        slope, start = np.polyfit(heart.d[loading], level[loading], 1)
+        unknowns.append(float((friction - start) / slope))
+    if not unknowns[0] > unknowns[1]:
+        raise ParameterError(
+            "record heart: closing and opening load the screws at the same travel: there is no "
+            "free-play to find, or the currents' signs are wrong"
+        )
+    return Contacts(*unknowns)
+
+
+def clear_of(contacts: Contacts, heart: Squeeze) -> NDArray[np.bool_]:
+    """Return the windows in which no contact opens or closes, nor has done so just before.
+
+    There force over travel has a kink, which a mean over a window rounds off, and the motors
+    change their speed.
+    """
+    low, high = heart.reach.min(axis=1), heart.reach.max(axis=1)
+    kinks = np.array([contacts.closed, contacts.apart])
+    inside = (low[:, None] <= kinks) & (kinks <= high[:, None])
+    return np.asarray(~inside.any(axis=1))
+
+
+@dataclass(frozen=True)
+class TwoStages:
+    """What was measured in both stages, and the unknowns of the fit.
+
+    ``par``: what is known, the sensor's stiffness among it, and starts; ``sensor``, ``heart``: the
+    stages; ``contacts``: where the search begins.
+    """
+
+    par: WedgeParameters
+    sensor: Squeeze
+    heart: Squeeze
+    contacts: Contacts
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Stiffnesses, zeros of travel, free-play, law of the current, cogging, encoders' lag."""
+        play = self.contacts.closed - self.contacts.apart
+        return (
+            *parameters_of(self.par, _STIFFNESS),
+            Unknown("zero_of_travel", float(np.mean(self.sensor.d)), scale=play, unit="m"),
+            Unknown("tips_touch", self.contacts.closed, scale=play, unit="m"),
+            Unknown("free_play", play, low=0.0, scale=play, unit="m"),
+            *force_current.unknowns(self.par),
+            *cogging_waves.unknowns(self.par, "sensor"),
+            *cogging_waves.unknowns(self.par, "heart"),
+            Unknown("travel_loop", 0.0, scale=1e-3 * play, unit="m"),
+        )
+
+    def parts(self) -> tuple[Problem, Problem, Problem]:
+        """Return the equations: force over travel, current over force, current over travel."""
+        return tuple(
+            Problem(self.unknowns, evaluate)
+            for evaluate in (self.sensor_force, self.sensor_current, self.heart_current)
+        )  # type: ignore[return-value]
+
+    def touching(self, values: Array) -> Contacts:
+        """Return where the contacts are."""
+        return Contacts(float(values[_CLOSED]), float(values[_CLOSED] - values[_PLAY]))
+
+    def slopes(self, values: Array) -> tuple[float, float]:
+        """Return stiffnesses tip to tip and through the wedge [N/m]."""
+        c_S, c_W, c_C = 2.0 / values[_S], 2.0 / values[_W], 1.0 / values[_C]
+        return float(1.0 / (c_S + c_C)), float(1.0 / (c_S + c_W))
+
+    def sensor_force(self, values: Array) -> tuple[Array, Array]:
+        """Return the straight line less the sensor's force, and its derivatives."""
+        stage, J = self.sensor, np.zeros((self.sensor.d.size, len(values)))
+        K = 1.0 / (2.0 / values[_S] + 1.0 / self.par.rig.sensor.K_F)
+        away = stage.d + stage.way * values[_LOOP] - values[_ZERO]
+        J[:, _S] = away * K**2 * 2.0 / values[_S] ** 2
+        J[:, _ZERO] = -K
+        J[:, _LOOP] = K * stage.way
+        return K * away - stage.F, J
+
+    def sensor_current(self, values: Array) -> tuple[Array, Array]:
+        """Return the law's current at the sensor's force less the measured one."""
+        stage, J = self.sensor, np.zeros((self.sensor.d.size, len(values)))
+        i, J[:, _LAW], _ = law(stage.F, stage.way, values[_LAW])
+        J[:, _SENSOR] = stage.waves
+        return i + stage.waves @ values[_SENSOR] - stage.i, J
+
+    def heart_force(self, values: Array, stage: Squeeze) -> tuple[Array, Array]:
+        """Return the force in the heart by the travel, and its derivatives."""
+        d, J = stage.d + stage.way * values[_LOOP], np.zeros((stage.d.size, len(values)))
+        K_c, K_t = self.slopes(values)
+        close = np.maximum(d - values[_CLOSED], 0.0)
+        apart = np.maximum(values[_CLOSED] - values[_PLAY] - d, 0.0)
+        J[:, _S] = (close * K_c**2 - apart * K_t**2) * 2.0 / values[_S] ** 2
+        J[:, _W] = -apart * K_t**2 * 2.0 / values[_W] ** 2
+        J[:, _C] = close * K_c**2 / values[_C] ** 2
+        J[:, _CLOSED] = -K_c * (close > 0.0) - K_t * (apart > 0.0)
+        J[:, _PLAY] = K_t * (apart > 0.0)
+        J[:, _LOOP] = stage.way * (K_c * (close > 0.0) + K_t * (apart > 0.0))
+        return K_c * close - K_t * apart, J
+
+    def heart_current(self, values: Array) -> tuple[Array, Array]:
+        """Return the law's current at that force less the measured one."""
+        stage = self.heart
+        F, J_F = self.heart_force(values, stage)
+        i, columns, slope = law(F, stage.way, values[_LAW])
+        J = slope[:, None] * J_F
+        J[:, _LAW] = columns
+        J[:, _HEART] = stage.waves
+        return i + stage.waves @ values[_HEART] - stage.i, J
+
+    def force_by_current(self, values: Array) -> Array:
+        """Return the force that the heart's current says, to first order around the fit."""
+        F, _ = self.heart_force(values, self.heart)
+        slope = law(F, self.heart.way, values[_LAW])[2]
+        return np.asarray(F - self.heart_current(values)[0] / slope)
+
+    def fits(self, values: Array, count: int) -> Check:
+        """Return whether curves of their own for every branch of both stages would fit better.
+
+        ``count``: number of unknowns that were told.
+        """
+        left = [part.evaluate(values)[0] for part in self.parts()]
+        F, d = self.heart_force(values, self.heart)[0], self.sensor.d
+        richer = (
+            np.column_stack((np.vander(d / np.ptp(d), 4), self.sensor.way)),
+            np.hstack((branches(self.sensor, 3, self.sensor.F), self.sensor.waves)),
+            np.hstack((branches(self.heart, 3, F), self.heart.waves)),
+        )
+        rows, columns = sum(e.size for e in left), sum(A.shape[1] for A in richer)
+        table, weights = np.zeros((rows, columns)), []
+        row = column = 0
+        for e, A in zip(left, richer, strict=True):
+            table[row : row + e.size, column : column + A.shape[1]] = A
+            row, column = row + e.size, column + A.shape[1]
+            weights.append(np.full(e.size, 1.0 / max(float(np.sqrt(np.mean(e**2))), 1e-300)))
+        return lack_of_fit(
+            "left_over",
+            np.concatenate(left),
+            np.concatenate(weights),
+            table,
+            count,
+            "whether force over travel or current over force bends or shifts otherwise",
+        )
+
 
 _PASSES = 3  # a fit finds the contacts, one without their kinks the forces, one uses both
 _WITHIN = 0.5  # of the clearance, in which the wedge stands when the test begins
@@ -108,9 +307,9 @@ def _fitted(
 
     Where contacts change, and what force slows the motors, the fit before tells.
     """
-    contacts = two_stages.started(par, sensor, heart, _ADVICE)
+    contacts = started(par, sensor, heart, _ADVICE)
     for _ in range(_PASSES):
-        clear = heart.only(two_stages.clear_of(contacts, heart))
+        clear = heart.only(clear_of(contacts, heart))
         stages = TwoStages(par, sensor, clear, contacts)
         best = steady_dynamics(stages.parts(), stages.unknowns, _ADVICE)
         known = {u.label: u.start for u in stages.unknowns}
@@ -191,5 +390,5 @@ METHOD = Method(
     unknowns=("heart.K_S", "heart.K_W", "heart.K_C"),
     several=True,
     truth=truth,
-    further=two_stages.MEANINGS,
+    further=MEANINGS,
 )
