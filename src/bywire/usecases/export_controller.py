@@ -83,8 +83,7 @@ def export_controller(
     import os
     from dataclasses import replace
 
-    from bywire.api.controller_check import check_controller
-    from bywire.api.export_controller import ControllerExport
+    from bywire.api.export_controller import ControllerExport, check_controller
     from bywire.api.export_folder import export_folder
     from bywire.bench.bench import Bench
     from bywire.bench.bench_file import read
