@@ -106,8 +106,8 @@ CALLS = {
     "margins-wedge": "margins moment",
     "frequency-response": "frequency-response pressure --frequencies 2Hz,8Hz --amplitudes 1bar",
     "agreement": "agreement pressure",
-    "design": "design pressure --require phase_margin>=60deg --require bandwidth>=5Hz",
-    "design-wedge": "design moment --require phase_margin>=60deg",
+    "design": "design pressure --require phase_margin>=60deg --require bandwidth>=5Hz --linear-only",
+    "design-wedge": "design moment --require phase_margin>=60deg --linear-only",
     "life": "life wedge-pads",
     "faults": "faults campaign.toml --out campaign",
     "faults-again": "faults campaign.toml --out campaign",
@@ -117,7 +117,7 @@ CALLS = {
     "study-surrogate": "study surrogate study",
     "study-report": "study report study",
     "study-extend": "study extend study --cases 96 --workers 1",
-    "study-size": "study size drive-train",
+    "study-size": "study size actuator-sizing",
     "identify-screw": "identify screw-efficiency --synthetic 1",
     "identify-friction": "identify seal-friction --synthetic 1",
     "identify-winding": "identify motor-winding --synthetic 1",
@@ -167,7 +167,7 @@ def help_texts() -> str:
 def signatures() -> str:
     """Return the signature of every public function and class."""
     lines = []
-    for name in sorted(bywire.__all__):
+    for name in sorted(dir(bywire)):
         thing = getattr(bywire, name)
         if callable(thing):
             with contextlib.suppress(ValueError):  # of an exception, for one

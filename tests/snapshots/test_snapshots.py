@@ -5,6 +5,8 @@ A wanted change is renewed with ``python tests/snapshots`` and read before it is
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,16 +14,13 @@ import pytest
 from snapshots.compared import difference
 from snapshots.subjects import GROUPS
 
-STORED = Path(__file__).parent / "stored"
-
 
 @pytest.mark.parametrize("group", GROUPS)
 def test_what_users_see_is_unchanged(group: str) -> None:
-    found = dict(GROUPS[group]())
-    stored = {path.stem: path.read_text() for path in (STORED / group).glob("*.txt")}
-    assert found.keys() == stored.keys()
-    changed = {name: difference(stored[name], text) for name, text in found.items()}
-    assert not {name: said for name, said in changed.items() if said}
+    """In a process of its own: other tests load brakes, which commands would offer."""
+    check = [sys.executable, str(Path(__file__).parent), "--check", group]
+    done = subprocess.run(check, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
 
 
 def test_a_change_is_found() -> None:
