@@ -123,7 +123,7 @@ def test_a_cluster_that_is_not_there_is_named(study, monkeypatch):
 def test_who_computes_is_chosen_by_the_work(monkeypatch):
     assert isinstance(executor_of(None, "", 2), InProcess)
     with monkeypatch.context() as copied:
-        copied.setattr("bywire.studies.executor.os.cpu_count", lambda: 2)
+        copied.setattr("os.cpu_count", lambda: 2)
         copied.setattr("bywire.studies.executor.may_copy", lambda: True)
         assert isinstance(executor_of(None, "", 1), InProcess)
         assert isinstance(executor_of(None, "", 2), Pool)

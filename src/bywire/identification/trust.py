@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import os
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
@@ -27,6 +26,7 @@ from bywire.core.errors import BywireError, ParameterError
 from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Progress
+from bywire.core.workers import worker_count
 from bywire.identification.confidence import MisfitWarning
 from bywire.identification.method import Effort, Method
 from bywire.identification.unknown import parameters_of, scattered
@@ -105,7 +105,7 @@ def experiments(
     done = {o.seed: o for o in _finished(jobs, key) if o.seed in set(wanted)}
     missing = [seed for seed in wanted if seed not in done]
     identify = partial(experiment, method, par, options, chosen)
-    with closing(_outcomes(identify, missing, processes or os.cpu_count() or 1)) as outcomes:
+    with closing(_outcomes(identify, missing, worker_count(processes, len(missing)))) as outcomes:
         for outcome in outcomes:
             done[outcome.seed] = outcome
             jobs.append({"key": key, **asdict(outcome)})
@@ -142,10 +142,10 @@ def experiment(method: Method, par: Any, options: Any, effort: Effort, seed: int
 def _outcomes(
     identify: Callable[[int], Outcome], seeds: Sequence[int], processes: int
 ) -> Generator[Outcome, None, None]:
-    if processes < 2 or len(seeds) < 2:
+    if processes < 2:
         yield from map(identify, seeds)
         return
-    with processes_with_brakes(min(processes, len(seeds)), _KILLED) as pool:
+    with processes_with_brakes(processes, _KILLED) as pool:
         jobs = [pool.submit(identify, seed) for seed in seeds]
         yield from (job.result() for job in as_completed(jobs))
 

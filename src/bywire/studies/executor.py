@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import time
 import warnings
 from collections import deque
@@ -22,6 +21,7 @@ from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.errors import ParameterError, RunError
 from bywire.core.heard_warnings import heard_warnings
 from bywire.core.unneeded import allow_dask
+from bywire.core.workers import worker_count
 from bywire.data.file_format import library
 from bywire.simulation.engine import CUDA
 from bywire.studies.chunk import Columns, PlacedChunk, computed_chunk, computed_chunks, number_of
@@ -337,7 +337,7 @@ def executor_of(
         return InProcess(_TOGETHER)
     if cluster:
         return Cluster(cluster)
-    count = min(workers or os.cpu_count() or 1, together or chunks)
+    count = worker_count(workers, together or chunks)
     is_worth = workers is not None or chunks >= (_WORTH_COPIES if may_copy() else _WORTH)
     return Pool(count) if count > 1 and is_worth else InProcess()
 
