@@ -7,13 +7,14 @@ import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from typing import Any, Generic, Protocol, TypeVar
 
+from bywire.cases.runner import as_completed
 from bywire.core.arguments import whole_number
 from bywire.core.brake import load_brakes, loaded_files
 from bywire.core.callers import option
@@ -250,7 +251,8 @@ class _InPool:
     ahead: int
 
     def __call__(self, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        return _as_completed(self.pool, self.ahead, chunks)
+        begun = as_completed(self.pool, _computed, chunks, self.ahead)
+        return (computed for _, computed in begun)
 
     def beside(self, job: Callable[[], T]) -> Beside[T]:
         return Beside(self.pool.submit(_told, job))
@@ -378,20 +380,3 @@ def _told(job: Callable[[], T]) -> tuple[T, list[Warning]]:
 
 def _computed(chunk: int | PlacedChunk) -> tuple[int, Columns]:
     return single(chunk, _given[0])
-
-
-def _as_completed(
-    pool: ProcessPoolExecutor, ahead: int, chunks: Chunks
-) -> Iterator[tuple[int, Columns]]:
-    """Return what a pool finishes, with few jobs in flight; the first ones are begun at once."""
-    left = iter(chunks)
-    running: set[Future[Any]] = {pool.submit(_computed, chunk) for chunk in islice(left, ahead)}
-
-    def finished(running: set[Future[Any]]) -> Iterator[tuple[int, Columns]]:
-        while running:
-            done, running = wait(running, return_when=FIRST_COMPLETED)
-            running |= {pool.submit(_computed, chunk) for chunk in islice(left, len(done))}
-            for each in done:
-                yield each.result()
-
-    return finished(running)
