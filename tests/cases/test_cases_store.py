@@ -1,4 +1,4 @@
-"""Stores of finished pieces: what a killed run leaves can be read, and what is damaged is missing."""
+"""Stores of finished pieces: a killed run can be resumed, and a damaged piece is missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pieces computed side by side: each once, kept by the thread that asked, as soon as it is there."""
+"""Pieces computed side by side: each once, and kept by the asking thread when it is there."""
 
 from __future__ import annotations
 
