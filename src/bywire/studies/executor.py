@@ -86,18 +86,14 @@ class Apart:
 class Executor(Protocol):
     """Computes chunks, in any order."""
 
-    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        """Yield the number and the columns of each chunk as soon as it is there.
+    def opened(self, plan: StudyPlan) -> AbstractContextManager[Compute]:
+        """Return what computes chunks batch by batch, each one whole before the next.
 
         Raises
         ------
         RunError
             When workers are lost and none is left.
         """
-        ...
-
-    def opened(self, plan: StudyPlan) -> AbstractContextManager[Compute]:
-        """Return what computes chunks batch by batch, each one whole before the next."""
         ...
 
 
@@ -144,11 +140,6 @@ class Cluster:
 
     def __init__(self, address: str) -> None:
         self.address = address
-
-    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        """Yield each chunk; see `Executor`."""
-        with self.opened(plan) as compute:
-            yield from compute(chunks)
 
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
@@ -270,8 +261,7 @@ class InProcess:
     def __init__(self, together: int = 1) -> None:
         self.together = together
 
-    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        """Yield each chunk; see `Executor`."""
+    def _computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
         left = iter(chunks)
         while several := list(islice(left, self.together)):
             yield from computed_chunks(plan, several)
@@ -279,7 +269,7 @@ class InProcess:
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
         """Return what computes; see `Executor`."""
-        yield Apart(partial(self.computed, plan))
+        yield Apart(partial(self._computed, plan))
 
 
 class Pool:
@@ -293,11 +283,6 @@ class Pool:
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
-
-    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        """Yield each chunk; see `Executor`."""
-        with self.opened(plan) as compute:
-            yield from compute(chunks)
 
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
