@@ -9,7 +9,7 @@ from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.api.describe import Description, described
-from bywire.api.described_faults import fault_summaries
+from bywire.api.described import fault_summaries
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.kpis.registry import definitions

@@ -12,7 +12,7 @@ from bywire.api.life import LifeResult as LifeResult
 from bywire.api.new import NewBrake as NewBrake
 from bywire.api.overview import overview as overview
 from bywire.api.page import BenchPage as BenchPage
-from bywire.api.replay_answer import Replay as Replay
+from bywire.api.replay import Replay as Replay
 from bywire.api.run import BenchResult as BenchResult
 from bywire.api.run_over import BenchRange as BenchRange
 from bywire.api.study_run import StudyRun as StudyRun

@@ -12,7 +12,7 @@ from scipy.io import savemat
 
 import bywire
 from bywire import read_measurement
-from bywire.api.replay_answer import Replay
+from bywire.api.replay import Replay
 from bywire.core import brake as registry
 from bywire.core.errors import FileError, ParameterError, UnitError
 from bywire.server.place import Place

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from command_line import Outcome, no_half_files, refused
 
+from bywire.api.identification import parameter_file
 from bywire.bench.bench_file import load
 from bywire.core.catalog import parameters
 from bywire.core.scratch import UNFINISHED
 from bywire.identification.method import METHODS
-from bywire.identification.parameter_file import parameter_file
 
 Bywire = Callable[..., Outcome]
 

@@ -9,11 +9,7 @@ from command_line import Outcome, refused
 
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
-from bywire.api.described_systems import (
-    described_drive,
-    described_loop,
-    described_plant,
-)
+from bywire.api.described import described_drive, described_loop, described_plant
 from bywire.api.overview import overview
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.core.catalog import PARAMETER_SETS

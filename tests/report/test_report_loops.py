@@ -16,11 +16,11 @@ from bywire.analysis.locus import Border, Locus
 from bywire.analysis.loop_curves import Family, LoopCurve
 from bywire.analysis.margins import UNSTABLE, LoopMargins
 from bywire.api.agreement import agreement_table, verdict
+from bywire.api.linear_texts import left_out, rate_table
 from bywire.api.margins import margins_table, worst_texts
 from bywire.core.errors import ParameterError
 from bywire.report.loop_curves import loop_gain, nichols, nyquist, sensitivity
 from bywire.report.poles import pole_map, root_locus
-from bywire.report.rate_table import left_out, rate_table
 from bywire.report.response_figures import differences
 
 FREQUENCY = np.geomspace(1e-2, 10.0, 400)

@@ -14,9 +14,16 @@ from bywire.core.errors import FileError, UnknownNameError
 from bywire.data.netcdf import read_recording
 from bywire.report.tables import text_table
 from bywire.reproduction.item import SHARE, Allowance, Fact, compared, found
-from bywire.reproduction.reproduction import SOURCES, Exhibit, Part, Reproduction
+from bywire.reproduction.reproduction import (
+    SOURCES,
+    Exhibit,
+    Part,
+    Reproduction,
+    Tally,
+    tallies,
+    verdicts,
+)
 from bywire.reproduction.root_cause import RootCause
-from bywire.reproduction.statements import Tally, tallies, verdicts
 
 KEYS = ["id", "unit", "stated", "computed", "tolerance", "agrees", "note"]
 

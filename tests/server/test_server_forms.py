@@ -12,9 +12,9 @@ from bywire.campaigns import running
 from bywire.core.errors import RunError, UnknownNameError
 from bywire.server import job_process
 from bywire.server.contents import Contents, contents
+from bywire.server.exchange import RefusedError
 from bywire.server.pages.frame import form
 from bywire.server.place import Place
-from bywire.server.refusal import RefusedError
 from bywire.server.task import Task, tasks
 from undrawn import drawn, undrawn_unless_asked
 

@@ -20,9 +20,9 @@ from bywire.core import scratch
 from bywire.core.child_process import environment, python_command
 from bywire.server import handler
 from bywire.server.address import HERE, NAMES
+from bywire.server.exchange import RefusedError
 from bywire.server.guard import require_place
 from bywire.server.place import Place, folder_name, safe_name
-from bywire.server.refusal import RefusedError
 from bywire.server.routes import addresses
 
 PIECES = [

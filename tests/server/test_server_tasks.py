@@ -15,14 +15,13 @@ import bywire
 from bywire.core.errors import ParameterError
 from bywire.server import study_so_far
 from bywire.server.contents import Contents, contents
+from bywire.server.exchange import RefusedError
 from bywire.server.field import Field
 from bywire.server.jobs import Job, Jobs
-from bywire.server.live_pages import LivePages
-from bywire.server.pages.bench_page import bench_page
+from bywire.server.live_pages import LivePages, shown_bench
+from bywire.server.pages.file_pages import bench_page
 from bywire.server.pages.frame import form
 from bywire.server.place import Place
-from bywire.server.refusal import RefusedError
-from bywire.server.shown_bench import shown_bench
 from bywire.server.study_so_far import StudyProgress, so_far
 from bywire.server.task import tasks
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS

@@ -222,6 +222,7 @@ def plain(text: str, folder: Path) -> str:
     """Return a text without what differs from one run to the next."""
     text = text.replace(str(folder), "FOLDER").replace(folder.name, "FOLDER")
     text = text.replace(str(ROOT), "ROOT")
+    text = re.sub(r"\bcc \([^)]*\) [\d.]+(, quick)?", "COMPILER", text)
     text = re.sub(r"\b[0-9a-f]{12,64}\b", "HASH", text)
     return re.sub(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?(\.\d+)?(Z|[+-]\d\d:\d\d)?", "TIME", text)
 

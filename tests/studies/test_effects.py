@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bywire.api.study_data import findings_data
 from bywire.api.study_figures import study_figures
+from bywire.api.study_run import findings_data
 from bywire.api.study_tables import effect_tables, unmoved
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.findings import Findings

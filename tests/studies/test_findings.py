@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from bywire.api.study_sensitivity import drivers_data
+from bywire.api.study_rare import drivers_data
 from bywire.api.study_tables import influence_tables
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core.errors import ParameterError, UnknownNameError

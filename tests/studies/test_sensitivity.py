@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bywire.api.study_rare import drivers_data, sensitivity_tables
 from bywire.api.study_run import StudyRun
-from bywire.api.study_sensitivity import drivers_data, sensitivity_tables
 from bywire.core.errors import FileError, InputError, ParameterError
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.designs import MOST, SENSITIVITY, SensitivityDesign

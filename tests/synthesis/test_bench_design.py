@@ -16,8 +16,8 @@ from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.analysis.margins import margins
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.sweep import Sweep, complex_values
+from bywire.api.design_parts import verdict_text, verification_parts
 from bywire.api.loop_case import loop_case
-from bywire.api.verification_parts import verdict_text, verification_parts
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import from_mapping
 from bywire.bench.running import run

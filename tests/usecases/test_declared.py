@@ -19,10 +19,10 @@ from bywire.core import callers
 from bywire.core.errors import ParameterError
 from bywire.server import task
 from bywire.server.contents import Contents
+from bywire.server.exchange import RefusedError
+from bywire.server.pages.file_pages import task_page
 from bywire.server.pages.index_page import index_page
-from bywire.server.pages.task_page import task_page
 from bywire.server.place import Place
-from bywire.server.refusal import RefusedError
 from bywire.usecases import use_cases
 from bywire.usecases.declare import DECLARED
 

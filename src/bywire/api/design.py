@@ -1,22 +1,47 @@
-"""Gains of a loop from requirements: linear design, trial and retuning on the nonlinear bench."""
+"""What a design of gains, or of a gain schedule, starts from and says."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bywire.analysis.loop import LOOPS
-from bywire.api.design_answer import LoopScheduleDesign
-from bywire.api.design_inputs import (
-    for_ecu,
-    narrowed,
-    trial_of,
-)
-from bywire.api.loop_case import loop_case, over_range, spread
+from bywire.analysis.loop_curves import loop_curve
+from bywire.analysis.margins import NO_LOOP, figures_at
+from bywire.api import design_parts
+from bywire.api.design_drawn import Probability
+from bywire.api.design_parts import Part, judged_on, verdict_text
+from bywire.api.linear_texts import corner_notes
+from bywire.api.loop_case import LoopCase, loop_case, over_range, spread
+from bywire.bench.bench import Bench
 from bywire.bench.requirements import Limit
 from bywire.bench.running import Progress
-from bywire.synthesis.outcome import Across
+from bywire.core.callers import option
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import leaf_fields
+from bywire.core.units import shown
+from bywire.data.toml_file import read_toml
+from bywire.report.answer import Answer
+from bywire.report.document import (
+    Attachment,
+    Banner,
+    Block,
+    Document,
+    FigureBlock,
+    Listing,
+    Paragraph,
+    Section,
+    TableBlock,
+)
+from bywire.synthesis.outcome import Across, Design, ScheduleDesign, Status, bench_text
+from bywire.synthesis.requirement import read
 from bywire.synthesis.schedules import (
     design_schedule,
     frozen,
@@ -24,6 +49,355 @@ from bywire.synthesis.schedules import (
     scheduled,
     verify_schedule,
 )
+from bywire.synthesis.verification import Trial, Verification
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from bywire.report.design_curves import DesignCurve
+
+Spans = Mapping[str, tuple[float, float]]
+
+
+def requirements_of(file: str | Path | None, texts: Sequence[str]) -> tuple[Limit, ...]:
+    """Return the requirements of a file and of texts such as ``"bandwidth >= 10 Hz"``."""
+    return read([*_from_file(None if file is None else Path(file)), *texts])
+
+
+def left_to_choose(
+    loop: str, spans: Spans, changes: Mapping[str, Any]
+) -> dict[str, tuple[float, float]]:
+    """Return what may be chosen: what the user has set stays.
+
+    Raises
+    ------
+    ParameterError
+        When nothing is left.
+    """
+    if not spans:
+        raise ParameterError(f"loop {loop!r} has no gains to design")
+    left = {name: span for name, span in spans.items() if name not in changes}
+    if not left:
+        raise ParameterError(
+            f"{option('overrides')} fixes all of {', '.join(spans)}: leave out what is to be chosen"
+        )
+    return left
+
+
+def for_ecu(
+    case: LoopCase, changes: Mapping[str, Any], free: bool
+) -> tuple[LoopCase, dict[str, Any], Spans]:
+    """Return a case, its changes, and the spans that an ECU can run, but for what the user has set.
+
+    What they leave one value has it in the case, and among the changes as a text with its unit.
+    With ``free``, nothing is kept.
+    """
+    if free:
+        return case, dict(changes), {}
+    limits = {n: span for n, span in case.loop.realizable(case.par).items() if n not in changes}
+    fixed = {name: low for name, (low, high) in limits.items() if low == high}
+    units = leaf_fields(type(case.par))
+    texts = {n: f"{v:.9g} {units[n].unit.symbol}".removesuffix(" 1") for n, v in fixed.items()}
+    return replace(case, par=case.par.replace(fixed)), {**changes, **texts}, limits
+
+
+def narrowed(spans: Spans, limits: Spans) -> Spans:
+    """Return spans with the limits in their place where there are any."""
+    return {name: limits.get(name, span) for name, span in spans.items()}
+
+
+def tunables_of(case: LoopCase) -> Spans:
+    """Return the loop's tunables; with its schedule on, those of the operating point's region."""
+    schedule = case.loop.schedule
+    if schedule is None or not schedule.is_on(case.par):
+        return case.loop.tunables
+    return schedule.regions[schedule.region(case.par, case.value)]
+
+
+def trial_of(case: LoopCase, changes: Mapping[str, Any], amplitudes: str) -> Trial:
+    """Return what the design is tried on; ``amplitudes`` are those of the sines, with units."""
+    loop = case.loop
+    sizes = spread(amplitudes, case.input_unit, "amplitudes") if amplitudes else loop.amplitudes[1:]
+    bench = Bench(loop.proof, case.name, changes) if loop.proof else None
+    return Trial(loop, case.par, case.value, tuple(sizes), bench)
+
+
+def _from_file(path: Path | None) -> list[str]:
+    """Return the requirements of a TOML file: ``figure = "<= limit"``, or a list of limits."""
+    if path is None:
+        return []
+    section = read_toml(path, "file of requirements").get("requirements")
+    if not isinstance(section, dict) or not section:
+        raise ParameterError(
+            f'{path}: a section [requirements] is wanted, with lines such as bandwidth = ">= 10 Hz"'
+        )
+    wanted = []
+    for figure, limits in section.items():
+        for limit in limits if isinstance(limits, list) else [limits]:
+            if not isinstance(limit, str):
+                raise ParameterError(f'{path}: {figure} = {limit}: write a text such as ">= 10 Hz"')
+            wanted.append(f"{figure} {limit}")
+    return wanted
+
+
+# --- The answer
+
+_STEPS, _SETTLED = 5.0, 1.2  # what is drawn of a step: periods of the bandwidth, settling times
+
+
+@dataclass(frozen=True)
+class DesignAnswer(Answer):
+    """What designs of gains and of gain schedules have in common.
+
+    Parameters
+    ----------
+    case
+        The loop, its parameters before the design, and its operating point.
+    overrides
+        Parameters that were set beforehand.
+    requirements
+        What was required.
+    limits
+        Spans [SI] that were kept to so that an ECU can run the gains; none of ``free_derivative``.
+    tried
+        The design on the nonlinear bench; None where that was left out, or nothing is feasible.
+    """
+
+    case: LoopCase
+    overrides: Mapping[str, Any]
+    requirements: tuple[Limit, ...]
+    limits: Spans
+    tried: Verification | None
+
+    @property
+    @abstractmethod
+    def linear(self) -> Design | ScheduleDesign:
+        """The design on the linear model."""
+
+    @property
+    @abstractmethod
+    def points(self) -> str:
+        """The operating points in words."""
+
+    @abstractmethod
+    def parts(self) -> Sequence[Part]:
+        """Return tables and sentences of the result, in their order."""
+
+    @abstractmethod
+    def data(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+
+    @property
+    def gains(self) -> Mapping[str, float]:
+        """The gains [SI] by dotted name: those of the bench where it retuned them."""
+        return self.linear.gains if self.tried is None else self.tried.final.gains
+
+    @property
+    def status(self) -> Status:
+        """``met``, ``infeasible`` or ``interrupted``."""
+        tuning = None if self.tried is None else self.tried.tuning
+        return "interrupted" if tuning is not None and tuning.interrupted else self.linear.status
+
+    @property
+    def notes(self) -> list[str]:
+        """On which side of corners the linear models are."""
+        loop, par = self.case.loop, self.case.par.replace(self.gains)
+        return corner_notes([loop.closed(par, self.case.value).corners])
+
+    @property
+    def partial(self) -> str:
+        """What an interrupted design still shows."""
+        return "what is shown is the best until then"
+
+    @property
+    def holds(self) -> bool:
+        """Whether the requirements are met, on the bench too where that was tried."""
+        return self.linear.status == "met" and (self.tried is None or self.tried.met)
+
+    def document(self) -> Document:
+        """Return result, figures, and the gains as a bench file."""
+        loop, status, tried = self.case.loop, self.linear.status, self.tried
+        parts = [*self.parts(), *design_parts.limit_lines(self.case, self.limits)]
+        verdict = f"requirements {status} on the linear model"
+        if tried is not None:
+            verdict = verdict_text((*self.requirements, *self._missed_floors(tried)), tried)
+        required = Listing([str(requirement) for requirement in self.requirements])
+        return Document(
+            f"Design of loop {loop.name}",
+            self.case.subject.line,
+            sections=lambda: [
+                Section("Requirements", [required]),
+                Section("Result", design_parts.as_blocks(parts)),
+                Section("Figures", self._figures()),
+                self.case.subject.provenance("Parameters as they were before the design."),
+            ],
+            brief=[part if isinstance(part, str) else TableBlock(part) for part in parts],
+            data={**self.data(), "kept_for_the_ecu": {k: list(v) for k, v in self.limits.items()}},
+            banner=Banner(verdict, "good" if self.holds else "bad"),
+            attachments=[Attachment(f"{loop.name}-design.toml", self._write_bench)],
+            remarks=self._remarks(),
+            changes=self.case.subject.changes,
+        )
+
+    def _remarks(self) -> list[str]:
+        if self.status == "infeasible":
+            return ["no gains meet the requirements together: see what excludes what"]
+        if self.tried is not None and not self.tried.met:
+            final = self.tried.final
+            missed = [text for text, slack in final.slacks.items() if slack < 0.0]
+            texts = ", ".join(f"{text} ({judged_on(final, text)})" for text in missed)
+            return [f"the linear design meets all requirements, the tried gains do not: {texts}"]
+        return []
+
+    @staticmethod
+    def _missed_floors(tried: Verification) -> list[Limit]:
+        """Return what was to be kept and is not: the verdict counts it."""
+        return [each for each in tried.kept if tried.final.slacks[str(each)] < 0.0]
+
+    def _write_bench(self, path: Path) -> Path:
+        """Write the gains as a bench file."""
+        from bywire.report.drawing import write_bytes
+
+        case, tried = self.case, self.tried
+        state = self.linear.status if tried is None or tried.met else "not met"
+        text = bench_text(
+            f"loop {case.loop.name} at {case.loop.at.name} = {self.points}, requirements {state}",
+            case.loop.proof,
+            case.name,
+            self.overrides,
+            case.par,
+            self.gains,
+        )
+        return write_bytes(path, text.encode())
+
+    @cached_property
+    def _curves(self) -> list[DesignCurve]:
+        every: dict[str, Mapping[str, float]] = {"as given": {}, "linear design": self.linear.gains}
+        if self.tried is not None and self.tried.tuning is not None:
+            every["retuned on the bench"] = self.gains
+        curves = [_curve(self.case, label, gains) for label, gains in every.items()]
+        return [each for each in curves if each.curve.margins.has_loop]
+
+    def _figures(self) -> list[Block]:
+        if not self._curves:
+            return [Paragraph(f"{NO_LOOP}.")]
+        limits = {(each.figure, each.is_upper): each.bound for each in self.requirements}
+        captions = {
+            "loop-gain": "Loop gain of the nominal linear model; phase margins as the spans in "
+            "which they are read.",
+            "sensitivity": "Sensitivity S = 1/(1 + L) and complementary sensitivity T = L/(1 + L), "
+            "with the limits that are usually asked for (Skogestad and Postlethwaite, section "
+            "2.4.3).",
+            "step": "Unit step of the nominal linear model, at the sampling instants.",
+        }
+        return [
+            FigureBlock(
+                partial(self._draw, kind, limits), text, f"{self.case.loop.name}-design-{kind}"
+            )
+            for kind, text in captions.items()
+        ]
+
+    def _draw(self, kind: str, limits: Mapping[tuple[str, bool], float]) -> Figure:
+        from bywire.report.design_curves import loop_gains, sensitivities, steps
+
+        if kind == "loop-gain":
+            return loop_gains(self._curves, limits.get(("phase_margin", False)))
+        if kind == "sensitivity":
+            return sensitivities(self._curves)
+        return steps(self._curves, limits.get(("overshoot", True)))
+
+
+@dataclass(frozen=True)
+class LoopDesign(DesignAnswer):
+    """Gains of a loop from requirements.
+
+    Parameters
+    ----------
+    designed
+        The linear design.
+    probability
+        How probably its requirements are met over drawn models; None where none were drawn.
+    """
+
+    designed: Design
+    probability: Probability | None = None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the requirements are met, on the bench too, and as probably as is wanted."""
+        is_probable = self.probability is None or self.probability.outcome in (None, "met")
+        return super().holds and is_probable
+
+    def _remarks(self) -> list[str]:
+        if self.holds or not super().holds or self.probability is None:
+            return super()._remarks()
+        return [self.probability.verdict]
+
+    @property
+    def linear(self) -> Design:
+        """The design on the linear model."""
+        return self.designed
+
+    @property
+    def points(self) -> str:
+        """The operating point in words."""
+        return shown(self.case.value, self.case.loop.at.unit)
+
+    def parts(self) -> Sequence[Part]:
+        """Return tables and sentences of the result."""
+        parts = design_parts.as_parts(self.case, self.requirements, self.designed, self.tried)
+        return parts if self.probability is None else [*parts, *self.probability.parts()]
+
+    def data(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        data = design_parts.as_object(self.case, self.requirements, self.designed, self.tried)
+        return data | ({} if self.probability is None else {"drawn": self.probability.data()})
+
+
+@dataclass(frozen=True)
+class LoopScheduleDesign(DesignAnswer):
+    """Gains of a loop by region; ``retuned`` is the loop across the regions with the bench's."""
+
+    designed: ScheduleDesign
+    retuned: tuple[Across, ...]
+
+    @property
+    def linear(self) -> ScheduleDesign:
+        """The design on the linear model."""
+        return self.designed
+
+    @property
+    def points(self) -> str:
+        """The operating points in words."""
+        unit = self.case.loop.at.unit
+        return ", ".join(shown(v, unit) for values in self.designed.points.values() for v in values)
+
+    def parts(self) -> Sequence[Part]:
+        """Return tables and sentences of the result."""
+        return design_parts.schedule_as_parts(self.case, self.designed, self.tried, self.retuned)
+
+    def data(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return design_parts.schedule_as_object(
+            self.case, self.requirements, self.designed, self.tried, self.retuned
+        )
+
+
+def _curve(case: LoopCase, label: str, gains: Mapping[str, float]) -> DesignCurve:
+    from bywire.report.design_curves import DesignCurve
+
+    figures = figures_at(case.loop, case.par.replace(gains), case.value)
+    step: NDArray[np.float64] = np.zeros(1)
+    span, period = 0.0, figures.closed.period
+    if figures.is_stable and figures.has_loop:
+        step, settling = figures.step, figures.settling_time
+        usual = _STEPS / figures.bandwidth if figures.bandwidth > 0.0 else step.size * period
+        span = max(usual, _SETTLED * settling if settling < np.inf else 0.0)
+    time = np.arange(step.size, dtype=float) * period
+    return DesignCurve(label, loop_curve(case.loop, figures), time, step, span)
+
+
+# --- The design
 
 
 def designed_by_region(

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from bywire.api.design_parts import Part, figure_cell
 from bywire.api.loop_case import LoopCase
 from bywire.api.study_tables import percent
-from bywire.api.verification_parts import Part, figure_cell
 from bywire.bench.option_names import OPTION
 from bywire.bench.requirements import Limit
 from bywire.core.errors import InputError, ParameterError, quoted

@@ -1,19 +1,210 @@
-"""The ECU of a bench as C: laws, plant's side, parameters, test vectors, description."""
+"""The ECU of a bench as C, and its trials on processors: the same bits everywhere."""
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bywire.api.controller_check import ControllerCheck
 from bywire.bench.bench import Bench
+from bywire.bench.experiment import Case
+from bywire.core.errors import CompilerError, ModelError
+from bywire.core.provenance import Cited
+from bywire.export.controller.c_text import PRECISIONS
+from bywire.export.controller.files import files
+from bywire.export.controller.program import program
+from bywire.export.controller.target.trial import (
+    TARGETS,
+    Trial,
+    host_trial,
+    missing_tools,
+    target_trial,
+)
+from bywire.export.controller.vectors import vectors
 from bywire.report.answer import Answer
-from bywire.report.document import Document, Flat, Listing, Paragraph, Section
+from bywire.report.document import Document, Flat, Listing, Paragraph, Section, TableBlock
 from bywire.report.subject import bench_changes
+from bywire.report.tables import Cell, Column, Table, Verdict
+from bywire.simulation.compiler import find_compiler
 
 if TYPE_CHECKING:
     from bywire.export.controller.program import Program
+
+GOALS: Mapping[tuple[str, str], Mapping[str, int]] = {
+    ("Cortex-M4F", "single"): {"rom": 2048, "ram": 128, "stack": 128, "instructions": 400},
+    ("Cortex-M4F", "double"): {"instructions": 10_000},
+}
+"""what a tick of an ECU should take at most, by processor and precision: bytes, instructions"""
+_HEADINGS = {
+    "rom": "ROM [B]",
+    "ram": "RAM [B]",
+    "stack": "stack [B]",
+    "instructions": "instructions",
+}
+
+
+@dataclass(frozen=True)
+class ControllerCheck:
+    """How an exported ECU did.
+
+    Parameters
+    ----------
+    trials
+        One for every processor and precision that was tried, this machine first.
+    vectors
+        Test vectors of all tasks.
+    skipped
+        What was not tried, why, and what to install.
+    inexact
+        Precisions in which functions of the C library are called whose last digit is free.
+    """
+
+    trials: tuple[Trial, ...]
+    vectors: int
+    skipped: tuple[str, ...]
+    inexact: tuple[str, ...] = ()
+
+    def is_identical(self, trial: Trial) -> bool:
+        """Return whether a processor gave what the first one gave, in every bit."""
+        first = next(each for each in self.trials if each.precision == trial.precision)
+        return trial.bits == first.bits
+
+    @property
+    def holds(self) -> bool:
+        """Whether values are Python's, bits the same but for free digits, and contracts kept."""
+        return all(
+            each.differing == each.breaches == 0
+            and (self.is_identical(each) or each.precision in self.inexact)
+            for each in self.trials
+        )
+
+    def table(self) -> TableBlock:
+        """Return a row for every trial."""
+        figures = (Column(each, True) for each in _HEADINGS.values())
+        columns = [
+            Column("processor"),
+            Column("precision"),
+            Column("differing", True),
+            Column("breaches", True),
+            Column("bits"),
+            *figures,
+        ]
+        rows = tuple(self._row(each) for each in self.trials)
+        caption = (
+            f"{self.vectors} vectors: values that differ from Python's, breaches of the contract "
+            "in README.txt, bits beside those of the first row; instructions and stack of the task "
+            "that takes most, calls included."
+        )
+        return TableBlock(Table(tuple(columns), rows), caption, width=120)
+
+    def _row(self, trial: Trial) -> tuple[Cell, ...]:
+        identical = self.is_identical(trial)
+        same = Cell("the same" if identical else "others", "good" if identical else "bad")
+        figures, goals = figures_of(trial), GOALS.get((trial.target, trial.precision), {})
+        cells = [_measured(figures.get(name), goals.get(name)) for name in _HEADINGS]
+        counts = [
+            Cell(str(each), "bad" if each else "good", each)
+            for each in (trial.differing, trial.breaches)
+        ]
+        return (Cell(trial.target), Cell(trial.precision), *counts, same, *cells)
+
+    def as_object(self) -> dict[str, Any]:
+        """Return plain data."""
+        return {
+            "vectors": self.vectors,
+            "holds": self.holds,
+            "skipped": list(self.skipped),
+            "trials": [
+                {
+                    "processor": each.target,
+                    "precision": each.precision,
+                    "differing": each.differing,
+                    "breaches": each.breaches,
+                    "identical": self.is_identical(each),
+                    **figures_of(each),
+                    "goals": dict(GOALS.get((each.target, each.precision), {})),
+                    "tasks": {name: vars(task) for name, task in (each.tasks or {}).items()},
+                }
+                for each in self.trials
+            ],
+        }
+
+
+def figures_of(trial: Trial) -> dict[str, int]:
+    """Return the figures of a trial that goals are about; none on the host."""
+    if trial.rom is None or trial.ram is None or not trial.tasks:
+        return {}
+    return {
+        "rom": trial.rom,
+        "ram": trial.ram,
+        "stack": max(each.stack for each in trial.tasks.values()),
+        "instructions": max(each.instructions for each in trial.tasks.values()),
+    }
+
+
+def _measured(value: int | None, goal: int | None) -> Cell:
+    if value is None:
+        return Cell("")
+    if goal is None:
+        return Cell(str(value), value=value)
+    verdict: Verdict = "good" if value <= goal else "bad"
+    return Cell(f"{value} ({'<=' if value <= goal else '>'} {goal})", verdict, value)
+
+
+def check_controller(case: Case, cited: Mapping[str, Cited], count: int) -> ControllerCheck:
+    """Compile the ECU of a case in both precisions, and run it wherever the tools are there.
+
+    Parameters
+    ----------
+    cited
+        Values of the parameter set with their provenance.
+    count
+        Test vectors of each task.
+
+    Raises
+    ------
+    CompilerError
+        When nothing can be compiled, or a compiler fails.
+    """
+    compiler, missing = find_compiler(), missing_tools()
+    if compiler is None and missing:
+        raise CompilerError(
+            f"nothing can be checked: there is no C compiler, and {missing}; "
+            "the extra bywire[compiler] brings one"
+        )
+    skipped = [f"Cortex-M3, M4F and M7 were skipped: {missing}"] if missing else []
+    if compiler is None:
+        skipped.append("this machine was skipped: there is no C compiler (extra bywire[compiler])")
+    trials: list[Trial] = []
+    inexact, tried = [], 0
+    for precision in PRECISIONS:
+        try:
+            made = program(case.model, case.par, precision)
+            every = vectors(made, case.memory, count)
+            texts = files(made, case.memory, cited, every)
+        except ModelError as error:
+            if precision == "double":
+                raise
+            skipped.append(f"{precision} precision was skipped: {error}")
+            continue
+        tried = count * len(made.steps)
+        inexact += [precision] if made.inexact else []
+        with tempfile.TemporaryDirectory(prefix="bywire-ecu-") as place:
+            folder, scratch = Path(place) / "ecu", Path(place) / "made"
+            folder.mkdir()
+            scratch.mkdir()
+            for name, text in texts.items():
+                (folder / name).write_text(text, encoding="utf-8")
+            if compiler is not None:
+                trials.append(host_trial(made, folder, compiler, scratch))
+            if not missing:
+                trials += [target_trial(made, every, folder, t, scratch) for t in TARGETS]
+    return ControllerCheck(tuple(trials), tried, tuple(skipped), tuple(inexact))
+
+
+# --- The export
 
 VECTORS = 200
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -10,11 +12,15 @@ from typing import Any
 
 import xarray as xr
 
-from bywire.api import earlier_result
-from bywire.api.method_choice import ChosenMethod
+from bywire.api.identify import ChosenMethod
+from bywire.bench.bench import Bench
+from bywire.bench.experiment import EXPERIMENTS
+from bywire.core.callers import option
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.errors import FileError, InputError
+from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.identification.estimate import Estimate, as_object
 from bywire.identification.method import Identified
-from bywire.identification.parameter_file import parameter_file
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Attachment,
@@ -33,6 +39,194 @@ from bywire.report.document import (
 from bywire.report.estimate_tables import check_table, estimate_table, figure_table
 from bywire.report.subject import Subject, changes_block, parameter_rows
 from bywire.report.tables import parameter_table
+
+_WITHOUT_EFFECT = re.compile(r"([\w.]+) = .* would have no effect")
+
+
+def parameter_file(
+    experiment: str,
+    parameters: str,
+    par: ParameterSet,
+    changes: Mapping[str, Any],
+    comment: str = "",
+) -> str:
+    """Return the text of a bench file.
+
+    Parameters
+    ----------
+    experiment
+        Experiment that the file runs; another one of the same assembly where it wants more than
+        parameters.
+    parameters
+        Name of the parameter set that the changes are made to.
+    par
+        Parameters of that set, for units.
+    changes
+        Dotted name -> value, SI, or choice. What has no effect in the experiment is left
+        out, and a comment says so.
+    comment
+        First line.
+    """
+    wanted, left_out, problem = _accepted(experiment, parameters, changes)
+    notes = comment.splitlines()
+    if problem:
+        for other in _alternatives(parameters):
+            accepted, left, trouble = _accepted(other, parameters, changes)
+            if not trouble:
+                notes.append(f"experiment {experiment!r} wants more than this file says: {problem}")
+                experiment, wanted, left_out = other, accepted, left
+                break
+    lines = [f"# {line}" for line in notes]
+    lines += [f'experiment = "{experiment}"', f'parameters = "{parameters}"', "", "[set]"]
+    lines += [f'"{name}" = {_written(name, value, par)}' for name, value in wanted.items()]
+    lines += [
+        f"# without effect in this experiment: {name} = {_written(name, changes[name], par)}"
+        for name in left_out
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _accepted(
+    experiment: str, parameters: str, changes: Mapping[str, Any]
+) -> tuple[dict[str, Any], list[str], str]:
+    """Return the changes that take effect, the others' names, and why none of it runs."""
+    wanted: dict[str, Any] = dict(changes)
+    left_out: list[str] = []
+    while True:
+        try:
+            Bench(experiment, parameters, overrides=wanted)
+        except InputError as error:
+            refused = _WITHOUT_EFFECT.match(str(error))
+            if refused is None or refused[1] not in wanted:
+                return wanted, left_out, str(error).splitlines()[0]
+            left_out.append(refused[1])
+            wanted.pop(refused[1])
+            continue
+        return wanted, left_out, ""
+
+
+def _alternatives(parameters: str) -> list[str]:
+    """Return the experiments of a parameter set's assembly that bring all they need."""
+    assembly = PARAMETER_SETS.find(parameters).assembly
+    return [
+        experiment.name
+        for experiment in EXPERIMENTS.all().values()
+        if experiment.assembly == assembly and experiment.driven_unit is None
+    ]
+
+
+def _written(name: str, value: Any, par: ParameterSet) -> str:
+    leaf = leaf_fields(type(par)).get(name)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if leaf is None or isinstance(value, str):
+        return f'"{value}"'
+    unit = leaf.unit.symbol
+    texts = [f'"{v:.9g} {unit}"' if unit != "1" else f"{v:.9g}" for v in _nodes(value)]
+    return texts[0] if not isinstance(value, tuple) else f"[{', '.join(texts)}]"
+
+
+def _nodes(value: Any) -> tuple[float, ...]:
+    if isinstance(value, tuple):
+        return tuple(map(float, value))
+    return (float(value),)
+
+
+# --- What an earlier identification or study left in the folder of ``--out``
+
+ESTIMATE = "estimate.json"
+"""file of the output folder that says which method wrote it, and what else it wrote"""
+
+STUDY = "study.json"
+"""file of the output folder that says which method a study tried, and what came of it"""
+
+_OURS = (".html", ".nc", ".png", ".toml")
+
+
+def require_own(out: Path, method: str) -> None:
+    """Refuse a folder that holds a result or a study of another method.
+
+    Raises
+    ------
+    FileError
+        When it does, or what it holds cannot be read.
+    """
+    for path, what in ((out / ESTIMATE, "result"), (out / STUDY, "study")):
+        earlier = _read(path)
+        if earlier is None or earlier.get("method") == method:
+            continue
+        raise FileError(
+            f"{out} holds a {what} of {earlier.get('method') or 'something else'}: name another "
+            f"folder with {option('folder')} for {method}, or remove {path} with what belongs to it"
+        )
+
+
+def remove_study(out: Path) -> None:
+    """Remove the result of an earlier study; the experiments that it finished stay.
+
+    Raises
+    ------
+    FileError
+        When it cannot be removed.
+    """
+    _unlink(out / STUDY)
+
+
+def remove(out: Path, keep: Sequence[Path]) -> None:
+    """Remove the files of an earlier result, so that none stands beside the new one.
+
+    Parameters
+    ----------
+    out
+        Folder.
+    keep
+        Files that stay: what is just being identified.
+
+    Raises
+    ------
+    FileError
+        When one cannot be removed.
+    """
+    earlier = _read(out / ESTIMATE)
+    if earlier is None:
+        return
+    kept = {path.resolve() for path in keep}
+    # Names alone, within the folder: it may have moved since. The list itself goes last.
+    names = [Path(str(text)).name for text in earlier.get("files", [])]
+    written = [out / name for name in names if Path(name).suffix in _OURS]
+    for path in (*written, out / ESTIMATE):
+        if path.resolve() not in kept:
+            _unlink(path)
+
+
+def _unlink(path: Path) -> None:
+    try:
+        if path.is_file():
+            path.unlink()
+    except OSError as error:
+        raise FileError(
+            f"cannot remove {path} of an earlier result: {error.strerror}; name another folder "
+            f"with {option('folder')}"
+        ) from None
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    """Return an earlier result, None where there is none."""
+    if not path.exists():
+        return None
+    try:
+        earlier = json.loads(path.read_text(encoding="utf-8"))
+        if not (isinstance(earlier, dict) and isinstance(earlier.get("files", []), list)):
+            raise ValueError("it is no result of bywire identify")
+    except (OSError, ValueError) as error:
+        raise FileError(
+            f"{path} cannot be read ({error}): name another folder with {option('folder')}, or "
+            "remove it"
+        ) from None
+    return earlier
+
+
+# --- The answer
 
 
 @dataclass(frozen=True)
@@ -139,7 +333,7 @@ class Identification(Answer):
             data=self._data(),
             banner=self._banner(),
             attachments=list(self._attachments()),
-            record=earlier_result.ESTIMATE,
+            record=ESTIMATE,
             file_notes=self._file_notes(),
             prepare=self._prepare,
             changes=self.chosen.changed,
@@ -291,8 +485,8 @@ class Identification(Answer):
         return [f"no parameters.toml is written: {reason}"]
 
     def _prepare(self, folder: Path) -> None:
-        earlier_result.require_own(folder, self.chosen.method.name)
-        earlier_result.remove(folder, self.files)
+        require_own(folder, self.chosen.method.name)
+        remove(folder, self.files)
 
 
 def _residual_caption(name: str, estimate: Estimate) -> str:

@@ -1,28 +1,238 @@
-"""The exact linear model of a closed loop, with its sampling, or of a plant."""
+"""The exact linear model of a closed loop, with its sampling: poles, responses, locus, dither."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bywire.analysis.crossings import bandwidth
+from bywire.analysis.linear.linear_model import LinearModel, rates
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.locus import Locus, locus
 from bywire.analysis.loop import LOOPS
+from bywire.analysis.loop_figures import LoopFigures
+from bywire.analysis.margins import NO_LOOP
 from bywire.analysis.periodic import PeriodicModel, dithered_loop
+from bywire.analysis.reduction import Reduced
 from bywire.api import linear_texts as texts
-from bywire.api.linearize_answer import LinearizedLoop
-from bywire.api.linearize_plant import (
-    PlantCase,
-    plant_case,
-)
+from bywire.api.linearize_plant import PlantCase, plant_case
 from bywire.api.loop_case import LoopCase, loop_case, range_of
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, of_difference
 from bywire.core.callers import option
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError
+from bywire.report.answer import Answer
+from bywire.report.document import (
+    Attachment,
+    Banner,
+    Block,
+    Document,
+    FigureBlock,
+    Flat,
+    Listing,
+    Paragraph,
+    Section,
+)
+from bywire.report.wording import unit_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_LOWEST = 1e-2  # lower end of what is searched for the bandwidth, Hz
+_NYQUIST = 0.998  # of half the sampling frequency
+_POINTS = 600
+_DEPTH = 80.0  # of the closed loop's gain that is shown, dB
+
+
+@dataclass(frozen=True)
+class LinearizedLoop(Answer):
+    """The linear model of a closed loop.
+
+    Parameters
+    ----------
+    case
+        The loop, its parameters and its operating point.
+    model
+        From its input to its output, as it is sampled; ``model.state_space()`` is python-control's.
+    locus
+        Its poles over a range; None where none was asked for.
+    reduced
+        The model with fewer states; None where none was asked for.
+    dithered
+        The loop about its motion under dither; None where it was not asked for.
+    dithered_error
+        Largest error of its gains to small sines from the step, as a share; infinite where the
+        motion does not repeat itself in half steps.
+    """
+
+    case: LoopCase
+    model: LinearModel
+    locus: Locus | None = None
+    reduced: Reduced | None = None
+    dithered: PeriodicModel | None = None
+    dithered_error: float = math.nan
+
+    @property
+    def notes(self) -> list[str]:
+        """On which side of corners the model is."""
+        return texts.corner_notes([self.model.corners])
+
+    @cached_property
+    def state(self) -> str:
+        """``"stable"``, ``"unstable"``, or that there is no loop."""
+        gain, closed = self.case.loop.gain_and_closed(self.case.par, self.case.value)
+        if not LoopFigures(gain, closed).has_loop:
+            return NO_LOOP
+        return "stable" if self.model.is_stable else "unstable"
+
+    def document(self) -> Document:
+        """Return poles, responses, locus, reduction and motion under dither."""
+        loop, model = self.case.loop, self.model
+        poles = texts.poles_block(model, "Poles, slowest first.")
+        stable = "UNSTABLE" if self.state == "unstable" else self.state
+        head = (
+            f"closed loop {loop.name} of {self.case.name} at {self.case.point}: {stable}, sampled "
+            f"with {model.period * 1e3:g} ms"
+        )
+        over = [] if self.locus is None else [self._locus_listing(self.locus)]
+        return Document(
+            f"Linear model of closed loop {loop.name}",
+            self.case.subject.line,
+            sections=lambda: [
+                Section("Poles", [*poles, *self._dithered_blocks(), *over]),
+                Section("Figures", self._figures()),
+                self.case.subject.provenance(
+                    f"Exact linear model, sampled with {model.period * 1e3:g} ms: plant, filters "
+                    "and controllers, dry friction left out."
+                ),
+            ],
+            brief=[head, *poles, *over, *self._brief_reduced(), *self._brief_dithered()],
+            data=self._data(),
+            banner=Banner(self.state, "good" if self.state == "stable" else "bad"),
+            attachments=self._attachments(),
+            changes=self.case.subject.changes,
+        )
+
+    def _locus_listing(self, locus: Locus) -> Listing:
+        return Listing(texts.locus_lines(locus), f"over {locus.name}:")
+
+    def _brief_reduced(self) -> list[str | Flat]:
+        if self.reduced is None:
+            return []
+        return [texts.reduced_line(self.reduced), *texts.poles_block(self.reduced.model)]
+
+    def _brief_dithered(self) -> list[str | Flat]:
+        if self.dithered is None:
+            return []
+        gains = texts.small_gains_line(self.dithered, self.case.loop.band, self.dithered_error)
+        poles = texts.poles_block(self.dithered.averaged)
+        return [texts.dithered_line(self.dithered), *poles, gains]
+
+    def _dithered_blocks(self) -> list[Block]:
+        if self.dithered is None:
+            return []
+        caption = "Poles with friction and dither, averaged over a dither period, slowest first."
+        poles = texts.poles_block(self.dithered.averaged, caption)
+        return [Paragraph(texts.dithered_line(self.dithered)), *poles]
+
+    def _figures(self) -> list[FigureBlock]:
+        name, model, width = self.case.loop.name, self.model, closed_bandwidth(self.model)
+        blocks = [
+            FigureBlock(
+                partial(_poles, model, width),
+                "Poles of the closed loop as rates; rays of equal damping ratio, circles of equal "
+                "frequency, the unstable half shaded, f_s the sampling frequency. Pairs are shown "
+                "by one of them.",
+                f"{name}-poles",
+            ),
+            FigureBlock(
+                partial(_response, model, width, self.dithered),
+                "Frequency response of the closed loop, down to 80 dB below its largest gain.",
+                f"{name}-closed-loop",
+            ),
+        ]
+        if self.locus is not None:
+            caption = f"Poles of the closed loop against {self.locus.name}."
+            draw = partial(self._draw_locus, self.locus)
+            blocks.append(FigureBlock(draw, caption, f"{name}-locus"))
+        return blocks
+
+    def _draw_locus(self, locus: Locus) -> Figure:
+        from bywire.report.poles import root_locus
+
+        case = self.case
+        ends = (float(locus.values[0]), float(locus.values[-1]))
+        cases = case.loop.varied(case.par, case.value, locus.name, ends)
+        models = [self.model, *(case.loop.closed(*each) for each in cases)]
+        widths = [closed_bandwidth(model) for model in models if model.is_stable]
+        return root_locus(locus, max(widths, default=math.nan))
+
+    def _attachments(self) -> list[Attachment]:
+        name = self.case.loop.name
+        files = [texts.json_file(f"{name}-linear-model.json", self._model_data())]
+        if self.dithered is not None:
+            content = texts.dithered_object(self.dithered)
+            files.append(texts.json_file(f"{name}-dithered-model.json", content))
+        return files
+
+    def _model_data(self) -> dict[str, Any]:
+        shown = texts.matrices(self.model)
+        transfers = shown.pop("transfer_functions")
+        return {
+            **self.case.heading,
+            **shown,
+            "rates": texts.pairs(rates(self.model)),
+            "stable": self.model.is_stable,
+            "has_loop": self.state != NO_LOOP,
+            "transfer_functions": transfers,
+        }
+
+    def _data(self) -> dict[str, Any]:
+        shown = self._model_data()
+        if self.locus is not None:
+            shown["locus"] = texts.locus_object(self.locus)
+        if self.reduced is not None:
+            shown["reduced"] = texts.reduced_object(self.reduced)
+        if self.dithered is not None:
+            shown["dithered"] = texts.dithered_object(self.dithered)
+            shown["dithered"]["gain_step_error"] = self.dithered_error
+        return shown
+
+
+def closed_bandwidth(model: LinearModel) -> float:
+    """Return the -3 dB bandwidth of a closed loop [Hz]; NaN for an unstable one."""
+    if not model.is_stable:
+        return math.nan
+    return bandwidth(lambda f: model.response(f)[:, 0, 0], (_LOWEST, _NYQUIST * model.nyquist))
+
+
+def _poles(model: LinearModel, width: float) -> Figure:
+    from bywire.report.poles import pole_map
+
+    return pole_map(rates(model), model.period, width)
+
+
+def _response(model: LinearModel, width: float, dithered: PeriodicModel | None) -> Figure:
+    from bywire.report.bode import Response, bode
+
+    low = 0.01 * width if math.isfinite(width) else 1e-4 / model.period
+    f = np.geomspace(low, _NYQUIST * model.nyquist, _POINTS)
+    (taken,), (given,) = model.input_units, model.output_units
+    unit = "1" if taken == given else f"{unit_text(given) or '1'}/{unit_text(taken) or '1'}"
+    label = "closed loop" if dithered is None else "without friction"
+    lines = [Response(label, f, model.response(f)[:, 0, 0])]
+    if dithered is not None:
+        lines.append(Response("with friction and dither", f, dithered.response(f)))
+    marks = {f"bandwidth {width:.3g} Hz": width} if math.isfinite(width) else {}
+    return bode(lines, gain_unit=unit, marks=marks, depth=_DEPTH)
+
+
+# --- The model
 
 
 def linearized_loop(case: LoopCase, locus: str, reduce: str, dither: bool) -> LinearizedLoop:

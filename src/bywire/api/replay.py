@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -11,17 +14,255 @@ import xarray as xr
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
+from bywire.bench.kpis.kpi import Kpi
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.model import Model
 from bywire.core.signals import signals_of
 from bywire.data.named_columns import NamedColumns
-from bywire.identification.replaying.segments import (
-    Segment,
-    found_in,
-    read_segments,
-    whole_record,
+from bywire.identification.replaying.bench_replay import Replayed
+from bywire.identification.replaying.fit import SegmentFit, undefined
+from bywire.identification.replaying.segments import Segment, found_in, read_segments, whole_record
+from bywire.identification.replaying.tracking import Track
+from bywire.report.answer import Answer
+from bywire.report.document import (
+    Attachment,
+    Banner,
+    Document,
+    FigureBlock,
+    Listing,
+    Section,
+    TableBlock,
+    spaced,
 )
+from bywire.report.subject import Subject
+from bywire.report.tables import Cell, Column, Table, measured_cell
+from bywire.report.wording import amount, clean, duration
+
+_SHOWN = ("nrmse", "vaf", "max_error", "bias", "lag")
+
+
+@dataclass(frozen=True)
+class Replay(Answer):
+    """A measurement beside what the model makes of the same demand.
+
+    Parameters
+    ----------
+    bench, source
+        The model, and the measurement in one line.
+    replayed
+        Inputs, and each output measured and modeled.
+    fits
+        Figures of every signal and stretch, with the tolerances.
+    tracks
+        Drifting parameters, tracked.
+    data_notes
+        What was done to the measurement.
+    """
+
+    bench: Bench
+    source: str
+    replayed: Replayed
+    fits: tuple[SegmentFit, ...]
+    tracks: tuple[Track, ...] = ()
+    data_notes: tuple[str, ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Whether every tolerance is met."""
+        return all(v.met for fit in self.fits for v in fit.verdicts)
+
+    @property
+    def notes(self) -> list[str]:
+        """What was done to the measurement, what is assumed, and why figures are not defined."""
+        return [*self.data_notes, *self.replayed.notes, *undefined(self.fits)]
+
+    @property
+    def recording(self) -> xr.Dataset:
+        """Inputs, and each output as ``NAME_measured`` and ``NAME_modeled``, over ``time`` [s]."""
+        signals = {
+            f"{name}_{kind}": pair[kind]
+            for name, pair in self.replayed.outputs.items()
+            for kind in ("measured", "modeled")
+        }
+        return xr.Dataset({**signals, **{str(n): v for n, v in self.replayed.inputs.items()}})
+
+    def document(self) -> Document:
+        """Return how well it fits, stretch by stretch, with figures and tracked parameters."""
+        bench, inputs = self.bench, ", ".join(map(str, self.replayed.inputs.data_vars))
+        subject = Subject.of_bench(bench)
+        table = TableBlock(fit_table(self.fits), width=110)
+        definitions = [f"{k.name}: {k.definition}" for k in self.fits[0].kpis] if self.fits else []
+        head = f"{self.source} drives {bench.experiment} of {bench.parameters} by {inputs}"
+        return Document(
+            f"Replay of {self.source}",
+            subject.line,
+            sections=lambda: [
+                Section("How well it fits", [table, Listing(definitions)]),
+                Section("Measured and simulated", self._figures()),
+                *([Section("Tracked parameters", self._track_figures())] if self.tracks else []),
+                subject.provenance(
+                    f"Measurement: {self.source}.",
+                    *(f"{note[:1].upper()}{note[1:]}." for note in self.notes),
+                ),
+            ],
+            brief=spaced([head, table, *self._tracked_texts()]),
+            data=self._data(),
+            banner=self._banner(),
+            attachments=[Attachment("replay.nc", self._write_signals)],
+            record="replay.json",
+            changes=subject.changes,
+        )
+
+    def _figures(self) -> list[FigureBlock]:
+        from bywire.report.replay_figures import replay_figure
+
+        return [
+            FigureBlock(
+                partial(
+                    replay_figure,
+                    name,
+                    pair,
+                    self.replayed.inputs,
+                    [fit for fit in self.fits if fit.signal == name],
+                ),
+                f"{name}: measured (solid), simulated (dashed), and their difference; the demand "
+                "above.",
+                name,
+            )
+            for name, pair in self.replayed.outputs.items()
+        ]
+
+    def _track_figures(self) -> list[FigureBlock]:
+        from bywire.report.replay_figures import track_figure
+
+        known = self.replayed.run.par.leaves()
+        return [
+            FigureBlock(
+                partial(track_figure, each, known.get(each.relation.parameter)),
+                f"{each.relation.parameter} tracked from {', '.join(each.relation.signals)}: "
+                f"{each.relation.assumption}.",
+                f"track-{each.relation.parameter}",
+            )
+            for each in self.tracks
+        ]
+
+    def _tracked_texts(self) -> Iterator[str]:
+        for each in self.tracks:
+            data, unit = each.data.isel(parameter=0), each.relation.units[0]
+            updated = data.isel(time=data["used"].values > 0)
+            if updated.sizes["time"]:
+                first, last = (
+                    f"{amount(float(updated['value'][k]), unit)} "
+                    f"({amount(float(updated['low'][k]), unit)} "
+                    f"to {amount(float(updated['high'][k]), unit)})"
+                    for k in (0, -1)
+                )
+                yield f"{each.relation.parameter} tracked: at first {first}, at last {last}"
+
+    def _banner(self) -> Banner | None:
+        if not any(fit.verdicts for fit in self.fits):
+            return None
+        outcomes = [v.outcome for fit in self.fits for v in fit.verdicts]
+        counted = ((outcomes.count(word), word) for word in ("missed", "undecided"))
+        said = " and ".join(f"{count} {word}" for count, word in counted if count)
+        if not said:
+            return Banner("All tolerances are met.", "good")
+        return Banner(f"Of {len(outcomes)} tolerances, {said}.", "bad")
+
+    def _data(self) -> dict[str, Any]:
+        return {
+            "bench": self.bench.name or self.bench.experiment,
+            "measurement": self.source,
+            "inputs": [str(name) for name in self.replayed.inputs.data_vars],
+            "notes": self.notes,
+            "holds": self.holds,
+            "segments": [
+                {
+                    "name": fit.segment.name,
+                    "signal": fit.signal,
+                    "start": fit.segment.start,
+                    "stop": fit.segment.stop,
+                    "figures": {
+                        k.name: {
+                            "value": k.value,
+                            "unit": k.unit,
+                            "error": k.error,
+                            "converges": k.converges,
+                        }
+                        for k in fit.kpis
+                    },
+                    "tolerances": [
+                        {
+                            "figure": v.kpi,
+                            "limit": v.limit,
+                            "value": v.value,
+                            "met": v.met,
+                            "outcome": v.outcome,
+                            "error": v.error,
+                        }
+                        for v in fit.verdicts
+                    ],
+                }
+                for fit in self.fits
+            ],
+            "tracked": {each.relation.parameter: _tracked(each) for each in self.tracks},
+        }
+
+    def _write_signals(self, path: Path) -> Path:
+        from bywire.data.netcdf import write_recording
+
+        return write_recording(self.recording, path)
+
+
+def fit_table(fits: Sequence[SegmentFit]) -> Table:
+    """Return the figures of every signal and stretch, with the tolerances that are missed."""
+    rows = []
+    for fit in fits:
+        by_name = {k.name: k for k in fit.kpis}
+        failed = {
+            word: [
+                f"{v.kpi} {v.limit}{' (not defined)' if math.isnan(v.value) else ''}"
+                for v in fit.verdicts
+                if v.outcome == word
+            ]
+            for word in ("missed", "undecided")
+        }
+        said = "; ".join(f"{word}: {', '.join(each)}" for word, each in failed.items() if each)
+        verdict = Cell("-")
+        if fit.verdicts:
+            verdict = Cell(said, "bad") if said else Cell("ok", "good")
+        rows.append(
+            (
+                Cell(clean(fit.segment.name)),
+                Cell(clean(fit.signal)),
+                *(_figure(by_name[n]) for n in _SHOWN),
+                verdict,
+            )
+        )
+    numbers = (Column(name.replace("_", " "), numeric=True) for name in _SHOWN)
+    return Table((Column("segment"), Column("signal"), *numbers, Column("tolerances")), tuple(rows))
+
+
+def _figure(kpi: Kpi) -> Cell:
+    if kpi.unit == "s" and math.isfinite(kpi.value) and not kpi.bound > 0.0:
+        return Cell(duration(kpi.value), value=kpi.value, unit=kpi.unit)
+    return measured_cell(kpi.value, kpi.unit, kpi.bound, 3)
+
+
+def _tracked(track: Track) -> dict[str, Any]:
+    data = track.data.isel(parameter=0)
+    return {
+        "unit": track.relation.units[0],
+        "from": list(track.relation.signals),
+        "assumption": track.relation.assumption,
+        "time": data["time"].values.tolist(),
+        **{n: data[n].values.tolist() for n in ("value", "low", "high")},
+        "used": data["used"].values.tolist(),
+    }
+
+
+# --- The replay
 
 _NONE: Mapping[str, Any] = MappingProxyType({})
 _SILENT = {"kind": "step", "start": "0", "end": "0", "t_step": "0"}

@@ -7,8 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from bywire.api.run_remarks import remarks
-from bywire.api.run_sections import energy, how_it_was_made, outcome, schematic_section, source_says
+from bywire.api.run_sections import (
+    energy,
+    how_it_was_made,
+    outcome,
+    remarks,
+    schematic_section,
+    source_says,
+)
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
 from bywire.bench.faults.fault_section import from_text

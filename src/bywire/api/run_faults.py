@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bywire.api.study_tested import varied_texts
+from bywire.api.run_sections import varied_texts
 from bywire.campaigns.findings import CampaignFindings, FaultFinding
 from bywire.campaigns.residual import NEVER
 from bywire.core.quantities import display_unit

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.api.loop_case import spread
-from bywire.api.run_remarks import fault_texts
+from bywire.api.run_sections import fault_texts
 from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed, run_benches, varied_leaf
 from bywire.bench.kpis.kpi import Kpi

@@ -1,4 +1,4 @@
-"""Sections of a run's report: the outcome first, then books of energy and how it was made."""
+"""What a report says of a run or study: remarks, sections, and what was tested."""
 
 from __future__ import annotations
 
@@ -9,15 +9,17 @@ from typing import Any
 
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger
+from bywire.bench.experiment import Recordings
+from bywire.bench.kpis.registry import FAMILIES
 from bywire.bench.result import Result
 from bywire.bench.stated import stated_for
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES
 from bywire.core.units import difference_unit
-from bywire.report.document import Block, Details, Paragraph, Section, TableBlock
+from bywire.report.document import Block, Details, Listing, Paragraph, Section, TableBlock
 from bywire.report.schematic import schematic_blocks
 from bywire.report.stated_levels import stated_level
-from bywire.report.subject import Subject, parameter_rows
+from bywire.report.subject import Subject, bench_changes, parameter_rows
 from bywire.report.tables import (
     Cell,
     KpiRow,
@@ -27,6 +29,94 @@ from bywire.report.tables import (
     parameter_table,
     text_table,
 )
+from bywire.report.wording import amount, clean
+from bywire.studies.plan import StudiedBench, StudyPlan, Varied
+
+_MOST = {"share_stuck": 0.5, "share_sat_current": 0.1, "share_sat_duty": 0.1}
+_MISSED = 0.05  # of the step's height
+
+
+def remarks(result: Result) -> list[str]:
+    """Return what a run did instead of what was asked.
+
+    A run is remarkable that is stuck more than half of its time, at a limit more than a tenth of
+    it, or that ends off its set point by more than a twentieth of the step; what its model says is.
+    """
+    faults = fault_texts(result.bench, result.recordings)
+    return [*faults, *_shares(result), *_set_point(result), *_of_models(result)]
+
+
+def fault_texts(bench: Bench, recordings: Recordings | None = None) -> list[str]:
+    """Return each fault of a bench in a sentence: how much, when, what it is.
+
+    ``recordings``: its runs, of which none may meet the fault; None where they are not looked at.
+    """
+    texts = []
+    for fault in bench.injections:
+        mode, course = fault.mode, fault.course
+        size = f" = {amount(fault.value, mode.unit)}" if mode.unit else ""
+        until = f" to {amount(course.end, 's')}" if math.isfinite(course.end) else " on"
+        is_met = recordings is None or any(
+            course.is_there(each["time"].values).any()
+            for each in recordings.values()
+            if "time" in each
+        )
+        unmet = "" if is_met else "; no recorded row meets it"
+        texts.append(
+            f"fault {mode.name}{size}, from {amount(course.onset, 's')}{until}: "
+            f"{mode.summary}{unmet}"
+        )
+    return texts
+
+
+def _of_models(result: Result) -> list[str]:
+    """Return what the models say of their runs; the same of several of them once.
+
+    Not of recordings that hold other things than the model's signals.
+    """
+    texts: dict[str, None] = {}
+    models = ASSEMBLIES.beside(type(result.bench.par))
+    for recording in result.recordings.values():
+        model = models.get(str(recording.attrs.get("model")))
+        text = recording.attrs.get("parameters")
+        if model is None or text is None or not recording.sizes.get("time"):
+            continue
+        if all(name in recording for name in model.Output._fields):
+            par = type(result.bench.par).model_validate_json(text)
+            texts |= dict.fromkeys(model().remarks(recording, par))
+    return list(texts)
+
+
+def _shares(result: Result) -> list[str]:
+    measures = FAMILIES.find("occupation").measures
+    texts = []
+    for kpi in result.kpis:
+        name = next((each for each in measures if kpi.name.startswith(each)), "")
+        if name and kpi.value > _MOST[name]:  # NaN is not
+            what = measures[name].definition.rpartition(" which ")[2].rstrip(".")
+            where = kpi.name.removeprefix(name).strip("_")
+            texts.append(f"{what} {100 * kpi.value:.3g} % of the time{where and f' ({where})'}")
+    return texts
+
+
+def _set_point(result: Result) -> list[str]:
+    definition, kpis = result.bench.definition, {kpi.name: kpi for kpi in result.kpis}
+    error = kpis.get("steady_state_error")
+    if definition.step is None or error is None or math.isnan(error.value):
+        return []
+    step = definition.step(result.bench.chosen_options)
+    if step.start is None or step.end is None or step.start == step.end:
+        return []
+    share = error.value / abs(step.end - step.start)
+    if not share > _MISSED:
+        return []
+    return [
+        f"misses its set point: {step.signal} ends {amount(error.value, error.unit)} off "
+        f"{amount(step.end, error.unit)}, {100 * share:.3g} % of the step"
+    ]
+
+
+# --- Sections
 
 RECORDED = ("bywire_version", "parameter_hash", "step", "engine", "status", "seed")
 """attributes of a recording that say how it was made"""
@@ -135,3 +225,82 @@ def _signal_errors(errors: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> lis
         return []
     table = text_table(["run", "signal", "rms", "largest"], rows)
     return [Details("Error of recorded signals from the step", [TableBlock(table)])]
+
+
+# --- What a study tests
+
+
+def tested_line(plan: StudyPlan) -> str:
+    """Return what the bench of a study does in one line, with the faults that it has."""
+    line = plan.bench.summary([each.name for each in plan.varied])
+    names = [fault.mode.name for fault in plan.bench.injections]
+    if not names:
+        return line
+    return f"{line}, with the fault{'s' * (len(names) > 1)} {', '.join(names)}"
+
+
+def tested_brief(nominal: Result, plan: StudyPlan) -> list[Listing]:
+    """Return for a terminal the faults, if there are any, and what varies."""
+    return [Listing([*fault_texts(nominal.bench, nominal.recordings), *varied_texts(plan.varied)])]
+
+
+def varied_texts(varied: Sequence[Varied]) -> list[str]:
+    """Return a sentence on each quantity that takes several values."""
+    return [clean(f"{each.name} varies: {each.distribution.text}") for each in varied]
+
+
+def tested_section(nominal: Result, source: StudiedBench | None, subject: Subject) -> Section:
+    """Return where the bench comes from, its faults, what it changes, and its options.
+
+    Parameters
+    ----------
+    nominal
+        The bench itself, run.
+    source
+        Where it comes from; None where that is not known.
+    subject
+        The bench with what was changed of it.
+    """
+    faults = fault_texts(nominal.bench, nominal.recordings)
+    blocks: list[Block] = [Paragraph(f"{_source_text(source)}.")] if source is not None else []
+    blocks += [Listing(faults)] if faults else []
+    blocks += [subject.changes_block, options_in_use(nominal.bench)]
+    return Section("What was tested", blocks)
+
+
+def tested_data(bench: Bench, source: StudiedBench | None) -> dict[str, Any]:
+    """Return the bench for JSON.
+
+    Values are SI numbers, those of changes and of what the study sets texts with units; the end of
+    a fault that stays is None.
+    """
+    return {
+        "file": None if source is None else source.bench,
+        "set": {} if source is None else dict(source.changes),
+        "experiment": bench.experiment,
+        "parameters": bench.parameters,
+        "changes": {
+            each.name: {"value": each.now, "instead_of": each.before}
+            for each in bench_changes(bench)
+        },
+        "options": bench.chosen_options.model_dump(mode="json"),
+        "faults": [
+            {
+                "fault": fault.mode.name,
+                "summary": fault.mode.summary,
+                "value": fault.value if fault.mode.unit else None,
+                "unit": fault.mode.unit or None,
+                "onset": fault.course.onset,
+                "end": fault.course.end if math.isfinite(fault.course.end) else None,
+            }
+            for fault in bench.injections
+        ],
+    }
+
+
+def _source_text(source: StudiedBench) -> str:
+    """Return which bench the study file names, and what the study sets of it."""
+    changes = ", ".join(f"{name} = {value}" for name, value in source.changes.items())
+    return clean(
+        f"Bench: {source.bench}" + (f", of which the study sets {changes}" if changes else "")
+    )

@@ -1,7 +1,9 @@
-"""What a study found, as it is shown: verdicts, spread, what drives it, worst cases."""
+"""What a study found, as it is shown: verdicts, spread, remarks, what drives it, worst cases."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,43 +11,252 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bywire.api.run_sections import tested_brief, tested_data, tested_line, tested_section
 from bywire.api.study_cases import ShownCases
-from bywire.api.study_data import findings_data
 from bywire.api.study_figures import study_figures
-from bywire.api.study_rare import failure_table, importance_tables
-from bywire.api.study_remarks import failure_texts, noted, unfinished, warned
-from bywire.api.study_sensitivity import missing_indices, sensitivity_tables
+from bywire.api.study_rare import (
+    drivers_data,
+    failure_table,
+    importance_tables,
+    missing_indices,
+    rare_data,
+    rare_notes,
+    search_notes,
+    sensitivity_tables,
+    state_texts,
+)
 from bywire.api.study_tables import (
     correlated,
     demand_table,
     effect_tables,
     influence_tables,
+    shown_figures,
     spread_blocks,
     unmoved,
     varied_table,
 )
-from bywire.api.study_tested import tested_brief, tested_data, tested_line, tested_section
 from bywire.bench.bench import Bench
 from bywire.bench.result import Result
 from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.units import shown
 from bywire.report.answer import Answer
-from bywire.report.document import (
-    Banner,
-    Block,
-    Document,
-    Listing,
-    Section,
-    TableBlock,
-    spaced,
-)
+from bywire.report.document import Banner, Block, Document, Listing, Section, TableBlock, spaced
 from bywire.report.subject import Subject
-from bywire.studies.findings import Findings
-from bywire.studies.plan import StudyPlan
+from bywire.studies.designs import WORST
+from bywire.studies.findings import Findings, Judgment
+from bywire.studies.plan import CHUNK, StudyPlan
+from bywire.studies.sensitivity import VarianceShares
+from bywire.studies.statistics import Spread
 from bywire.studies.store import StudyStore
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+
+def findings_data(findings: Findings) -> dict[str, Any]:
+    """Return design, cases, requirements and key figures; values in the figures' units."""
+    plan = findings.plan
+    count = len(findings.cases)
+    return {
+        "design": plan.design,
+        "seed": plan.seed,
+        "cases": count,
+        "of": plan.total * (len(plan.judged_demands) if plan.sought else 1),
+        "confidence": plan.confidence,
+        "failed": len(findings.failures),
+        "reasons": [
+            {"why": why, "cases": len(rows), "first": findings.number(rows[0])}
+            for why, rows in findings.reasons.items()
+        ],
+        "requirements": [
+            _judgment_data(findings, each) for each in (findings.judgments if count else ())
+        ],
+        "kpis": {
+            each.name: {
+                "unit": each.unit,
+                "nominal": each.nominal,
+                "least": each.least,
+                "largest": each.largest,
+                "undefined": each.undefined,
+                **(_spread_data(each) if plan.is_sampled else {}),
+                **drivers_data(findings, each.name),
+            }
+            for each in findings.spreads
+        },
+    }
+
+
+def _judgment_data(findings: Findings, judgment: Judgment) -> dict[str, Any]:
+    """Return a requirement; of cases that were not drawn, without a probability."""
+    demand, share = judgment.demand, judgment.share
+    probability = {"probability": share.value, "low": share.low, "high": share.high}
+    rare = {}
+    if judgment.failure is not None:
+        (of,) = [each for each in findings.rare if each.demand == demand]
+        rare = rare_data(judgment.failure, of)
+    return rare | {
+        "kpi": demand.figure,
+        "limit": demand.text,
+        "wanted": demand.probability,
+        "outcome": judgment.outcome,
+        "met": share.count,
+        **(probability if findings.plan.is_sampled else {}),
+        "undecided_cases": judgment.undecided,
+        "worst_case": None if judgment.worst is None else findings.number(judgment.worst),
+    }
+
+
+def _spread_data(spread: Spread) -> dict[str, Any]:
+    """Return mean and quantiles of drawn cases."""
+    return {
+        "mean": spread.mean,
+        "sd": spread.sd,
+        "quantiles": [
+            {"probability": q.probability, "value": q.value, "low": q.low, "high": q.high}
+            for q in spread.quantiles
+        ],
+    }
+
+
+# --- Warnings and notes
+
+_REASONS = 10  # that are named
+_WIDE = 0.15  # reach of an interval of shares of the variance to either side, that tells little
+
+
+def warned(findings: Findings, of_the_bench: list[str]) -> list[str]:
+    """Return what runs warn of, what is undecided of rare failures, and cases without a result."""
+    count = len(findings.cases)
+    said = [f"{text} ({cases} of {count} cases)" for text, cases in findings.warnings.items()]
+    said += of_the_bench if not said else []
+    if failed := findings.failures:
+        said.append(
+            f"{len(failed)} of {count} cases have no result; they count as missing every "
+            "requirement"
+        )
+    if findings.spreads:
+        said += _undefined(findings)
+    elif count and not failed:
+        said.append("no key figure is defined in any case: look at the bench alone, bywire run")
+    return said + (state_texts(findings) if findings.rare and count else [])
+
+
+def _undefined(findings: Findings) -> list[str]:
+    """Return which figures of requirements are not defined in cases that ran."""
+    cases: dict[int, list[str]] = {}
+    for each in findings.judgments:
+        undefined = int(np.count_nonzero(~np.isfinite(findings.figure(each.demand.figure))))
+        if lacking := undefined - len(findings.failures):
+            cases.setdefault(lacking, []).append(each.demand.figure)
+    return [
+        f"{', '.join(names)}: not defined in {number} of {len(findings.cases)} cases, which count "
+        "as missing what is required"
+        for number, names in cases.items()
+    ]
+
+
+def unfinished(plan: StudyPlan, cases: int, resume: str) -> str:
+    """Return what is still to be computed, and by which command."""
+    if plan.sought is not None:
+        return f"not all cases that it asks for are computed yet: {resume}"
+    limit = f" (its file gives it {shown(plan.time, 's')} at a time)"
+    return (
+        f"{plan.total - cases} of {plan.total} cases are not computed yet"
+        f"{limit if math.isfinite(plan.time) else ''}: {resume}"
+    )
+
+
+def noted(findings: Findings, damaged: int) -> list[str]:
+    """Return what was rounded or repaired, and what intervals stand for."""
+    repaired = ""
+    if damaged:
+        files = "1 damaged chunk is" if damaged == 1 else f"{damaged} damaged chunks are"
+        repaired = f"{files} computed again"
+    return [
+        *filter(None, [repaired]),
+        *_rounding(findings.plan),
+        *_on_intervals(findings),
+        *_on_choices(findings.plan),
+    ]
+
+
+def failure_texts(findings: Findings, named: Callable[[int], str]) -> list[str]:
+    """Return why cases have no result, each reason once, with the first case that has it.
+
+    Parameters
+    ----------
+    named
+        ``named(row)``: the case with its values.
+    """
+    reasons = findings.reasons
+    texts = []
+    for text, rows in list(reasons.items())[:_REASONS]:
+        count = f"{len(rows)} cases, " if len(rows) > 1 else ""
+        texts.append(f"{text} ({count}case {named(rows[0])})")
+    rest = len(reasons) - len(texts)
+    return texts + ([f"and {rest} reasons more"] if rest else [])
+
+
+def _rounding(plan: StudyPlan) -> list[str]:
+    if plan.total == plan.cases or not (plan.is_sampled or plan.sensitivity is not None):
+        return []
+    what = "whole groups" if plan.sensitivity is not None else f"whole chunks of {CHUNK}"
+    return [f"{plan.total} cases in place of {plan.cases}: they come in {what}"]
+
+
+def _on_choices(plan: StudyPlan) -> list[str]:
+    choices = [v.name for v in plan.varied if not v.unit]
+    if not choices or not plan.is_sampled:
+        return []
+    return [
+        f"{', '.join(choices)}: a choice has no rank correlation: its correlation ratio ranks it "
+        "among the quantities, without a sign or an interval; 'sobol-indices' tells its share of "
+        "the variance"
+    ]
+
+
+def _on_intervals(findings: Findings) -> list[str]:
+    plan = findings.plan
+    if plan.design == WORST:
+        return search_notes(findings)
+    if plan.sought is not None:
+        return rare_notes(findings)
+    if plan.sensitivity is not None:
+        return [
+            f"{plan.design}: cases share values, so that shares of them are no probabilities",
+            *((missing_indices(findings) + _wide_shares(findings)) if len(findings.cases) else []),
+        ]
+    if not plan.is_sampled:
+        return [f"{plan.design}: what may happen, and not how often"]
+    if plan.design == "monte-carlo":
+        return []
+    return [
+        f"{plan.design}: intervals are those of independent cases, which scatter more as a rule"
+    ]
+
+
+def _wide_shares(findings: Findings) -> list[str]:
+    """Return which key figures have shares of the variance that are hardly known."""
+    design = findings.plan.sensitivity
+    assert design is not None
+    wide = [
+        name
+        for name in shown_figures(findings)
+        if any(
+            isinstance(each, VarianceShares) and max(each.first.reach, each.total.reach) > _WIDE
+            for each in findings.sensitivity(name).drivers
+        )
+    ]
+    if not wide:
+        return []
+    return [
+        f"{', '.join(wide)}: {design.base} groups do not tell shares within +-{_WIDE:g}; "
+        "name more cases in the study file, and run it into another folder"
+    ]
+
+
+# --- The answer
 
 _BRIEF = 3  # tables of drivers that a terminal shows
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from bywire.api import earlier_result
-from bywire.api.method_choice import ChosenMethod, choose
+from bywire.api import identification
+from bywire.api.identify import ChosenMethod, choose
 from bywire.core.blas import on_one_thread
 from bywire.data.file_format import Progress, no_progress
 from bywire.identification import trust as trusted
@@ -90,8 +90,8 @@ class TrustStudy(Answer):
                 },
                 "experiments": [asdict(o) for o in trust.outcomes],
             },
-            record=earlier_result.STUDY,
-            prepare=lambda folder: earlier_result.require_own(folder, method.name),
+            record=identification.STUDY,
+            prepare=lambda folder: identification.require_own(folder, method.name),
             is_paged=False,
             changes=self.chosen.changed,
         )
@@ -154,8 +154,8 @@ def trust(
     chosen = choose(method, parameters, overrides, options, question, progress=shown)
     store = None
     if folder is not None:
-        earlier_result.require_own(Path(folder), method)
-        earlier_result.remove_study(Path(folder))
+        identification.require_own(Path(folder), method)
+        identification.remove_study(Path(folder))
         store = Path(folder) / STORE
     try:
         recovered = trusted.trust(

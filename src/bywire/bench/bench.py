@@ -55,7 +55,7 @@ class Bench:
         be changed by a share, ``{"seal.T_pr": "+50%"}``, and several by ``{"seal.*": "-10%"}``.
     stimulus
         ``{"kind": ..., **parameters}`` for experiments that take a stimulus; a table may come
-        from a file, see ``stimulus_file``. Experiments of any brake also take such a mapping
+        from a file, see ``stimulus_sections``. Experiments of any brake also take such a mapping
         under the name of each further signal of the model's Stimulus.
     step
         Substep [s].

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from bywire.bench.stimuli.registry import STIMULI, Stimulus, create
-from bywire.core.errors import FileError, ParameterError, quoted
+from bywire.core.errors import FileError, InputError, ParameterError, quoted
 
 _FILE = ("format", "rate", "start", "decimal", "skip_lines")
 _CLOCK = {"time": "column", "time_unit": "unit"}  # a table of a stimulus would be another one
@@ -59,12 +59,13 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
                 f"({', '.join(names[:_SHOWN])}{more})"
             )
         signal["column"] = names[0]
-    trace = read_trace(
-        path,
-        {_NAME: level_unit},
-        max_gap=values.get("max_gap", 0.1),
-        mapping={**whole, "signals": {_NAME: signal}},
-    )
+    mapping = {**whole, "signals": {_NAME: signal}}
+    try:
+        trace = read_trace(
+            path, {_NAME: level_unit}, max_gap=values.get("max_gap", 0.1), mapping=mapping
+        )
+    except InputError as error:  # of a mapping that the user has not written
+        raise type(error)(str(error).replace(f"[signals.{_NAME}] ", "stimulus.")) from None
     time = trace["time"].values
     nodes = {"times": (time - time[0]).tolist(), "values": trace[_NAME].values.tolist()}
     return {"between": "linear", **rest, **nodes}

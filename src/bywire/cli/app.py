@@ -9,13 +9,31 @@ from functools import cache
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from bywire.cli.bench_commands import benchmark_command, list_command
 from bywire.cli.output import result
 from bywire.cli.serve_command import serve_command
-from bywire.cli.study_group import StudyGroup
 from bywire.cli.use_case_commands import command_of
+from bywire.core.errors import ParameterError
 from bywire.usecases import use_cases
+
+_SIZE = "size"
+
+
+class StudyGroup(TyperGroup):
+    """Commands of studies; the name of a sizing study stands for ``size NAME``."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # types of typer's own click
+        """Return the command of the first word; see click."""
+        if args and args[0].endswith(".toml"):
+            raise ParameterError(f"a study file is run by 'bywire study run {args[0]}'")
+        if args and not args[0].startswith("-") and args[0] not in self.commands:
+            args = [_SIZE, *args]
+        return super().resolve_command(ctx, args)
+
+
+# --- The commands
 
 _ORDER = """
 list, run, compare, page, serve, reproduce, benchmark, linearize, frequency-response, agreement,

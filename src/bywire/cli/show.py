@@ -1,25 +1,111 @@
-"""What every command does with its answer: messages, the result, files, the exit status."""
+"""What every command does with its answer: progress, messages, files, the exit status."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from contextlib import nullcontext
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING
 
 import typer
 
 from bywire.cli import output
-from bywire.cli.output_folder import ANOTHER, output_folder
-from bywire.cli.progress import progress_bar
-from bywire.core.errors import BywireError
+from bywire.core.errors import BywireError, FileError
 from bywire.core.heard_warnings import heard_warnings
 from bywire.core.interrupts import interrupt_heard
+from bywire.core.scratch import made_folder
 
 if TYPE_CHECKING:
     from bywire.bench.running import Progress
     from bywire.report.answer import Answer
+
+_INTERVAL = 0.1  # s between two drawings of the bar
+
+
+@contextmanager
+def progress_bar() -> Iterator[Progress]:
+    """Yield a function that shows the finished share of a labeled piece of work."""
+    if not sys.stderr.isatty():
+        yield lambda label, share: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+        auto_refresh=False,  # by a thread of its own: then nobody could copy this process
+    )
+    tasks = {}
+    with bar:
+        drawn = -_INTERVAL
+
+        def show(label: str, share: float) -> None:
+            nonlocal drawn
+            if label not in tasks:
+                tasks[label] = bar.add_task(label, total=1.0)
+            now = time.monotonic()
+            is_due = now - drawn >= _INTERVAL
+            drawn = now if is_due else drawn
+            bar.update(tasks[label], completed=share, refresh=is_due)
+
+        yield show
+
+
+# --- The folder of ``--out``
+
+
+def folder(text: str) -> Path:
+    """Return the path that ``--out`` names; nothing is no path, and never the current folder.
+
+    Raises
+    ------
+    FileError
+        When it names nothing.
+    """
+    if not text.strip():
+        raise FileError("--out '': name a folder; '.' is the one that you are in")
+    return Path(text)
+
+
+ANOTHER = "name another one with --out"
+"""what to do about a folder that cannot be written"""
+
+
+@contextmanager
+def output_folder(out: Path, advice: str = ANOTHER) -> Iterator[None]:
+    """Make the output folder, so that nothing is computed for one that cannot be written.
+
+    What was made for it and is empty in the end is removed. ``advice``: what to do about one that
+    cannot be written.
+
+    Raises
+    ------
+    FileError
+        When it cannot be made or written to.
+    """
+    with ExitStack() as made:
+        try:
+            made.enter_context(made_folder(out))
+            with TemporaryFile(dir=out):
+                pass
+        except OSError as error:
+            raise FileError(
+                f"cannot write to the output folder {out}: {error.strerror or error}; {advice}"
+            ) from None
+        yield
+
+
+# --- The answer
 
 
 def show(

@@ -12,8 +12,7 @@ import typer
 
 from bywire.cli import completion
 from bywire.cli.options import JsonFlag
-from bywire.cli.output_folder import ANOTHER, folder
-from bywire.cli.show import show
+from bywire.cli.show import ANOTHER, folder, show
 from bywire.core.pairs import changes, named
 from bywire.usecases.asks import OUT
 from bywire.usecases.declare import Argument, Command, UseCase

@@ -33,6 +33,7 @@ _HARMLESS = {
         "engines",
         "errors",
         "interrupts",
+        "lazy_names",
         "machine_memory",
         "scratch",
         "sources",

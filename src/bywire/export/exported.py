@@ -86,6 +86,23 @@ class Exported:
         return started
 
 
+def cases_of(bench: Bench) -> tuple[Case, ...]:
+    """Return the runs of a bench, of which there is one at least.
+
+    Raises
+    ------
+    ParameterError
+        When the bench makes no run.
+    """
+    cases = bench.cases()
+    if not cases:
+        raise ParameterError(
+            f"experiment {bench.experiment!r} computes a characteristic without any run, and "
+            "there is nothing to export: take another experiment, for instance 'open-loop'"
+        )
+    return cases
+
+
 def exported(bench: Bench, label: str = "") -> Exported:
     """Return the run of a bench that is exported.
 
@@ -101,13 +118,8 @@ def exported(bench: Bench, label: str = "") -> Exported:
     UnknownNameError
         When it has no run of that label.
     """
-    cases = bench.cases()
+    cases = cases_of(bench)
     labels = [case.label for case in cases]
-    if not cases:
-        raise ParameterError(
-            f"experiment {bench.experiment!r} computes a characteristic without any run, and "
-            "there is nothing to export: take another experiment, for instance 'open-loop'"
-        )
     if label and label not in labels:
         raise unknown_name("run", label, labels)
     if not label and len(cases) > 1:

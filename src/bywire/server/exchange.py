@@ -1,4 +1,4 @@
-"""A request as routes see it, and what they answer."""
+"""A request as routes see it, what they answer, and what a server refuses."""
 
 from __future__ import annotations
 
@@ -9,7 +9,26 @@ from email.message import Message
 from pathlib import Path
 from typing import Any, Protocol
 
-from bywire.server.refusal import RefusedError
+
+class RefusedError(Exception):
+    """A request that is not answered as it wanted.
+
+    Parameters
+    ----------
+    status
+        Of HTTP.
+    text
+        What is wrong, and what to do.
+    field
+        Of the form, beside which it is shown; none where it is no field's.
+    """
+
+    def __init__(self, status: int, text: str, field: str = "") -> None:
+        super().__init__(text)
+        self.status, self.text, self.field = status, text, field
+
+
+# --- Requests and answers
 
 LARGEST_FORM = 200_000
 """bytes of a form"""

@@ -14,7 +14,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Final
 
 from bywire.server.address import HERE, NAMES
-from bywire.server.refusal import RefusedError
+from bywire.server.exchange import RefusedError
 
 _PLAIN: Final = 80
 """the port of HTTP, which addresses leave out"""

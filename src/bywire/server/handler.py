@@ -20,9 +20,8 @@ from bywire.core.clean_text import shortened
 from bywire.core.errors import BywireError, quoted
 from bywire.core.version import __version__
 from bywire.server import guard
-from bywire.server.exchange import REFUSAL, Reply, Request
-from bywire.server.pages.refusal_page import refusal_page
-from bywire.server.refusal import RefusedError
+from bywire.server.exchange import REFUSAL, RefusedError, Reply, Request
+from bywire.server.pages.file_pages import refusal_page
 from bywire.server.routes import answer
 from bywire.server.service import Service
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import signal
 import subprocess
 import threading
@@ -14,11 +15,41 @@ from pathlib import Path
 from typing import Any, Literal
 
 from bywire.core.brake import loaded_files
+from bywire.core.child_process import start_python
 from bywire.core.pairs import read_count
-from bywire.server.job_group import interrupt, kill, started
+from bywire.server.exchange import RefusedError
 from bywire.server.place import Place
-from bywire.server.refusal import RefusedError
 from bywire.server.task import Task
+
+
+def started(folder: Path) -> subprocess.Popen[bytes]:
+    """Return a new process that waits for its order; no code of the served folder runs in it."""
+    return start_python("bywire.server.job_process", untrusted=(folder,))
+
+
+def interrupt(process: subprocess.Popen[bytes]) -> None:
+    """Do what Ctrl-C does to a command."""
+    if os.name == "posix":
+        _signal(process, signal.SIGINT)
+    elif process.poll() is None:
+        process.terminate()
+
+
+def kill(process: subprocess.Popen[bytes]) -> None:
+    """End it at once, with all that it started."""
+    if os.name == "posix":
+        _signal(process, signal.SIGKILL)
+    elif process.poll() is None:
+        process.kill()
+
+
+def _signal(process: subprocess.Popen[bytes], number: int) -> None:
+    if process.poll() is None:
+        with contextlib.suppress(OSError):
+            os.killpg(process.pid, number)
+
+
+# --- Jobs
 
 TOGETHER = 2
 """jobs that compute at the same time; further ones wait"""

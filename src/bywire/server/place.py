@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from bywire.core.callers import is_command_line
 from bywire.core.errors import FileError
 from bywire.core.scratch import claim
-from bywire.server.refusal import RefusedError
+from bywire.server.exchange import RefusedError
 
 RESULTS, MEASUREMENTS = "results", "measurements"
 _LONGEST = 100  # characters of the name of a file that was dropped

@@ -1,4 +1,7 @@
-"""Which request is answered by what."""
+"""Which request is answered by what.
+
+Whoever made them, their bytes are opened by the limited process of `bywire.data.limited_source`.
+"""
 
 from __future__ import annotations
 
@@ -7,23 +10,72 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
-from bywire.core.errors import ParameterError, quoted, unknown_name
-from bywire.server.contents import REPORT, contents
-from bywire.server.exchange import LIVE, SANDBOX, Reply, Request, page, plain
+from bywire.core.errors import FileError, ParameterError, quoted, unknown_name
+from bywire.core.scratch import scratch_folder
+from bywire.server.contents import REPORT, contents, endings
+from bywire.server.exchange import LIVE, SANDBOX, RefusedError, Reply, Request, page, plain
 from bywire.server.field import is_file_name
-from bywire.server.live_pages import experiments
-from bywire.server.pages.bench_page import bench_page
+from bywire.server.live_pages import experiments, shown_bench
+from bywire.server.pages.file_pages import bench_page, report_page, study_page, task_page
 from bywire.server.pages.index_page import index_page
-from bywire.server.pages.report_page import report_page
-from bywire.server.pages.study_page import study_page
-from bywire.server.pages.task_page import task_page
-from bywire.server.place import RESULTS, Place, folder_name
-from bywire.server.refusal import RefusedError
+from bywire.server.place import RESULTS, Place, folder_name, safe_name
 from bywire.server.service import Service
-from bywire.server.shown_bench import shown_bench
-from bywire.server.studies import how_far
 from bywire.server.task import tasks
-from bywire.server.uploads import uploaded
+from bywire.studies.plan import CHUNK
+from bywire.studies.store import StudyStore
+
+_PIECE = 2**20
+
+
+def uploaded(place: Place, request: Request, name: str, largest: int) -> Path:
+    """Keep a file, whole or not at all, under a name that nothing has yet.
+
+    Raises
+    ------
+    RefusedError
+        With status 415 for an ending of no format, 411 and 413 for its length, 400 where it does
+        not come to its end.
+    OSError
+        When there is no room for it.
+    """
+    if Path(safe_name(name)).suffix.lower() not in endings():
+        raise RefusedError(
+            415,
+            f"{name[:100]!r} has the ending of no measurement format: known are "
+            f"{', '.join(endings())}",
+        )
+    request.require_length(largest, "a measurement")
+    if request.length == 0:
+        raise RefusedError(400, f"{name[:100]!r} is empty: was the recording stopped?")
+    with scratch_folder(place.measurements()) as scratch:
+        fresh = scratch / "measurement"
+        with fresh.open("wb") as stream:
+            left = request.length
+            while left:
+                piece = request.body.read(min(left, _PIECE))
+                if not piece:
+                    what = f"{name[:100]!r} did not come to its end: send it again"
+                    raise RefusedError(400, what)
+                stream.write(piece)
+                left -= len(piece)
+        return place.kept(fresh, name)
+
+
+# --- How far a study is
+
+
+def how_far(folder: Path) -> str:
+    """Return in a sentence how much of a study is computed."""
+    store = StudyStore(folder)
+    try:
+        said = store.record()
+    except FileError:
+        return "Nothing of it is computed yet."
+    done = min(len(store.finished()) * CHUNK, int(said["cases"]))
+    return f"{done:,} of {said['cases']:,} cases are computed."
+
+
+# --- Routes
 
 Route = Callable[[Service, Request, str], Reply]
 

@@ -15,9 +15,9 @@ from bywire.core.errors import InputError, unknown_name
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
 from bywire.server.contents import Contents
+from bywire.server.exchange import RefusedError
 from bywire.server.field import Field, is_file_name
 from bywire.server.place import Place, shortened
-from bywire.server.refusal import RefusedError
 from bywire.server.study_so_far import StudyProgress
 from bywire.usecases import use_cases
 from bywire.usecases.declare import Argument, Form, UseCase

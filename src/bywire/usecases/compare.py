@@ -8,8 +8,7 @@ from bywire.usecases.asks import BenchChanges, ErrorEstimate
 from bywire.usecases.declare import NOTHING, Ask, Form, use_case
 
 if TYPE_CHECKING:
-    from bywire.api.compare import Comparable
-    from bywire.api.comparison import Comparison
+    from bywire.api.comparison import Comparable, Comparison
     from bywire.core.typing import Progress
 
 Runs = Annotated[
@@ -34,7 +33,7 @@ IsFull = Annotated[
 
 
 def _read(*runs: Path, overrides: Mapping[str, str]) -> None:
-    from bywire.api.compare import require_comparable
+    from bywire.api.comparison import require_comparable
     from bywire.bench import bench_file
     from bywire.bench.result_folder import record_of
 
@@ -86,9 +85,14 @@ def compare(
     KeyboardInterrupt
         When interrupted: half a run compares with nothing.
     """
-    from bywire.api.compare import is_folder, require_comparable, resolved, told_apart
     from bywire.api.compared_run import kept
-    from bywire.api.comparison import Comparison
+    from bywire.api.comparison import (
+        Comparison,
+        is_folder,
+        require_comparable,
+        resolved,
+        told_apart,
+    )
 
     require_comparable(runs, overrides)
     places = [k for k, each in enumerate(runs) if is_folder(each)]

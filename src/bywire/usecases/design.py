@@ -10,7 +10,7 @@ from bywire.usecases.asks import At, Changes, LoopName, ParameterSetName, Side
 from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
 
 if TYPE_CHECKING:
-    from bywire.api.design_answer import LoopDesign, LoopScheduleDesign
+    from bywire.api.design import LoopDesign, LoopScheduleDesign
     from bywire.core.typing import Progress
 
 Required = Annotated[
@@ -143,10 +143,9 @@ def design(
     InputError
         For names that are unknown, values out of range, and requirements that make no sense.
     """
-    from bywire.api.design import designed_by_region
-    from bywire.api.design_answer import LoopDesign
-    from bywire.api.design_drawn import drawn_models, probability_of, probability_wanted
-    from bywire.api.design_inputs import (
+    from bywire.api.design import (
+        LoopDesign,
+        designed_by_region,
         for_ecu,
         left_to_choose,
         narrowed,
@@ -154,6 +153,7 @@ def design(
         trial_of,
         tunables_of,
     )
+    from bywire.api.design_drawn import drawn_models, probability_of, probability_wanted
     from bywire.api.loop_case import loop_case, over_range
     from bywire.core.arguments import whole_number
     from bywire.core.errors import ParameterError

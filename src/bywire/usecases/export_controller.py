@@ -83,8 +83,7 @@ def export_controller(
     import os
     from dataclasses import replace
 
-    from bywire.api.controller_check import check_controller
-    from bywire.api.export_controller import ControllerExport
+    from bywire.api.export_controller import ControllerExport, check_controller
     from bywire.api.export_folder import export_folder
     from bywire.bench.bench import Bench
     from bywire.bench.bench_file import read
@@ -96,6 +95,7 @@ def export_controller(
     from bywire.export.controller.files import files
     from bywire.export.controller.program import program
     from bywire.export.controller.vectors import vectors as test_vectors
+    from bywire.export.exported import cases_of
 
     if precision not in PRECISIONS:
         raise unknown_name("precision", precision, PRECISIONS)
@@ -106,7 +106,7 @@ def export_controller(
         bench = read(bench, overrides)
     elif overrides:
         bench = bench.with_overrides(overrides)
-    case = replace(bench, faults=()).cases()[0]
+    case = cases_of(replace(bench, faults=()))[0]
     made = program(case.model, case.par, precision, name)
     cited = PARAMETER_SETS.find(bench.parameters).values
     every = test_vectors(made, case.memory, vectors)

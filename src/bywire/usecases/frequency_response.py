@@ -16,7 +16,7 @@ from bywire.usecases.asks import (
 from bywire.usecases.declare import NOTHING, Ask, Form, use_case
 
 if TYPE_CHECKING:
-    from bywire.api.frequency_response_answer import FrequencyResponse
+    from bywire.api.frequency_response import FrequencyResponse
     from bywire.api.loop_case import LoopCase
     from bywire.core.typing import Progress
 

@@ -302,18 +302,20 @@ def identify(
     >>> list(found.tables()["Seal friction"]["parameter"])
     ['A', 'F_0', 'f']
     """
-    from bywire.api import earlier_result
+    from bywire.api import identification
     from bywire.api.identification import Identification
     from bywire.api.identify import (
         STARTS,
+        Source,
         begun_at,
+        choose,
+        columns_of,
         data_of,
         far_off,
         require_one_source,
         search,
         start_of,
     )
-    from bywire.api.method_choice import Source, choose, columns_of
     from bywire.data.file_format import no_progress
     from bywire.identification.fitting.question import Question
     from bywire.identification.method import Effort
@@ -337,13 +339,13 @@ def identify(
     require_one_source(chosen, sources, synthetic, mapping, time)
     place = None if folder is None else Path(folder)
     if place is not None:
-        earlier_result.require_own(place, method)
+        identification.require_own(place, method)
     data, source = data_of(chosen, sources, mapping, named, synthetic, shown)
     files = tuple(
         Path(each) for each in (*sources, question.holdout) if isinstance(each, str | Path)
     )
     if place is not None:
-        earlier_result.remove(place, files)
+        identification.remove(place, files)
     start = start_of(chosen, synthetic)
     store = None if place is None else place / STARTS
     effort = Effort(starts=starts, seed=seed, store=store, progress=shown)

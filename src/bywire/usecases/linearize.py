@@ -9,7 +9,7 @@ from bywire.usecases.asks import At, Changes, ParameterSetName, Side
 from bywire.usecases.declare import NOTHING, Ask, Form, use_case
 
 if TYPE_CHECKING:
-    from bywire.api.linearize_answer import LinearizedLoop
+    from bywire.api.linearize import LinearizedLoop
     from bywire.api.linearize_plant import LinearizedPlant, PlantLocus
 
 LoopOrPlant = Annotated[

@@ -18,7 +18,7 @@ from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
 if TYPE_CHECKING:
     import xarray as xr
 
-    from bywire.api.replay_answer import Replay
+    from bywire.api.replay import Replay
     from bywire.core.typing import Progress
 
 MeasurementFile = Annotated[
@@ -144,8 +144,7 @@ def replay(
     InputError
         When something that is asked for does not fit, or the measurement cannot be used.
     """
-    from bywire.api.replay import columns_of_bench, driven_bench, stretches_of, units_of
-    from bywire.api.replay_answer import Replay
+    from bywire.api.replay import Replay, columns_of_bench, driven_bench, stretches_of, units_of
     from bywire.data.file_format import no_progress
     from bywire.identification.measured import measured, name_of
     from bywire.identification.replaying import bench_replay, tracking

@@ -8,8 +8,8 @@ import xarray as xr
 
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.large_signal import leaving
-from bywire.api.response_warnings import purity
-from bywire.api.response_warnings import response_warnings as warnings
+from bywire.api.frequency_response import purity
+from bywire.api.frequency_response import response_warnings as warnings
 from bywire.core.catalog import main_set, parameters
 
 

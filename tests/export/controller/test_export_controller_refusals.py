@@ -82,6 +82,11 @@ def test_bad_requests_are_refused(tmp_path: Path) -> None:
 
 
 @needs_compiler
+def test_an_experiment_without_runs_has_no_controller(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="without any run"):
+        bywire.export_controller("seal-stribeck", out=tmp_path / "ecu")
+
+
 def test_a_brake_of_ones_own(tmp_path: Path) -> None:
     bench = EXAMPLE / "benches" / "step_from_5kN.toml"
     words = ["--system", EXAMPLE, "export", "controller", bench, "--out", tmp_path]

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import ast
 import bisect
+import builtins
 import dataclasses
 import inspect
 import math
@@ -250,8 +251,8 @@ class _Writer:
     def translated(self) -> Function:
         """Return the function in C."""
         node = self.node
-        if not isinstance(node, ast.FunctionDef):
-            self.refuse(node, "only a function is")
+        if not isinstance(node, ast.FunctionDef) or node.name != self.function.__name__:
+            self.refuse(node, "it is not a function, or its file was changed since it was loaded")
         a = node.args
         for each in (a.vararg, a.kwarg, *a.kwonlyargs, *a.posonlyargs):
             if each is not None:
@@ -602,11 +603,24 @@ class _Writer:
         self.refuse(node, "only a finite number is a constant")
 
     def evaluated(self, node: ast.expr) -> Any:
-        """Return what an expression of names stands for outside the function."""
-        try:
-            return eval(ast.unparse(node), self.function.__globals__)
-        except (NameError, AttributeError):
-            self.refuse(node, "it has no value yet, or only in a loop that is over")
+        """Return what a name, an attribute or a type stands for outside the function."""
+        known = self.function.__globals__
+        match node:
+            case ast.Constant(value):
+                return value
+            case ast.BinOp(left, ast.BitOr(), right):
+                return self.evaluated(left) | self.evaluated(right)
+            case ast.Subscript(of, ast.Tuple(parts)):
+                return self.evaluated(of)[tuple(map(self.evaluated, parts))]
+            case ast.Subscript(of, part):
+                return self.evaluated(of)[self.evaluated(part)]
+            case ast.Name(name) if name in known:
+                return known[name]
+            case ast.Name(name) if hasattr(builtins, name):
+                return getattr(builtins, name)
+            case ast.Attribute(of, name) if hasattr(found := self.evaluated(of), name):
+                return getattr(found, name)
+        self.refuse(node, "it has no value yet, or only in a loop that is over")
 
     def attribute(self, node: ast.Attribute) -> Value:
         """Return a field, or a constant of a module."""

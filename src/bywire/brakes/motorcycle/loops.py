@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from bywire.analysis.loop import Loop, LoopSchedule, Point, Quantity
 from bywire.brakes.motorcycle.ecu import Stimulus
-from bywire.brakes.motorcycle.linear import control_laws
+from bywire.brakes.motorcycle.linear import pressure_loop
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import memory_at, state_at
@@ -47,7 +47,7 @@ def current_point(par: ParameterSet, value: float) -> Point:
 def current_laws(par: ParameterSet, value: float, frequencies: Array) -> tuple[Complex, Complex]:
     """Return what the PI makes of set point and current, up to its duty cycle, at any pressure."""
     brake = cast(MotorcycleParameters, par)
-    pi = control_laws.current_control(brake.ecu).response(frequencies)[:, 0, 0]
+    pi = pressure_loop.current_control(brake.ecu).response(frequencies)[:, 0, 0]
     return pi, pi / (1.0 + 1j * frequencies / brake.anti_alias.f_aa)
 
 
@@ -69,8 +69,8 @@ def dither_frequency(par: ParameterSet) -> Sequence[float]:
 def pressure_laws(par: ParameterSet, value: float, frequencies: Array) -> tuple[Complex, Complex]:
     """Return what the PID makes of set point and pressure at a pressure [Pa], up to its demand."""
     brake = cast(MotorcycleParameters, par)
-    demand = control_laws.pressure_demand(brake.ecu, value).response(frequencies)[:, 0, 0]
-    feedback = control_laws.pressure_feedback(brake.ecu, value).response(frequencies)[:, 0, 0]
+    demand = pressure_loop.pressure_demand(brake.ecu, value).response(frequencies)[:, 0, 0]
+    feedback = pressure_loop.pressure_feedback(brake.ecu, value).response(frequencies)[:, 0, 0]
     return demand, feedback / (1.0 + 1j * frequencies / brake.anti_alias.f_aa)
 
 

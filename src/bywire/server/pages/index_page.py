@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bywire.server.contents import Contents
-from bywire.server.pages.entries import text
-from bywire.server.pages.frame import frame, link, section, table
+from bywire.server.pages.frame import frame, link, section, table, text
 from bywire.server.task import tasks
 
 _SHOWN = 200  # reports, and measurements

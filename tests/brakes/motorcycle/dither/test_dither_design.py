@@ -7,17 +7,19 @@ import math
 import numpy as np
 import pytest
 
-from bywire.brakes.motorcycle.dither.choice import best_of, candidates, crossing, least
-from bywire.brakes.motorcycle.dither.reach import (
+from bywire.brakes.motorcycle.dither.map import best_of, candidates, crossing, least
+from bywire.brakes.motorcycle.dither.trial import (
+    Trial,
     admissible_frequencies,
+    area_ratios,
     attenuation,
     breakaway_torques,
     dead_band,
     needed_gain,
     reach,
+    tried,
     waveform,
 )
-from bywire.brakes.motorcycle.dither.trial import Trial, area_ratios, tried
 from bywire.brakes.motorcycle.studies import dither
 from bywire.control.dither import breakaway_current
 from bywire.core.catalog import PARAMETER_SETS

@@ -6,7 +6,7 @@ import control
 import numpy as np
 import pytest
 
-from bywire.brakes.motorcycle.linear.rational import Rational, first_orders
+from bywire.brakes.motorcycle.linear.brake import Rational, first_orders
 
 
 @pytest.fixture

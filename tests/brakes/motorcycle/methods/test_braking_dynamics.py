@@ -15,10 +15,15 @@ from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.dither.dithered_plant import dithered_plant
 from bywire.brakes.motorcycle.linear.brake import with_slow_pair
-from bywire.brakes.motorcycle.methods.braking.fit import fit, five_of
-from bywire.brakes.motorcycle.methods.braking.records import REGIONS, block_of, regions_of, step_at
-from bywire.brakes.motorcycle.methods.braking.sine_lines import lines, measured_points
-from bywire.brakes.motorcycle.methods.braking.slow_pair import NAMES, log_response, response
+from bywire.brakes.motorcycle.methods.braking.fit import NAMES, fit, five_of, log_response, response
+from bywire.brakes.motorcycle.methods.braking.records import (
+    REGIONS,
+    block_of,
+    lines,
+    measured_points,
+    regions_of,
+    step_at,
+)
 from bywire.brakes.motorcycle.methods.braking_dynamics import METHOD, pair_shows, truth
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError

@@ -10,8 +10,7 @@ import xarray as xr
 
 from bywire.brakes.motorcycle.methods.friction_ramp import METHOD, Options, shots_of
 from bywire.brakes.motorcycle.methods.stick_slip.shooting import Shooting
-from bywire.brakes.motorcycle.methods.stick_slip.shots import cut_out
-from bywire.brakes.motorcycle.methods.stick_slip.slips import Slip, find_slips
+from bywire.brakes.motorcycle.methods.stick_slip.slips import Slip, cut_out, find_slips
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet

@@ -15,11 +15,16 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, as_run
 from bywire.brakes.motorcycle.case import case_from_rest
-from bywire.brakes.motorcycle.linear.brake import theoretical, two_pole, with_slow_pair
-from bywire.brakes.motorcycle.linear.rational import Rational
-from bywire.brakes.motorcycle.methods.braking.fit import fit, five_of, over_frequency, unknowns_of
+from bywire.brakes.motorcycle.linear.brake import Rational, theoretical, two_pole, with_slow_pair
+from bywire.brakes.motorcycle.methods.braking.fit import (
+    NAMES,
+    fit,
+    five_of,
+    over_frequency,
+    response,
+    unknowns_of,
+)
 from bywire.brakes.motorcycle.methods.braking.records import Region, StepRecord, regions_of
-from bywire.brakes.motorcycle.methods.braking.slow_pair import NAMES, response
 from bywire.brakes.motorcycle.operating_point import settled_start
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current, travel_at

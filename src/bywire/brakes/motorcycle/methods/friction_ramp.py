@@ -14,13 +14,13 @@ from pydantic import Field
 from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.experiments import friction_ramp
 from bywire.brakes.motorcycle.methods.stick_slip.shooting import Fitted, Shooting
-from bywire.brakes.motorcycle.methods.stick_slip.shots import (
+from bywire.brakes.motorcycle.methods.stick_slip.slips import (
     Shot,
     cut_out,
+    find_slips,
     require_calm,
     require_reachable,
 )
-from bywire.brakes.motorcycle.methods.stick_slip.slips import find_slips
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import memory_at, state_at
@@ -302,8 +302,7 @@ def identify(
 
     References
     ----------
-    Dardanelli, Alli, Savaresi (2010), section 4.1; the loss is ours, see
-    ``bywire.brakes.motorcycle.methods.stick_slip.loss``.
+    Dardanelli, Alli, Savaresi (2010), section 4.1; the loss is ours, see `SlipLoss`.
     """
     shots = shots_of(data, options)
     require_reachable(shots, par)

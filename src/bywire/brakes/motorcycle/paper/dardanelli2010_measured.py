@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from functools import cache
 
 from bywire.brakes.motorcycle.paper.facts import CITATION, FACTS
-from bywire.brakes.motorcycle.paper.measured.appraisal import Appraisal, appraised
 from bywire.brakes.motorcycle.paper.measured.experiments import overshoots, stuck_at
-from bywire.brakes.motorcycle.paper.measured.misfit import predicted
+from bywire.brakes.motorcycle.paper.measured.misfit import Appraisal, appraised, predicted
 from bywire.brakes.motorcycle.paper.measured.statements import STATEMENTS, Statement, allowances
 from bywire.brakes.motorcycle.paper.measured.unknowns import FREE, HELD, PRIOR
 from bywire.brakes.motorcycle.paper.runs import MAIN, PRINTED, Runs, parameters

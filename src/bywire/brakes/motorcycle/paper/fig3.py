@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bywire.analysis.crossings import bandwidth
 from bywire.bench.result import Result
-from bywire.brakes.motorcycle.linear.control_laws import Rotor, current_loop
+from bywire.brakes.motorcycle.linear.pressure_loop import Rotor, current_loop
 from bywire.brakes.motorcycle.paper.facts import FACTS
 from bywire.brakes.motorcycle.paper.runs import MAIN, PRINTED, Runs, parameters
 from bywire.report.step_response import step_response

@@ -8,8 +8,7 @@ import xarray as xr
 from bywire.bench.kpis import step_response
 from bywire.bench.kpis.registry import evaluate
 from bywire.bench.result import Result
-from bywire.brakes.motorcycle.linear.brake import theoretical
-from bywire.brakes.motorcycle.linear.rational import Rational
+from bywire.brakes.motorcycle.linear.brake import Rational, theoretical
 from bywire.brakes.motorcycle.methods.braking.records import averaged
 from bywire.brakes.motorcycle.paper.facts import FACTS, table4_model
 from bywire.brakes.motorcycle.paper.identified import identified_model

@@ -7,8 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from bywire.brakes.motorcycle.linear.brake import theoretical, with_slow_pair
-from bywire.brakes.motorcycle.linear.rational import Rational
+from bywire.brakes.motorcycle.linear.brake import Rational, theoretical, with_slow_pair
 from bywire.brakes.motorcycle.methods import braking_dynamics
 from bywire.brakes.motorcycle.methods.braking.fit import five_of
 from bywire.brakes.motorcycle.paper.facts import FACTS, REGIONS, table4_model

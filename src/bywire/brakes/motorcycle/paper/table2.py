@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.brakes.motorcycle.linear.brake import theoretical, two_pole_error
-from bywire.brakes.motorcycle.linear.rational import Rational
+from bywire.brakes.motorcycle.linear.brake import Rational, theoretical, two_pole_error
 from bywire.brakes.motorcycle.paper.facts import FACTS, table2_model, table4_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, PRINTED, SETS, Runs, parameters
 from bywire.report.bode import Response, bode

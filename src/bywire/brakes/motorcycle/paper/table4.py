@@ -7,8 +7,7 @@ import xarray as xr
 
 from bywire.analysis.crossings import fall
 from bywire.analysis.response.sweep import complex_values
-from bywire.brakes.motorcycle.linear.brake import theoretical
-from bywire.brakes.motorcycle.linear.rational import Rational
+from bywire.brakes.motorcycle.linear.brake import Rational, theoretical
 from bywire.brakes.motorcycle.paper import identified as dardanelli2010_identified
 from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, FACTS, REGIONS, table4_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, before, parameters

@@ -12,23 +12,29 @@ import xarray as xr
 from pydantic import Field, model_validator
 
 from bywire.bench.kpis.kpi import Kpi
-from bywire.brakes.motorcycle.dither.choice import NAMES, Candidate, best_of, candidates
 from bywire.brakes.motorcycle.dither.dithered_plant import dithered_plant
 from bywire.brakes.motorcycle.dither.map import (
+    NAMES,
+    Candidate,
     Grid,
+    best_of,
     by_frequency,
     by_pressure,
+    candidates,
     figures_of,
     law,
     mapped,
 )
-from bywire.brakes.motorcycle.dither.reach import (
+from bywire.brakes.motorcycle.dither.trial import (
+    FIGURES,
+    Trial,
     admissible_frequencies,
+    area_ratios,
     attenuation,
     reach,
+    tried,
     waveform,
 )
-from bywire.brakes.motorcycle.dither.trial import FIGURES, Trial, area_ratios, tried
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import highest_pressure
 from bywire.core.errors import InputError, ParameterError, RunError

@@ -1,4 +1,4 @@
-"""One drive train of the wedge brake: the moment demand at equal response, case by case of mu_B.
+"""One drive train of the wedge brake: what is demanded, how it answers, case by case of mu_B.
 
 A design is a slope of the wedge and a lead of the screws. Everything that follows from them is
 derived here, and the speeds of the reference are set so that every design answers equally fast.
@@ -7,8 +7,8 @@ derived here, and the speeds of the reference are set so that every design answe
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,7 +18,6 @@ from bywire.bench.experiment import as_run
 from bywire.brakes.wedge.case import case_from_parked, steps
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.sizing.answer import Answer, Demand
 from bywire.brakes.wedge.start import force_for, travel_for
 from bywire.core.typing import Array
 from bywire.plant import roller_screw
@@ -220,3 +219,92 @@ def _times(time: Array, y: Array, level: float) -> Array:
             share = (level - row[k - 1]) / (row[k] - row[k - 1])
             times[n] = time[k - 1] + share * (time[k] - time[k - 1]) - _SETTLE
     return times
+
+
+# --- What is demanded of a drive train of the wedge brake, and how it answers
+
+PHASES = tuple(0.5 * math.pi * k for k in range(4))
+"""angles of the disc [rad] at which a run begins"""
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What every design must do.
+
+    Parameters
+    ----------
+    moment
+        Step of the demand [N m].
+    t_90
+        Time [s] in which the sensor must show 90 % of it, at every friction coefficient.
+    t_hold, t_release
+        Lengths [s] of the demand and of the release after it.
+    mu_B
+        Friction coefficients of the pads.
+    known
+        Whether the moment control knows the coefficient, so that its crossover stays.
+    enforced
+        Whether the time is enforced by the speed of the reference; else the pads' closing speed
+        is that of the given brake.
+    whole
+        Whether the power of the release counts too, else that of build-up and hold alone.
+    phases
+        Angles of the disc [rad] at which the runs begin.
+    """
+
+    moment: float
+    t_90: float
+    t_hold: float
+    t_release: float
+    mu_B: Sequence[float]
+    known: bool
+    enforced: bool
+    whole: bool = False
+    phases: Sequence[float] = PHASES
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a design does, per friction coefficient, shape (cases,); the worst of all phases.
+
+    Where on a revolution the disc's run-out meets the stop is chance: several phases are tried.
+
+    Parameters
+    ----------
+    closing_speed
+        Largest speed at which the reference closes the pads [m/s], the same for all cases.
+    t_90
+        Time to 90 % of the demand [s]; NaN where it is not reached.
+    filtered, instantaneous
+        Largest power at the drives' input [W], as the rig shows it and as it is, where it counts.
+    release
+        Largest power during the release [W], as the rig shows it.
+    current
+        Largest current demand of either motor [A].
+    speed
+        Largest speed of either motor [rad/s].
+    copper, friction
+        Energies lost in copper, bearings and screws [J].
+    held
+        Mean moment in the last fifth of the stop [N m].
+    left
+        Moment at the end of the release [N m].
+    stop
+        Largest force on the wedge's end stops [N].
+    unsettled
+        Substeps of all cases that hit the cap of the contact iteration.
+    """
+
+    closing_speed: float
+    t_90: Array
+    filtered: Array
+    instantaneous: Array
+    release: Array
+    current: Array
+    speed: Array
+    copper: Array
+    friction: Array
+    held: Array
+    left: Array
+    stop: Array
+    unsettled: int

@@ -8,8 +8,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.sizing.answer import Answer, Demand
-from bywire.brakes.wedge.sizing.design import Efficiency, answer, redesigned
+from bywire.brakes.wedge.sizing.design import Answer, Demand, Efficiency, answer, redesigned
 from bywire.core.interrupts import thread_pool
 from bywire.core.typing import Array
 from bywire.data.labeled import Labeled, labeled

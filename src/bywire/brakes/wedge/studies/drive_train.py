@@ -13,8 +13,7 @@ import xarray as xr
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.sizing.answer import Answer, Demand
-from bywire.brakes.wedge.sizing.design import answer
+from bywire.brakes.wedge.sizing.design import Answer, Demand, answer
 from bywire.brakes.wedge.sizing.map import HELD, LATE, LEFT, mapped
 from bywire.brakes.wedge.sizing.options import ASSUMPTIONS, DEFAULTS, Options
 from bywire.core.typing import Array, Progress

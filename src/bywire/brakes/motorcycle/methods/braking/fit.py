@@ -3,25 +3,306 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.linear.brake import two_pole
 from bywire.brakes.motorcycle.methods.braking.records import BAND, Region
-from bywire.brakes.motorcycle.methods.braking.slow_pair import (
-    NAMES,
-    impulse,
-    log_response,
-    response,
-)
-from bywire.brakes.motorcycle.methods.braking.two_step import in_turn, restricted
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import travel_at
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
-from bywire.identification.estimate import Estimate
+from bywire.identification.confidence import notes_of, uncertainty
+from bywire.identification.estimate import Estimate, Kept
 from bywire.identification.least_squares import Problem, estimate
-from bywire.identification.unknown import Unknown
+from bywire.identification.unknown import Unknown, moved
+
+NAMES = ("K", "tau_L", "T1", "T2", "T_L")
+"""gain and time constants of eq. (22), in the order of the paper's xi"""
+
+_STATES, _INPUTS = 6, 2
+
+
+def response(values: Array, u: Array, interval: float, every: int) -> tuple[Array, Array]:
+    r"""Return every so many samples of the response, and its derivatives.
+
+    .. math::
+        G = K \frac{1 + s \tau_L}{(1 + s T_1)(1 + s T_2)(1 + s T_L)}, \quad
+        \frac{\partial y}{\partial T_k} = -\frac{s}{1 + s T_k} y
+
+    The system begins at rest. Between samples the input runs straight, for which the
+    discretization is exact.
+
+    Parameters
+    ----------
+    values
+        K, tau_L, T1, T2, T_L; SI, shape (5,).
+    u
+        Input less its value at rest, shape (n,).
+    interval
+        Sample time [s].
+    every
+        Samples from one returned to the next; the first is at the start.
+
+    Returns
+    -------
+    tuple
+        Response, shape (1 + (n - 1) // every,), and derivatives, shape (..., 5).
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eq. (22).
+    """
+    A, B = _realization(values)
+    Phi, now, later = _first_order_hold(A, B, interval)
+    blocks = (u.size - 1) // every
+    begin = u[: blocks * every].reshape(blocks, every)
+    end = u[1 : blocks * every + 1].reshape(blocks, every)
+    powers = [np.eye(_STATES)]
+    for _ in range(every):
+        powers.append(Phi @ powers[-1])
+    onward = np.array(powers[:every][::-1])
+    gain = begin @ (onward @ now) + end @ (onward @ later)
+    states = np.zeros((blocks + 1, _STATES))
+    for k in range(blocks):
+        states[k + 1] = powers[every] @ states[k] + gain[k]
+    z = states @ _outputs(values).T
+    return z[:, 0], z[:, 1:]
+
+
+def impulse(values: Array, n: int, interval: float) -> Array:
+    """Return the response of samples to a sample of the input, shape (n,).
+
+    Parameters
+    ----------
+    values
+        K, tau_L, T1, T2, T_L; SI, shape (5,).
+    n
+        Samples.
+    interval
+        Sample time [s].
+    """
+    u = np.zeros(n + 1)
+    u[1] = 1.0  # within the record: its input runs up to the sample, and down from it
+    return response(values, u, interval, 1)[0][1:]
+
+
+def _realization(values: Array) -> tuple[Array, Array]:
+    """Return the chain of lags, and one more lag of the output for each time constant."""
+    K, tau_L, T_1, T_2, T_L = values
+    A, B = np.zeros((_STATES, _STATES)), np.zeros(_STATES)
+    lags = (T_1, T_2, T_L)
+    for k, T in enumerate(lags):
+        A[k, k] = -1.0 / T
+        if k:
+            A[k, k - 1] = 1.0 / T
+    B[0] = 1.0 / T_1
+    y = _output_row(K, tau_L, T_L)
+    for k, T in enumerate(lags):
+        A[3 + k] = y / T
+        A[3 + k, 3 + k] -= 1.0 / T
+    return A, B
+
+
+def _output_row(K: float, tau_L: float, T_L: float) -> Array:
+    row = np.zeros(_STATES)
+    row[1], row[2] = K * tau_L / T_L, K * (1.0 - tau_L / T_L)
+    return row
+
+
+def _outputs(values: Array) -> Array:
+    """Return rows of the output and of its derivatives by the five values."""
+    K, tau_L, T_1, T_2, T_L = values
+    y = _output_row(K, tau_L, T_L)
+    rows = [y, y / K, _output_row(K, 1.0, T_L) - _output_row(K, 0.0, T_L)]
+    for k, T in enumerate((T_1, T_2, T_L)):
+        row = -y / T
+        row[3 + k] += 1.0 / T
+        rows.append(row)
+    return np.array(rows)
+
+
+def _first_order_hold(A: Array, B: Array, interval: float) -> tuple[Array, Array, Array]:
+    """Return the transition, and what the input at the begin and at the end of a step adds."""
+    from scipy import linalg
+
+    n = _STATES
+    M = np.zeros((n + _INPUTS, n + _INPUTS))
+    M[:n, :n], M[:n, n], M[n, n + 1] = A * interval, B * interval, 1.0
+    E = linalg.expm(M)
+    held, risen = E[:n, n], E[:n, n + 1]
+    return E[:n, :n], held - risen, risen
+
+
+def log_response(values: Array, frequencies: Array) -> tuple[NDArray[np.complex128], Array]:
+    r"""Return :math:`\ln G` at frequencies [Hz], and its derivatives, complex.
+
+    The real part is the logarithm of the magnitude, the imaginary part the phase [rad].
+
+    Returns
+    -------
+    tuple
+        Shapes (n,) and (n, 5).
+    """
+    s = 2j * math.pi * frequencies
+    K, tau_L, T_1, T_2, T_L = values
+    G = np.log(K) + np.log(1.0 + s * tau_L) - sum(np.log(1.0 + s * T) for T in (T_1, T_2, T_L))
+    slopes = [np.full(s.size, 1.0 / K + 0j), s / (1.0 + s * tau_L)]
+    slopes += [-s / (1.0 + s * T) for T in (T_1, T_2, T_L)]
+    return np.asarray(G), np.column_stack(slopes)
+
+
+# --- Two fits that share unknowns, in turn until they agree
+
+_SETTLED = 1e-6  # of a value
+
+
+def in_turn(
+    problems: tuple[Problem, Problem], groups: tuple[Sequence[int], Sequence[int]], most: int
+) -> Estimate:
+    r"""Estimate some unknowns by one fit and the others by another, each with the other's values.
+
+    At the end :math:`Z^T r = 0` holds with Z the derivatives of either fit by its own unknowns
+    alone: an instrumental-variable estimate, whose covariance knows that an error of one fit
+    reaches the other.
+
+    Parameters
+    ----------
+    problems
+        Both with the same unknowns.
+    groups
+        Which of them either fit estimates; together all.
+    most
+        Turns at most; one is what leaves the second fit's values unknown to the first.
+
+    Raises
+    ------
+    ParameterError
+        When the data tells none of a fit's unknowns.
+    """
+    unknowns = problems[0].unknowns
+    values = np.array([u.start for u in unknowns])
+    parts: list[Estimate] = []
+    turns, change = 0, np.inf
+    while turns < most and change > _SETTLED:
+        before = values.copy()
+        parts = []
+        for problem, mine in zip(problems, groups, strict=True):
+            part = estimate(restricted(problem, mine, values))
+            values[[_index(problem, label) for label in part.names]] = part.values
+            parts.append(part)
+        size = np.abs(values) + np.array([u.scale for u in unknowns])
+        change, turns = float(np.max(np.abs(values - before) / size)), turns + 1
+    notes = [f"{turns} turn{'s' if turns > 1 else ''} of two steps"]
+    if change <= _SETTLED:
+        best = _combined(problems, parts, values)
+    else:
+        best = _apart(problems, parts)
+        notes.append(
+            f"the two steps do not agree yet: the last turn changed the values by {change:.2g} of "
+            "their size; each step's intervals take the other step's values as known"
+        )
+    return best.noted((*notes, *notes_of(best)))
+
+
+def _index(problem: Problem, label: str) -> int:
+    return [u.label for u in problem.unknowns].index(label)
+
+
+def restricted(problem: Problem, mine: Sequence[int], values: Array) -> Problem:
+    """Return a problem in some of its unknowns, the others held.
+
+    Parameters
+    ----------
+    mine
+        Indices of those that stay unknown.
+    values
+        Of all: where they begin, or are held.
+    """
+    chosen = list(mine)
+    begin = moved([problem.unknowns[k] for k in chosen], values[chosen])
+    held = values.copy()
+
+    def evaluate(some: Array) -> tuple[Array, Array]:
+        whole = held.copy()
+        whole[chosen] = some
+        r, J = problem.evaluate(whole)
+        return r, J[:, chosen]
+
+    return Problem(begin, evaluate)
+
+
+def _apart(problems: tuple[Problem, Problem], parts: Sequence[Estimate]) -> Estimate:
+    """Return both parts as one estimate, each with the covariance that it has alone."""
+    first = len(parts[0].names)
+    size = first + len(parts[1].names)
+    covariance, spectrum = np.zeros((size, size)), np.zeros(size)
+    for part, span in zip(parts, (slice(0, first), slice(first, size)), strict=True):
+        covariance[span, span], spectrum[span] = part.covariance, part.singular_values
+    return replace(
+        parts[0],
+        unknowns=_original(problems[0], parts),
+        covariance=covariance,
+        values=np.concatenate([part.values for part in parts]),
+        singular_values=np.sort(spectrum)[::-1],
+        residuals=np.concatenate([part.residuals for part in parts]),
+        freedom=min(part.freedom for part in parts),
+        colored=any(part.colored for part in parts),
+        kept=_kept(problems[0], parts),
+        notes=(),
+    )
+
+
+def _original(problem: Problem, parts: Sequence[Estimate]) -> tuple[Unknown, ...]:
+    """Return the parts' unknowns with the starts they had before the first turn."""
+    return tuple(problem.unknowns[_index(problem, label)] for part in parts for label in part.names)
+
+
+def _kept(problem: Problem, parts: Sequence[Estimate]) -> tuple[Kept, ...]:
+    first = {u.label: u for u in problem.unknowns}
+    already = [k for part in parts for k in part.kept]
+    return tuple(replace(k, unknown=first[k.unknown.label]) for k in already)
+
+
+def _combined(
+    problems: tuple[Problem, Problem], parts: Sequence[Estimate], values: Array
+) -> Estimate:
+    """Return both parts as one estimate with its joint covariance."""
+    labels = [label for part in parts for label in part.names]
+    columns = [_index(problems[0], label) for label in labels]
+    residuals, jacobians, instruments = [], [], []
+    first = 0
+    for problem, part in zip(problems, parts, strict=True):
+        r, J = problem.evaluate(values)
+        Z = np.zeros((r.size, len(columns)))
+        mine = slice(first, first + len(part.names))
+        # Each fit weighs its residuals by their own size: what the noise really was.
+        size = float(np.sqrt(r @ r / max(r.size - len(part.names), 1)))
+        Z[:, mine] = J[:, columns[mine]] / size
+        residuals.append(r / size)
+        jacobians.append(J[:, columns] / size)
+        instruments.append(Z)
+        first += len(part.names)
+    r, J, Z = np.concatenate(residuals), np.vstack(jacobians), np.vstack(instruments)
+    unknowns = _original(problems[0], parts)
+    scale = np.array([u.scale for u in unknowns])
+    sure = uncertainty(J * scale, r, Z * scale)
+    return Estimate(
+        unknowns=unknowns,
+        values=values[columns],
+        covariance=sure.covariance * np.outer(scale, scale),
+        singular_values=np.asarray(np.linalg.svd(J * scale, compute_uv=False), dtype=float),
+        residuals=np.concatenate([part.residuals for part in parts]),
+        freedom=sure.freedom,
+        colored=sure.colored,
+        kept=_kept(problems[0], parts),
+    )
+
+
+# --- The fit
 
 _DECADE = 10.0  # tau_L and T_L begin one decade below T1
 _FAR = 1e3  # how far from its start a time constant may go

@@ -6,8 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from bywire.brakes.motorcycle.paper.measured.appraisal import Appraisal, appraised
-from bywire.brakes.motorcycle.paper.measured.misfit import LOSS, problem, sized
+from bywire.brakes.motorcycle.paper.measured.misfit import (
+    LOSS,
+    Appraisal,
+    appraised,
+    problem,
+    sized,
+)
 from bywire.brakes.motorcycle.paper.measured.unknowns import brake, unknowns
 from bywire.core.typing import Array, Progress
 from bywire.identification.estimate import Estimate

@@ -16,10 +16,8 @@ from bywire.bench.kpis.hysteresis import Loop, loop_area
 from bywire.bench.kpis.smoothing import smoothed
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.experiments import friction_ramp, hard_braking
-from bywire.brakes.motorcycle.methods.braking.fit import over_frequency, unknowns_of
-from bywire.brakes.motorcycle.methods.braking.records import Region
-from bywire.brakes.motorcycle.methods.braking.sine_lines import Points
-from bywire.brakes.motorcycle.methods.braking.two_step import restricted
+from bywire.brakes.motorcycle.methods.braking.fit import over_frequency, restricted, unknowns_of
+from bywire.brakes.motorcycle.methods.braking.records import Points, Region
 from bywire.brakes.motorcycle.paper.facts import FACTS, REGIONS
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
