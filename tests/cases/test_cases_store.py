@@ -19,7 +19,7 @@ def values_of(row: dict[str, Any]) -> list[float]:
 
 
 def test_pieces_come_back_but_for_a_line_that_was_cut_off(tmp_path: Path) -> None:
-    lines = PieceLines(tmp_path / "starts.jsonl")
+    lines = PieceLines(tmp_path / "made" / "starts.jsonl")
     assert list(lines.pieces(values_of)) == []
     lines.keep("a", {"values": [1.0, 0.1]})
     lines.keep("b", {"values": []})
@@ -47,7 +47,7 @@ def test_lines_that_cannot_be_read_or_written_are_refused(tmp_path: Path) -> Non
     with pytest.raises(FileError, match="delete it to start anew"):
         list(PieceLines(unreadable).pieces(values_of))
     with pytest.raises(FileError, match="cannot write"):
-        PieceLines(tmp_path / "missing" / "starts.jsonl").keep("a", {})
+        PieceLines(unreadable / "starts.jsonl").keep("a", {})
 
 
 @dataclass(frozen=True)

@@ -241,6 +241,7 @@ class PieceLines:
             return
         line = json.dumps({"key": key, **row}).encode() + b"\n"
         try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
             with self.path.open("a+b", buffering=0) as file:  # in one write, whoever else writes
                 if file.tell():
                     file.seek(-1, 2)
