@@ -69,6 +69,7 @@ NEWEST_TESTS = [
         "synthesis/test_design_floors.py",
         "contracts/test_gates_can_fail.py",
         "benchmarks/test_suite.py",
+        "cases",
         "simulation/test_run_outcomes.py",
         "analysis/test_margins.py",
         "life/test_life_file.py",

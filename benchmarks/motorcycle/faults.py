@@ -7,7 +7,7 @@ import time
 from benchmarks.result import Result, at_least
 from benchmarks.suite import Part
 from bywire.campaigns.campaign_file import read_campaign
-from bywire.campaigns.running import CampaignStore, complete
+from bywire.campaigns.running import run_campaign
 from bywire.core.typing import silent
 
 _GOAL = 1000.0  # cases a minute
@@ -18,7 +18,7 @@ def faults() -> list[Result]:
     plan = read_campaign("motorcycle")
     for _ in range(2):
         started = time.perf_counter()
-        complete(plan, CampaignStore(None), silent)
+        run_campaign(plan, None, silent)
         seconds = time.perf_counter() - started
     note = f"{plan.total} runs with a fault beside {plan.healthy} healthy ones, all judged"
     rate = 60.0 * plan.total / seconds

@@ -221,12 +221,13 @@ def _efficiency(plan: StudyPlan, cores: int, seconds: float) -> Result:
 
 def _rate(executor: Executor, plan: StudyPlan, cores: int, chunks: int) -> float:
     """Return chunks a second [1/s], once each process has had several."""
-    computed = executor.computed(plan, range(_WARM * cores + chunks))
-    for _ in range(_WARM * cores):
-        next(computed)
-    begin = time.perf_counter()
-    count = sum(1 for _ in computed)
-    return count / (time.perf_counter() - begin)
+    with executor.opened(plan) as compute:
+        computed = compute(range(_WARM * cores + chunks))
+        for _ in range(_WARM * cores):
+            next(computed)
+        begin = time.perf_counter()
+        count = sum(1 for _ in computed)
+        return count / (time.perf_counter() - begin)
 
 
 PART = Part("studies", studies)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 from dataclasses import replace
 from functools import partial
@@ -16,7 +17,7 @@ from bywire.core.errors import ParameterError, RunError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Force
 from bywire.identification.least_squares import Problem, estimate
-from bywire.identification.method import Effort, Identified, Method
+from bywire.identification.method import METHODS, Effort, Identified, Method
 from bywire.identification.trust import trust
 from bywire.identification.unknown import Unknown
 
@@ -152,3 +153,8 @@ def test_a_killed_process_ends_a_study_that_then_goes_on(tmp_path: Path) -> None
     found = trust(*asked, processes=2, store=store)
     assert [each.seed for each in found.outcomes] == list(range(12))
     assert found.outcomes == trust(METHOD, None, METHOD.defaults, range(12)).outcomes
+
+
+def test_every_method_can_be_given_to_the_processes_of_a_study():
+    for name, method in METHODS.all().items():
+        assert pickle.loads(pickle.dumps(method)).name == name

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from functools import partial
 
@@ -33,7 +34,7 @@ def blocks(count: int) -> list[FigureBlock]:
 @pytest.fixture(autouse=True)
 def copied(monkeypatch):
     monkeypatch.setattr(side_by_side, "may_copy", lambda: True)
-    monkeypatch.setattr(side_by_side.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
 
 
 def test_copies_draw_the_same():
@@ -52,7 +53,7 @@ def test_copies_draw_the_same():
 
 
 def test_what_is_long_is_begun_first(tmp_path, monkeypatch):
-    monkeypatch.setattr(side_by_side.os, "cpu_count", lambda: 9)
+    monkeypatch.setattr(os, "cpu_count", lambda: 9)
     monkeypatch.setattr(
         side_by_side, "processes", lambda _, *rest, **is_copied: processes(1, *rest, **is_copied)
     )
@@ -90,11 +91,11 @@ def test_a_figure_that_fails_says_why():
 
 
 def test_a_copy_that_is_killed_leaves_its_figures_to_be_drawn_here(monkeypatch):
-    maker = side_by_side.os.getpid()
+    maker = os.getpid()
 
     def killed() -> Figure:
-        if side_by_side.os.getpid() != maker:
-            side_by_side.os._exit(9)
+        if os.getpid() != maker:
+            os._exit(9)
         return line(0)
 
     many = [*blocks(FEW), FigureBlock(killed, "killed")]

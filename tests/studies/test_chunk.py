@@ -147,7 +147,8 @@ def test_drawn_cases_have_noise_of_their_own(plan):
 def test_chunks_that_a_graphics_processor_computes_together_are_as_they_are_alone(plan):
     there = replace(plan, bench=replace(plan.bench, engine="cuda"))
     with emulated(EmulatedDriver()) as driver:
-        computed = list(InProcess(together=3).computed(there, [4, 0, 2, 1]))
+        with InProcess(together=3).opened(there) as compute:
+            computed = list(compute([4, 0, 2, 1]))
         assert len(driver.launches) == 2
         driver.cuCtxSynchronize = lambda: (Status.CUDA_ERROR_ILLEGAL_ADDRESS,)
         with pytest.raises(DeviceError, match="failed"):  # and is no case without a result

@@ -264,11 +264,11 @@ def test_a_killed_worker_of_a_search_is_what_the_pool_says_it_is(study, tmp_path
     """OpenTURNS, which asks for the cases, stands between the pool and who opened it."""
     text = BRAKE.replace("subset-simulation", "importance-sampling")
 
-    def broken(pool, ahead, chunks):
+    def broken(*given):
         raise BrokenProcessPool("terminated abruptly")
         yield
 
-    monkeypatch.setattr(executor, "_as_completed", broken)
+    monkeypatch.setattr(executor, "as_completed", broken)
     path = study(text.replace("cases_per_level = 640", ""), BENCH)
     with pytest.raises(RunError, match=r"a process of the study was killed.*resume it"):
         bywire.run_study(path, tmp_path / "out", workers=2)

@@ -28,6 +28,11 @@ from bywire.studies.store import Origin, StudyStore
 from bywire.studies.study_file import read_study
 
 
+def chunks_of(executor, plan, chunks):
+    with executor.opened(plan) as compute:
+        yield from compute(chunks)
+
+
 # A process of tests has threads; commands that are copied have none.
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 @pytest.mark.parametrize("is_copied", [False, True], ids=["begun", "copied"])
@@ -42,9 +47,9 @@ def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(
     alone, shared = (StudyStore(tmp_path / name) for name in ("alone", "shared"))
     for store in (alone, shared):
         store.open(plan, Origin(tmp_path / "study.toml"))
-    for chunk, columns in InProcess().computed(plan, [2, 0, 1]):  # in whatever order
+    for chunk, columns in chunks_of(InProcess(), plan, [2, 0, 1]):  # in whatever order
         alone.write(chunk, columns, {})
-    computing = Pool(2).computed(plan, range(100))
+    computing = chunks_of(Pool(2), plan, range(100))
     while not all(shared.path(k).exists() for k in range(3)):
         shared.write(*next(computing), {})
     workers = active_children()
@@ -101,14 +106,14 @@ def test_a_cluster_computes_the_same_until_its_workers_are_gone(study):
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0"
     ) as cluster:
-        ((_, theirs),) = Cluster(cluster.scheduler_address).computed(plan, [1])
+        ((_, theirs),) = chunks_of(Cluster(cluster.scheduler_address), plan, [1])
         with Cluster(cluster.scheduler_address).opened(plan) as compute:
             given = compute(range(64))
             next(given)
             cluster.scale(0)
             with pytest.raises(RunError, match=r"lost its workers.*resume the study"):
                 list(given)
-    ((_, ours),) = InProcess().computed(plan, [1])
+    ((_, ours),) = chunks_of(InProcess(), plan, [1])
     for name, column in ours.items():
         np.testing.assert_array_equal(column, theirs[name])
 
@@ -117,13 +122,13 @@ def test_a_cluster_that_is_not_there_is_named(study, monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr("bywire.studies.executor._SECONDS", 0.5)
     with pytest.raises(RunError, match=r"no cluster answers at 'tcp://192\.0\.2\.1:9'"):
-        next(iter(Cluster("tcp://192.0.2.1:9").computed(read_study(study()), [0])))
+        next(chunks_of(Cluster("tcp://192.0.2.1:9"), read_study(study()), [0]))
 
 
 def test_who_computes_is_chosen_by_the_work(monkeypatch):
     assert isinstance(executor_of(None, "", 2), InProcess)
     with monkeypatch.context() as copied:
-        copied.setattr("bywire.studies.executor.os.cpu_count", lambda: 2)
+        copied.setattr("os.cpu_count", lambda: 2)
         copied.setattr("bywire.studies.executor.may_copy", lambda: True)
         assert isinstance(executor_of(None, "", 1), InProcess)
         assert isinstance(executor_of(None, "", 2), Pool)

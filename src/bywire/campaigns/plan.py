@@ -18,6 +18,7 @@ from bywire.bench.faults.injected import taps_of, touched
 from bywire.bench.faults.modes import Mode
 from bywire.bench.option_names import split_options
 from bywire.campaigns.residual import Residual, first_time, least_of_the_last, missed_ticks
+from bywire.cases.identity import as_json, digest_of
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import TimeConstant
@@ -27,7 +28,7 @@ from bywire.core.typing import Array
 from bywire.core.values import written
 from bywire.core.version import __version__
 from bywire.simulation.tapped import Tap
-from bywire.studies.plan import CHUNK, StudyPlan, Varied, as_json, digest_of
+from bywire.studies.plan import CHUNK, StudyPlan, Varied
 
 Sense = Literal["above", "below", "above_healthy", "below_healthy", "below_share"]
 SENSES: tuple[Sense, ...] = ("above", "below", "above_healthy", "below_healthy", "below_share")

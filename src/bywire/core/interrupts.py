@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import _thread
-import os
 import signal
 import sys
 import threading
@@ -11,6 +10,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from types import FrameType
+
+from bywire.core.workers import worker_count
 
 _PAUSE = 0.2  # seconds until an interrupt that may have been swallowed is raised again
 
@@ -155,7 +156,7 @@ def thread_pool(threads: int | None = None) -> Iterator[ThreadPoolExecutor]:
     """
     stop = threading.Event()
     pool = ThreadPoolExecutor(
-        threads or os.cpu_count() or 1, initializer=_take, initargs=((*_stops.events, stop),)
+        worker_count(threads), initializer=_take, initargs=((*_stops.events, stop),)
     )
     try:
         yield pool

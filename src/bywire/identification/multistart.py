@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection, Sequence
-from concurrent.futures import as_completed
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from bywire.cases.runner import complete
+from bywire.cases.store import PieceLines
 from bywire.core.errors import ParameterError, SolverError
-from bywire.core.interrupts import raise_if_stopped, thread_pool
-from bywire.core.typing import Array, Progress
+from bywire.core.interrupts import raise_if_stopped
+from bywire.core.typing import Array, Progress, silent
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import NO_TRIAL, Loss, Problem, Solution, estimate, solve
 from bywire.identification.unknown import moved, scattered
-from bywire.simulation.job_store import JobStore
 
 _SAME = 0.01  # of the lowest cost: minima that count as one
 _ROUGH = 1e-4  # of the cost: enough to come nearer
@@ -135,10 +136,9 @@ def search(
     KeyboardInterrupt
         When interrupted; finished starts are in the store.
     """
-    kept = JobStore(store)
-    known = _finished(kept)
+    lines, told = PieceLines(store), progress or silent
+    known: dict[str, Solution | Exception] = dict(lines.pieces(_solution))
     keys = _keys(problem, starts, loss) if store is not None else [""] * len(starts)
-    solutions = {k: known[key] for k, key in enumerate(keys) if key in known}
 
     def evaluate(values: Array) -> tuple[Array, Array]:
         raise_if_stopped()
@@ -146,37 +146,34 @@ def search(
 
     guarded = replace(problem, evaluate=evaluate)
 
-    def solved(start: Array) -> Solution:
-        return solve(guarded, start if before is None else before(start), loss, share=_ENDED)
+    def solved(k: int) -> Solution | Exception:
+        start = starts[k]
+        try:
+            return solve(guarded, start if before is None else before(start), loss, share=_ENDED)
+        except NO_TRIAL as error:
+            return error
 
-    failed, refused = 0, None  # type: int, ParameterError | None
-    with thread_pool(threads) as pool:
-        jobs = {
-            pool.submit(solved, start): k for k, start in enumerate(starts) if k not in solutions
-        }
-        for job in as_completed(jobs):
-            k = jobs[job]
-            try:
-                solutions[k] = job.result()
-                kept.append(
-                    {
-                        "key": keys[k],
-                        "values": solutions[k].values.tolist(),
-                        "cost": solutions[k].cost,
-                    }
-                )
-            except NO_TRIAL as error:
-                failed += 1
-                refused = error if isinstance(error, ParameterError) else refused
-            if progress is not None:
-                progress("starts", (len(solutions) + failed) / len(starts))
-    if not solutions and refused is not None:
-        raise refused
+    def keep(k: int, led: Solution | Exception) -> None:
+        if isinstance(led, Solution):
+            lines.keep(keys[k], {"values": led.values.tolist(), "cost": led.cost})
+
+    ends = complete(
+        range(len(starts)),
+        {k: known[key] for k, key in enumerate(keys) if key in known},
+        solved,
+        keep=keep,
+        progress=lambda _, share: told("starts", share),
+        workers=threads,
+    )
+    solutions = {k: end for k, end in ends.items() if isinstance(end, Solution)}
+    refused = [end for end in ends.values() if isinstance(end, ParameterError)]
+    if not solutions and refused:
+        raise refused[-1]
     if not solutions:
         raise SolverError(
             "no start could be computed: begin nearer to the truth, or measure at other points"
         )
-    return Search(tuple(solutions[k] for k in sorted(solutions)), failed)
+    return Search(tuple(solutions[k] for k in sorted(solutions)), len(starts) - len(solutions))
 
 
 def nearer(problem: Problem, held: Collection[str], start: Array) -> Array:
@@ -208,13 +205,6 @@ def _keys(problem: Problem, starts: Sequence[Array], loss: Loss) -> list[str]:
     return keys
 
 
-def _finished(store: JobStore) -> dict[str, Solution]:
-    """Return the finished starts by key."""
-    solutions = {}
-    for row in store.rows():
-        try:
-            values = np.array(row["values"], dtype=float)
-            solutions[str(row["key"])] = Solution(values, float(row["cost"]))
-        except (ValueError, KeyError, TypeError):
-            continue
-    return solutions
+def _solution(row: Mapping[str, Any]) -> Solution:
+    """Return the solution that a file of finished starts says."""
+    return Solution(np.array(row["values"], dtype=float), float(row["cost"]))

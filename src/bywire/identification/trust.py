@@ -9,11 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import math
-import os
 import warnings
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import as_completed
-from contextlib import closing
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -22,15 +19,16 @@ from typing import Any
 import numpy as np
 
 from bywire.bench.computation import functions_digest
+from bywire.cases.runner import complete
+from bywire.cases.store import PieceLines
 from bywire.core.copies import processes_with_brakes
 from bywire.core.errors import BywireError, ParameterError
 from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import ParameterSet
-from bywire.core.typing import Progress
+from bywire.core.typing import Progress, silent
 from bywire.identification.confidence import MisfitWarning
 from bywire.identification.method import Effort, Method
 from bywire.identification.unknown import parameters_of, scattered
-from bywire.simulation.job_store import JobStore
 
 _TRIES = 20
 _KILLED = "what was finished is kept where there is an output folder, and the same command goes on"
@@ -101,16 +99,16 @@ def experiments(
     chosen = replace(effort, threads=1, store=None, progress=None)
     wanted = list(dict.fromkeys(seeds))
     key = _key(method, par, options, chosen)
-    jobs = JobStore(store)
-    done = {o.seed: o for o in _finished(jobs, key) if o.seed in set(wanted)}
-    missing = [seed for seed in wanted if seed not in done]
-    identify = partial(experiment, method, par, options, chosen)
-    with closing(_outcomes(identify, missing, processes or os.cpu_count() or 1)) as outcomes:
-        for outcome in outcomes:
-            done[outcome.seed] = outcome
-            jobs.append({"key": key, **asdict(outcome)})
-            if progress is not None:
-                progress("experiments", len(done) / len(wanted))
+    lines, told = PieceLines(store), progress or silent
+    done = complete(
+        wanted,
+        {outcome.seed: outcome for of, outcome in lines.pieces(_outcome) if of == key},
+        partial(experiment, method, par, options, chosen),
+        keep=lambda _, outcome: lines.keep(key, asdict(outcome)),
+        progress=lambda _, share: told("experiments", share),
+        workers=processes,
+        pool=partial(processes_with_brakes, advice=_KILLED),
+    )
     return tuple(done[seed] for seed in wanted)
 
 
@@ -139,17 +137,6 @@ def experiment(method: Method, par: Any, options: Any, effort: Effort, seed: int
     return Outcome(seed, values, deviations, low, high, units, checks, kept)
 
 
-def _outcomes(
-    identify: Callable[[int], Outcome], seeds: Sequence[int], processes: int
-) -> Generator[Outcome, None, None]:
-    if processes < 2 or len(seeds) < 2:
-        yield from map(identify, seeds)
-        return
-    with processes_with_brakes(min(processes, len(seeds)), _KILLED) as pool:
-        jobs = [pool.submit(identify, seed) for seed in seeds]
-        yield from (job.result() for job in as_completed(jobs))
-
-
 def _key(method: Method, par: Any, options: Any, effort: Effort) -> str:
     values = "" if par is None else par.model_dump_json()
     model = ASSEMBLIES.find(method.assembly) if method.assembly else None
@@ -163,15 +150,9 @@ def _key(method: Method, par: Any, options: Any, effort: Effort) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _finished(store: JobStore, key: str) -> Iterator[Outcome]:
-    """Yield the finished experiments of a study."""
-    for row in store.rows():
-        try:
-            if row.pop("key") == key:
-                row |= {name: tuple(row[name]) for name in ("failed_checks", "kept")}
-                yield Outcome(**row)
-        except (ValueError, KeyError, TypeError):
-            continue
+def _outcome(row: Mapping[str, Any]) -> Outcome:
+    """Return the outcome that a file of finished experiments says."""
+    return Outcome(**{**row, **{name: tuple(row[name]) for name in ("failed_checks", "kept")}})
 
 
 # --- Trust

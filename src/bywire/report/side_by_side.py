@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from bywire.core.copies import may_copy, processes
+from bywire.core.workers import worker_count
 from bywire.report.document import Picture
 
 if TYPE_CHECKING:
@@ -27,14 +27,14 @@ def drawn_side_by_side(blocks: Sequence[FigureBlock]) -> Iterator[None]:
 
     When it ends their place is taken by what was drawn. Others are drawn when they are asked for.
     """
-    cores = os.cpu_count() or 1
-    if len(blocks) <= FEW or cores == 1 or not may_copy():
+    count = worker_count(most=len(blocks))
+    if len(blocks) <= FEW or count == 1 or not may_copy():
         yield
         return
     from bywire.report import drawing  # noqa: F401 - loaded once, for all copies
 
     _blocks[:] = blocks
-    with processes(min(cores, len(blocks)), list, is_copied=True) as pool:
+    with processes(count, list, is_copied=True) as pool:
         # What is long is begun first: at the end it would have all but one copy wait.
         order = sorted(range(len(blocks)), key=lambda k: not blocks[k].is_long)
         drawn = {k: pool.submit(_picture, k) for k in order}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,6 +12,7 @@ import xarray as xr
 from bywire.bench.running import Progress
 from bywire.core.interrupts import thread_pool
 from bywire.core.registry import Kind, instances
+from bywire.core.workers import worker_count
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Banner,
@@ -344,7 +344,7 @@ def reproduced(
         runs.report(label, 1.0)
         return part
 
-    with thread_pool(min(os.cpu_count() or 1, _THREADS)) as pool:
+    with thread_pool(worker_count(most=_THREADS)) as pool:
         jobs = [pool.submit(made, label) for label in parts]
         finished = tuple(job.result() for job in jobs)
     whole = replace(source, parts=finished)

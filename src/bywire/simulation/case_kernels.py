@@ -6,7 +6,6 @@ An engine's name says which; both are called alike, with as many cases as they t
 from __future__ import annotations
 
 import ctypes
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -14,6 +13,7 @@ import numpy as np
 
 from bywire.core.errors import unknown_name
 from bywire.core.typing import Array
+from bywire.core.workers import worker_count
 from bywire.simulation.compiler import IN_TURN, VECTOR, Compiler, find_compiler, load_library
 from bywire.simulation.engine import CUDA, Prepared, built_once, engine_names
 from bywire.simulation.kernel_cache import load
@@ -81,7 +81,7 @@ class LaneKernel:
         self.layout, self.library, self.compiler = layout, library, compiler
         self._signals, self.ends = signals - ends, ends
         loaded = load(library, self.ENTRY)
-        self.lanes, self.at_once = int(loaded.bw_lanes()), os.cpu_count() or 1
+        self.lanes, self.at_once = int(loaded.bw_lanes()), worker_count()
         self.label = f"compiled C in {self.lanes} lanes, {compiler.label}"
         self._run = loaded[self.ENTRY]
         self._run.restype = ctypes.c_int64

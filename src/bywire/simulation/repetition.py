@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from bywire.core.errors import ParameterError, StepError
 from bywire.core.interrupts import thread_pool
 from bywire.core.typing import Array, Complex
+from bywire.core.workers import worker_count
 from bywire.simulation.advance import require_finite
 from bywire.simulation.case_kernels import lane_kernel
 from bywire.simulation.compiler import find_compiler
@@ -290,7 +290,7 @@ def repeat(
                 values[case], done[case] = now[lane], (taken.seen[lane], repeats, unsettled)
                 taken.release(lane)
 
-    workers = min((os.cpu_count() or 1) if lanes else 1, -(-count // width))
+    workers = worker_count(None if lanes else 1, -(-count // width))
     with thread_pool(workers) as pool:
         try:
             list(pool.map(turns, range(workers)))

@@ -20,7 +20,6 @@ from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed
 from bywire.bench.side_by_side import key_figures_of
 from bywire.core.errors import BywireError, DeviceError
-from bywire.core.scratch import replacing
 from bywire.data.file_format import library
 from bywire.studies.plan import CHUNK, StudyPlan
 
@@ -238,9 +237,8 @@ def write_chunk(
         for name, array in arrays.items()
     ]
     table = pa.table(list(arrays.values()), schema=pa.schema(fields, dict(marks)))
-    with replacing(path) as fresh:
-        # A dictionary of numbers that all differ would be written in vain.
-        parquet.write_table(table, fresh, write_page_checksum=True, use_dictionary=texts)
+    # A dictionary of numbers that all differ would be written in vain.
+    parquet.write_table(table, path, write_page_checksum=True, use_dictionary=texts)
 
 
 def read_chunk(path: Path) -> tuple[Columns, Mapping[bytes, bytes]]:

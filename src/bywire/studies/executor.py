@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import logging
-import os
 import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from typing import Any, Generic, Protocol, TypeVar
 
+from bywire.cases.runner import as_completed
 from bywire.core.arguments import whole_number
 from bywire.core.brake import load_brakes, loaded_files
 from bywire.core.callers import option
@@ -22,6 +22,7 @@ from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.errors import ParameterError, RunError
 from bywire.core.heard_warnings import heard_warnings
 from bywire.core.unneeded import allow_dask
+from bywire.core.workers import worker_count
 from bywire.data.file_format import library
 from bywire.simulation.engine import CUDA
 from bywire.studies.chunk import Columns, PlacedChunk, computed_chunk, computed_chunks, number_of
@@ -85,18 +86,14 @@ class Apart:
 class Executor(Protocol):
     """Computes chunks, in any order."""
 
-    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        """Yield the number and the columns of each chunk as soon as it is there.
+    def opened(self, plan: StudyPlan) -> AbstractContextManager[Compute]:
+        """Return what computes chunks batch by batch, each one whole before the next.
 
         Raises
         ------
         RunError
             When workers are lost and none is left.
         """
-        ...
-
-    def opened(self, plan: StudyPlan) -> AbstractContextManager[Compute]:
-        """Return what computes chunks batch by batch, each one whole before the next."""
         ...
 
 
@@ -143,11 +140,6 @@ class Cluster:
 
     def __init__(self, address: str) -> None:
         self.address = address
-
-    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        """Yield each chunk; see `Executor`."""
-        with self.opened(plan) as compute:
-            yield from compute(chunks)
 
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
@@ -250,7 +242,8 @@ class _InPool:
     ahead: int
 
     def __call__(self, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        return _as_completed(self.pool, self.ahead, chunks)
+        begun = as_completed(self.pool, _computed, chunks, self.ahead)
+        return (computed for _, computed in begun)
 
     def beside(self, job: Callable[[], T]) -> Beside[T]:
         return Beside(self.pool.submit(_told, job))
@@ -268,8 +261,7 @@ class InProcess:
     def __init__(self, together: int = 1) -> None:
         self.together = together
 
-    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        """Yield each chunk; see `Executor`."""
+    def _computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
         left = iter(chunks)
         while several := list(islice(left, self.together)):
             yield from computed_chunks(plan, several)
@@ -277,7 +269,7 @@ class InProcess:
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
         """Return what computes; see `Executor`."""
-        yield Apart(partial(self.computed, plan))
+        yield Apart(partial(self._computed, plan))
 
 
 class Pool:
@@ -291,11 +283,6 @@ class Pool:
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
-
-    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
-        """Yield each chunk; see `Executor`."""
-        with self.opened(plan) as compute:
-            yield from compute(chunks)
 
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
@@ -337,7 +324,7 @@ def executor_of(
         return InProcess(_TOGETHER)
     if cluster:
         return Cluster(cluster)
-    count = min(workers or os.cpu_count() or 1, together or chunks)
+    count = worker_count(workers, together or chunks)
     is_worth = workers is not None or chunks >= (_WORTH_COPIES if may_copy() else _WORTH)
     return Pool(count) if count > 1 and is_worth else InProcess()
 
@@ -378,20 +365,3 @@ def _told(job: Callable[[], T]) -> tuple[T, list[Warning]]:
 
 def _computed(chunk: int | PlacedChunk) -> tuple[int, Columns]:
     return single(chunk, _given[0])
-
-
-def _as_completed(
-    pool: ProcessPoolExecutor, ahead: int, chunks: Chunks
-) -> Iterator[tuple[int, Columns]]:
-    """Return what a pool finishes, with few jobs in flight; the first ones are begun at once."""
-    left = iter(chunks)
-    running: set[Future[Any]] = {pool.submit(_computed, chunk) for chunk in islice(left, ahead)}
-
-    def finished(running: set[Future[Any]]) -> Iterator[tuple[int, Columns]]:
-        while running:
-            done, running = wait(running, return_when=FIRST_COMPLETED)
-            running |= {pool.submit(_computed, chunk) for chunk in islice(left, len(done))}
-            for each in done:
-                yield each.result()
-
-    return finished(running)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from bywire.bench.bench import Bench
 from bywire.bench.computation import computation
 from bywire.bench.requirements import Limit
+from bywire.cases.identity import as_json, digest_of
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import Array
@@ -81,91 +81,6 @@ def correlation_factor(
             f"[[correlation]] {told}: no quantities can be correlated so, for the matrix is not "
             f"positive definite (least eigenvalue {least:.2g}): take values closer to zero"
         ) from None
-
-
-# --- What tells a study from another: all that figures of its cases depend on
-
-_SHOWN = 3  # entries that are named, of those that differ
-_WORDS = {
-    "version": "the version of bywire",
-    "computed equations": "the equations of the model",
-    "computed figures": "how the runs or their key figures are computed",
-    "points": "how the library draws",
-}
-"""entries whose values say nothing to a reader"""
-_PARTS = {"varied": ("", "together", "quantiles"), "stimuli": ("", "parameters")}
-"""entries whose values are lists, and what stands in each place of them"""
-
-
-def as_json(identity: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an identity as it is kept: of nothing but what JSON has."""
-    kept: dict[str, Any] = json.loads(json.dumps(identity, sort_keys=True, default=str))
-    return kept
-
-
-def digest_of(identity: Mapping[str, Any]) -> str:
-    """Return what tells an identity from any other."""
-    text = json.dumps(identity, sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """Return which entries of two identities differ, for a reader; empty where that is not known.
-
-    Examples
-    --------
-    >>> differing({"seed": 1, "parameters": {"motor.R_m": 0.35}}, {"seed": 2, "parameters": {}})
-    'parameters motor.R_m: 0.35, now nothing; seed: 1, now 2'
-    """
-    if not before:
-        return ""
-    if "brake" in before:  # the digest of its source, which told studies apart once
-        return "an older version of bywire has written it"
-    old, new = dict(_entries(before)), dict(_entries(now))
-    differ = [name for name in sorted({*old, *new}) if old.get(name) != new.get(name)]
-    names = [name for name in differ if not _is_said(name, old, new)]
-    texts = [_difference(name, old, new) for name in names[:_SHOWN]]
-    rest = [f"and {len(names) - _SHOWN} more"] if len(names) > _SHOWN else []
-    return "; ".join(texts + rest)
-
-
-def _is_said(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
-    """Return whether a difference follows from one of another entry.
-
-    Quantiles differ where the text of a distribution does, and all of what varies only now.
-    """
-    whole, _, part = name.rpartition(" ")
-    if part == "quantiles":
-        return old.get(whole) != new.get(whole)
-    return part == "together" and (whole in old) != (whole in new)
-
-
-def _difference(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
-    if name in _WORDS:
-        return _WORDS[name]
-    before, now = _shown(old.get(name)), _shown(new.get(name))
-    return f"{name}: {before}, now {now}" if before != now else f"{name}: other values"
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, list):
-        value = ", ".join(map(str, value))
-    text = "nothing" if value is None or value == "" else str(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def _entries(identity: Mapping[str, Any], group: str = "") -> list[tuple[str, Any]]:
-    """Return the entries with those of groups in words of their own."""
-    entries: list[tuple[str, Any]] = []
-    for key, value in identity.items():
-        name = f"{group} {key}".strip()
-        if isinstance(value, Mapping):
-            entries += _entries(value, name)
-        elif group in _PARTS and isinstance(value, list):
-            entries += _entries(dict(zip(_PARTS[group], value, strict=False)), name)
-        else:
-            entries.append((name, value))
-    return entries
 
 
 # --- The plan

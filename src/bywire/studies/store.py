@@ -6,32 +6,30 @@ all, so that whatever is killed loses the chunks that it was at.
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from bywire.cases.store import PieceFolder
 from bywire.core.arguments import whole_number
 from bywire.core.brake import loaded_files
 from bywire.core.errors import FileError, ParameterError
-from bywire.core.scratch import replacing, sweep
 from bywire.studies.chunk import Columns, read_chunk, require_pyarrow, write_chunk
 from bywire.studies.designs import MOST, SPANNED
 from bywire.studies.meant_study import RECORD, require_no_file
-from bywire.studies.plan import CHUNK, StudyPlan, differing
+from bywire.studies.plan import CHUNK, StudyPlan
 
 if TYPE_CHECKING:
     import pandas as pd
 
 CHUNKS = "chunks"
 """folder of the chunks"""
-_SAID = {"digest": str, "source": str, "cases": int, "set": dict, "systems": list, "study": dict}
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ class Origin:
 
 
 @dataclass(frozen=True)
-class StudyStore:
+class StudyStore(PieceFolder):
     """Where the chunks of a study lie.
 
     Parameters
@@ -60,9 +58,31 @@ class StudyStore:
         The study's folder.
     """
 
-    folder: Path
+    NOUN = "study"
+    KIND = "study of many cases"
+    COMMAND = "bywire study run"
+    RECORD = RECORD
+    PIECES = CHUNKS
+    FILE = "{:06d}.parquet"
+    SAID: ClassVar[Mapping[str, type]] = {
+        "digest": str,
+        "source": str,
+        "cases": int,
+        "set": dict,
+        "systems": list,
+        "study": dict,
+    }
+
     # What was read or written here, so that nobody who judges a study waits for its files again.
     _known: dict[int, Columns] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    @property
+    def elsewhere(self) -> str:
+        """What to do where the folder holds another study."""
+        return (
+            "what is computed there does not belong to this one; run it into another folder, "
+            "bywire study run FILE --out FOLDER, or remove that one"
+        )
 
     def open(self, plan: StudyPlan, origin: Origin) -> None:
         """Make the folder one of a study, or refuse that of another.
@@ -73,25 +93,15 @@ class StudyStore:
             When it holds another study, or cannot be written.
         """
         require_pyarrow()
-        if (self.folder / RECORD).exists():
-            self.require(plan)
-        try:
-            (self.folder / CHUNKS).mkdir(parents=True, exist_ok=True)
-            sweep(self.folder / CHUNKS)
-            said = {
-                "digest": plan.digest,
-                "source": str(origin.file.resolve()),
-                "name": plan.name,
-                "cases": plan.total,
-                "chunk": CHUNK,
-                "set": dict(origin.overrides),
-                "systems": list(loaded_files()),
-                "study": plan.identity,
-            }
-            with replacing(self.folder / RECORD) as fresh:
-                fresh.write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise _unwritable(self.folder, error) from None
+        about = {
+            "source": str(origin.file.resolve()),
+            "name": plan.name,
+            "cases": plan.total,
+            "chunk": CHUNK,
+            "set": dict(origin.overrides),
+            "systems": list(loaded_files()),
+        }
+        self.begin(plan, about)
 
     def asked_and_computed(self, plan: StudyPlan) -> tuple[int, int]:
         """Return for how many cases the folder was asked, and how many of them are computed.
@@ -112,24 +122,6 @@ class StudyStore:
             chunks = max(turns.values(), default=0)
         return int(known["cases"]), min(int(known["cases"]), CHUNK * chunks)
 
-    def require(self, plan: StudyPlan) -> dict[str, Any]:
-        """Return what the folder says, or refuse it where it holds another study.
-
-        Raises
-        ------
-        FileError
-            When it does, or holds none.
-        """
-        known = self.record()
-        if known["digest"] != plan.digest:
-            differs = differing(known["study"], plan.identity)
-            raise FileError(
-                f"{self.folder} holds another study{differs and f' ({differs})'}: what is computed "
-                "there does not belong to this one; run it into another folder, bywire study run "
-                "FILE --out FOLDER, or remove that one"
-            )
-        return known
-
     def record(self) -> dict[str, Any]:
         """Return what the folder says of its study.
 
@@ -139,39 +131,13 @@ class StudyStore:
             When it holds none.
         """
         require_no_file(self.folder)
-        path = self.folder / RECORD
-        try:
-            said = json.loads(path.read_bytes())
-            if all(isinstance(said[key], kind) for key, kind in _SAID.items()):
-                return dict(said)
-        except OSError as error:
-            raise FileError(
-                f"{self.folder} holds no study ({path.name}: {error.strerror}): name the folder "
-                "that 'bywire study run' has written"
-            ) from None
-        except (ValueError, KeyError, TypeError):
-            pass
-        raise FileError(
-            f"{path} is damaged, or not of a study of many cases: run the study into another folder"
-        )
+        return super().record()
 
     @property
     def resume_command(self) -> str:
         """Command that goes on with the study, with the brakes that were loaded by path."""
         words = ["bywire", "study", "resume", str(self.folder)]
         return shlex.join([*words, *(w for file in loaded_files() for w in ("--system", file))])
-
-    def path(self, chunk: int) -> Path:
-        """Return the file of a chunk."""
-        return self.folder / CHUNKS / f"{chunk:06d}.parquet"
-
-    def finished(self) -> set[int]:
-        """Return the numbers of the chunks that are there."""
-        return {
-            int(path.stem)
-            for path in (self.folder / CHUNKS).glob("*.parquet")
-            if path.stem.isdecimal()
-        }
 
     def drop_damaged(self) -> int:
         """Take away files of chunks that cannot be read, so that they are computed again.
@@ -203,10 +169,8 @@ class StudyStore:
             name: column.astype(object) if column.dtype.kind == "U" else column
             for name, column in columns.items()
         }
-        try:
-            write_chunk(self.path(chunk), columns, units, self._marks(chunk))
-        except OSError as error:
-            raise _unwritable(self.path(chunk), error) from None
+        marks = self._marks(chunk)
+        self.keep_file(chunk, lambda fresh: write_chunk(fresh, columns, units, marks))
         self._known[chunk] = columns
 
     def read(self, chunks: int) -> pd.DataFrame:
@@ -260,13 +224,6 @@ class StudyStore:
     @cached_property
     def _digest(self) -> bytes:
         return str(self.record()["digest"]).encode()
-
-
-def _unwritable(path: Path, error: OSError) -> FileError:
-    return FileError(
-        f"cannot write {path}: {error.strerror or error}: make room there and resume the study; "
-        "what is finished stays"
-    )
 
 
 # --- How many cases are asked for, beside what the file says and the folder has

@@ -80,17 +80,18 @@ def run_faults(
         When interrupted; finished faults stay in the folder.
     """
     from bywire.api.run_faults import FaultCampaign
-    from bywire.campaigns.running import CampaignStore, complete
+    from bywire.campaigns.running import CampaignStore, run_campaign
     from bywire.core.typing import silent
 
     plan = _read(campaign, overrides)
-    store = CampaignStore(None if out is None else Path(out))
+    store = None if out is None else CampaignStore(Path(out))
     try:
-        return FaultCampaign(complete(plan, store, progress or silent), store.folder)
+        findings = run_campaign(plan, store, progress or silent)
     except KeyboardInterrupt:
-        if store.folder is None:
+        if store is None:
             raise
-        kept = sum(store.kept(number) is not None for number in range(len(plan.faults)))
+        kept = len(store.kept(plan))
         raise KeyboardInterrupt(
             f"{kept} of {len(plan.faults)} faults are kept: the same command goes on"
         ) from None
+    return FaultCampaign(findings, None if store is None else store.folder)

@@ -6,7 +6,7 @@ resolution is left out; its error counts as noise.
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
@@ -48,6 +48,11 @@ def held(par: MotorcycleParameters, options: Options) -> MotorcycleParameters:
     )
 
 
+def at_rest(par: MotorcycleParameters) -> tuple[Any, Any]:
+    """Return state and memory in which a record begins: the chamber without pressure."""
+    return state_at(0.0, par), memory_at(0.0, par)
+
+
 LOOP = CurrentLoop(
     model=MotorcycleBrake(),
     demand="i_set",
@@ -56,7 +61,7 @@ LOOP = CurrentLoop(
     gains=("ecu.current.k_p", "ecu.current.k_i"),
     winding=("motor.R_m", "motor.L_m"),
     held=held,
-    rest=lambda par: (state_at(0.0, par), memory_at(0.0, par)),
+    rest=at_rest,
 )
 
 

@@ -34,6 +34,11 @@ class Options(LoopOptions):
     """synthetic: noise of the measured current"""
 
 
+def held(par: WedgeParameters, _: Options) -> WedgeParameters:
+    """Return the parameters with the shaft clamped."""
+    return par.replace({**_CLAMPED, "encoder.law": "ideal"})
+
+
 LOOP = CurrentLoop(
     model=ShaftRig(),
     demand="i_1_set",
@@ -41,7 +46,7 @@ LOOP = CurrentLoop(
     computed="i_1",
     gains=("drive.k_p", "drive.k_i"),
     winding=("motor_1.R_ref", "motor_1.L_M"),
-    held=lambda par, _: par.replace({**_CLAMPED, "encoder.law": "ideal"}),
+    held=held,
 )
 
 

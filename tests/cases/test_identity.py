@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bywire.studies.plan import differing
+from bywire.cases.identity import differing
 
 BEFORE = {"varied": {"motor.R_m": ["0.4 ohm +- 5 %", ["ecu.R"], [0.38, 0.42]]}, "seed": 1}
 

@@ -1,0 +1,96 @@
+"""Pieces of work computed side by side, each kept as soon as it is finished."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, wait
+from contextlib import AbstractContextManager
+from itertools import islice
+from typing import TypeVar
+
+from bywire.core.interrupts import thread_pool
+from bywire.core.workers import worker_count
+
+K = TypeVar("K")
+T = TypeVar("T")
+
+
+def complete(
+    pieces: Sequence[K],
+    kept: Mapping[K, T],
+    compute: Callable[[K], T],
+    *,
+    keep: Callable[[K, T], object],
+    progress: Callable[[K, float], object],
+    workers: int | None = None,
+    pool: Callable[[int], AbstractContextManager[Executor]] = thread_pool,
+) -> dict[K, T]:
+    """Return what all pieces give, computed as far as it is not kept.
+
+    Parameters
+    ----------
+    pieces
+        What tells each piece from the others.
+    kept
+        What finished ones gave.
+    compute
+        Computes a piece, in a thread or process of the pool; here where one worker is enough.
+    keep
+        Called here with each piece that is computed, and what it gave.
+    progress
+        Called here after that, with the piece and the finished share, 0 to 1.
+    workers
+        How many compute at a time; one a core by default.
+    pool
+        What they are: `thread_pool` for work that lets go of Python's lock, or processes.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        When interrupted; finished pieces are kept.
+    """
+    results = {piece: kept[piece] for piece in pieces if piece in kept}
+    missing = [piece for piece in pieces if piece not in results]
+
+    def finish(computed: Iterable[tuple[K, T]]) -> None:
+        for piece, result in computed:
+            results[piece] = result
+            keep(piece, result)
+            progress(piece, len(results) / len(pieces))
+
+    count = worker_count(workers, len(missing))
+    if count == 1:
+        finish((piece, compute(piece)) for piece in missing)
+    else:
+        with pool(count) as opened:
+            finish(as_completed(opened, compute, missing))
+    return results
+
+
+def as_completed(
+    pool: Executor, compute: Callable[[K], T], pieces: Iterable[K], ahead: int | None = None
+) -> Iterator[tuple[K, T]]:
+    """Return what a pool finishes, in any order; the first pieces are begun at once.
+
+    Parameters
+    ----------
+    pool
+        Computes the pieces.
+    compute
+        What it does with a piece.
+    pieces
+        The pieces.
+    ahead
+        How many are begun and not yet finished at a time; all of them by default.
+    """
+    left = iter(pieces)
+    begun = {pool.submit(compute, piece): piece for piece in islice(left, ahead)}
+
+    def finished() -> Iterator[tuple[K, T]]:
+        while begun:
+            done, _ = wait(begun, return_when=FIRST_COMPLETED)
+            begun.update({pool.submit(compute, piece): piece for piece in islice(left, len(done))})
+            for each in done:
+                yield begun.pop(each), each.result()
+
+    return finished()
