@@ -106,7 +106,8 @@ CALLS = {
     "margins-wedge": "margins moment",
     "frequency-response": "frequency-response pressure --frequencies 2Hz,8Hz --amplitudes 1bar",
     "agreement": "agreement pressure",
-    "design": "design pressure --require phase_margin>=60deg --require bandwidth>=5Hz --linear-only",
+    "design": "design pressure --require phase_margin>=60deg --require bandwidth>=5Hz "
+    "--linear-only",
     "design-wedge": "design moment --require phase_margin>=60deg --linear-only",
     "life": "life wedge-pads",
     "faults": "faults campaign.toml --out campaign",
