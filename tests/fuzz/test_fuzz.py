@@ -77,7 +77,8 @@ def test_no_message_repeats_a_long_value(tmp_path: Path, monkeypatch: pytest.Mon
     rng = Random(SEED)
     by_command = groupby(options.long_values(), key=lambda value: value[0])
     each = [value for _, values in by_command for value in rng.sample(list(values), 2)]
-    assert {command for command, _, _ in each} == set(options.COMMANDS)
+    commands = {command for command, _, _ in each}
+    assert commands == set(options.COMMANDS), "add what it is called with to options.COMMANDS"
     wrong = [
         f"{command} {name}: {said}"
         for command, name, text in each

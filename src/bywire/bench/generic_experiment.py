@@ -176,8 +176,8 @@ class GenericExperiment:
         option of that name names.
     signals
         What each option that names a signal names: a ``stimulus``, a ``recording``, one of both
-        (``input or recording``), a ``friction`` or a ``state``. The latter two and the third are
-        what the first option names, unless given.
+        (``input or recording``), a ``friction`` or a ``state``. ``input or recording``
+        and ``state`` are what the first option names, unless given.
     defaults
         Options unless given; a level is a multiple of its signal's nominal magnitude.
     build

@@ -39,6 +39,7 @@ _HARMLESS = {
         "sources",
         "unneeded",
         "version",
+        "workers",
     )
 }
 

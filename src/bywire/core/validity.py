@@ -13,9 +13,10 @@ F = TypeVar("F", bound=Callable[..., list[str]])
 
 
 def row_by_row(watch: F) -> F:
-    """Declare that an element's ``watch`` says something if and only if it does so of some one row.
+    """Declare that an element's ``watch`` judges each row alone.
 
-    It is then asked once of the rows of many cases, (cases, rows) each: they are silent mostly.
+    It warns exactly if at least one row alone would make it warn. It is then asked once of the
+    rows of many cases, (cases, rows) each: they are silent mostly.
     """
     watch.row_by_row = True  # type: ignore[attr-defined]
     return watch

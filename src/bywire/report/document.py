@@ -236,7 +236,8 @@ class Document:
         What a reader must know first: the first words on a terminal and of the JSON object.
     changes
         What the user changed, which a terminal shows first and the JSON object has by name; None
-        where nothing can be. A page has it where its sections put it (`bywire.report.subject`).
+        where nothing can be. Pages do not show it by themselves: a section holds it
+        (`bywire.report.subject`).
     """
 
     title: str

@@ -20,6 +20,7 @@ import builtins
 import dataclasses
 import inspect
 import math
+import re
 import textwrap
 import types
 import typing
@@ -777,6 +778,8 @@ class _Writer:
                 pass
             case _:
                 self.refuse(node, "it is Undefined(text) or Undefined(text, is_open=True)")
+        if isinstance(reason, ast.Constant) and re.search(r"\{[{:]", str(reason.value)):
+            self.refuse(node, "a text with numbers is an f-string")
         numbers: list[str] = []
         text = "".join(self.pieces(node, reason, numbers))
         if len(numbers) > _MOST_NUMBERS:
