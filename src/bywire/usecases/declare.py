@@ -379,6 +379,7 @@ def _bare(annotation: Any) -> str:
     return (
         inspect.formatannotation(kind)
         .replace("typing.", "")
+        .replace("pathlib._local.", "pathlib.")  # Python 3.13
         .replace("pathlib.", "")
         .replace("collections.abc.", "")
     )
