@@ -51,6 +51,7 @@ NEWEST_TESTS = [
     f"tests/{name}"
     for name in (
         "repository/test_imports.py",
+        "core/test_core_arguments.py",
         "core/test_core_copies.py",
         "core/test_core_scratch.py",
         "core/test_heard_warnings.py",

@@ -81,8 +81,8 @@ def test_nodes_come_from_any_measurement_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ('unit = "bra"', "stimulus.unit = 'bra': the unit 'bra' is not known"),
-        ("column = true", "stimulus.column"),
+        ('unit = "bra"', r"\[stimulus\] unit = 'bra': the unit 'bra' is not known"),
+        ("column = true", r"\[stimulus\] column = true: write its title in quotation marks"),
         ('rate = "5 ms"', "rate = '5 ms' has the wrong unit"),
         ('tme = "t"', "tme"),
         ('column = "a"\nunit = "V"', "the file says 'A' and the mapping 'V'"),

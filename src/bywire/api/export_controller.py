@@ -206,8 +206,6 @@ def check_controller(case: Case, cited: Mapping[str, Cited], count: int) -> Cont
 
 # --- The export
 
-VECTORS = 200
-
 
 @dataclass(frozen=True)
 class ControllerExport(Answer):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from bywire.bench.stimuli.registry import STIMULI, Stimulus, create
-from bywire.core.errors import FileError, InputError, ParameterError, quoted
+from bywire.core.errors import FileError, ParameterError, quoted
 
 _FILE = ("format", "rate", "start", "decimal", "skip_lines")
 _CLOCK = {"time": "column", "time_unit": "unit"}  # a table of a stimulus would be another one
@@ -37,7 +38,8 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
     """
     if "file" not in values:
         return dict(values)
-    from bywire.data.trace import read_trace, trace_names  # most benches have no file
+    from bywire.data.mapping import mapping_from, signal_mapping  # most benches have no file
+    from bywire.data.trace import read_trace, trace_names
 
     keys = ("file", "max_gap", *_FILE, *_CLOCK, *_SIGNAL)
     rest = {key: value for key, value in values.items() if key not in keys}
@@ -59,13 +61,13 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
                 f"({', '.join(names[:_SHOWN])}{more})"
             )
         signal["column"] = names[0]
-    mapping = {**whole, "signals": {_NAME: signal}}
-    try:
-        trace = read_trace(
-            path, {_NAME: level_unit}, max_gap=values.get("max_gap", 0.1), mapping=mapping
-        )
-    except InputError as error:  # of a mapping that the user has not written
-        raise type(error)(str(error).replace(f"[signals.{_NAME}] ", "stimulus.")) from None
+    meant = signal_mapping(_NAME, signal, "[stimulus]")
+    trace = read_trace(
+        path,
+        {_NAME: level_unit},
+        max_gap=values.get("max_gap", 0.1),
+        mapping=replace(mapping_from(whole), signals={_NAME: meant}),
+    )
     time = trace["time"].values
     nodes = {"times": (time - time[0]).tolist(), "values": trace[_NAME].values.tolist()}
     return {"between": "linear", **rest, **nodes}

@@ -216,7 +216,7 @@ def mapping_from(content: Mapping[str, Any]) -> MeasurementMapping:
     """
     file = MappingFile.read(content, "a mapping")
     return MeasurementMapping(
-        {name: _signal(name, each) for name, each in file.signals.items()},
+        {name: _signal(name, each, f"[signals.{name}]") for name, each in file.signals.items()},
         _clock(file.time, file.rate, file.start, ""),
         file.format.strip(),
         file.decimal,
@@ -225,6 +225,14 @@ def mapping_from(content: Mapping[str, Any]) -> MeasurementMapping:
         _encoding(file.encoding.strip().lower()),
         _marks(file.missing),
     )
+
+
+def signal_mapping(name: str, content: Mapping[str, Any], place: str) -> SignalMapping:
+    """Return the mapping of a signal that a section of another file describes.
+
+    ``place``: the section as errors call it, ``"[stimulus]"``. Raises: as `mapping_from`.
+    """
+    return _signal(name, SignalSection.read(content, place), place)
 
 
 def _encoding(name: str) -> str:
@@ -245,8 +253,8 @@ def _marks(missing: tuple[float | str, ...]) -> tuple[float | str, ...]:
     return tuple(mark.strip() if isinstance(mark, str) else mark for mark in missing)
 
 
-def _signal(name: str, section: SignalSection) -> SignalMapping:
-    where = f"[signals.{name}] "
+def _signal(name: str, section: SignalSection, place: str) -> SignalMapping:
+    where = f"{place} "
     unit = _unit(section.unit, where)
     symbol = si_symbol(unit_of(unit)) if unit else ""
     needs_unit = [key for key in ("offset", "limits") if key in section.given and not symbol]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from matplotlib.patches import Circle, Patch
 from matplotlib.ticker import MultipleLocator, NullFormatter
 
 from bywire.analysis.loop_curves import Family, LoopCurve, disk
+from bywire.analysis.margins import LoopMargins
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.legend import legend_outside
@@ -219,6 +220,15 @@ def _disk(axes: Axes, worst: LoopCurve) -> None:
         axes.add_patch(Circle((free.middle, 0.0), free.radius, **look))
 
 
+_MARK: dict[str, Any] = {
+    "color": style.BLACK,
+    "markersize": 5,
+    "zorder": 5,
+    "linestyle": "none",
+}
+"""looks of the points where margins are read"""
+
+
 def _mark_on_the_circle(axes: Axes, worst: LoopCurve) -> None:
     """Mark where phase and gain margin are read."""
     margins = worst.margins
@@ -228,28 +238,21 @@ def _mark_on_the_circle(axes: Axes, worst: LoopCurve) -> None:
             math.cos(angle),
             math.sin(angle),
             "o",
-            color=style.BLACK,
-            markersize=5,
-            zorder=5,
-            linestyle="none",
+            **_MARK,
             label=f"phase margin {margins.phase:.3g}° at {margins.phase_at:.3g} Hz",
         )
-    factors = (
+    for name, mark, factor, at in _gain_margins(margins):
+        label = f"{name} {factor:.3g} at {at:.3g} Hz"
+        axes.plot(-1.0 / factor, 0.0, mark, label=label, **_MARK)
+
+
+def _gain_margins(margins: LoopMargins) -> Iterator[tuple[str, str, float, float]]:
+    """Yield name, mark, factor and frequency [Hz] of the gain margins that there are."""
+    both = (
         ("gain margin", "s", margins.gain, margins.gain_at),
         ("lower gain margin", "D", margins.lower_gain, margins.lower_gain_at),
     )
-    for name, mark, factor, at in factors:
-        if 0.0 < factor < math.inf:
-            axes.plot(
-                -1.0 / factor,
-                0.0,
-                mark,
-                color=style.BLACK,
-                markersize=5,
-                zorder=5,
-                linestyle="none",
-                label=f"{name} {factor:.3g} at {at:.3g} Hz",
-            )
+    yield from (each for each in both if 0.0 < each[2] < math.inf)
 
 
 # --- Nichols chart with contours of the closed loop's magnitude
@@ -351,29 +354,17 @@ def _mark_on_the_chart(axes: Axes, worst: LoopCurve) -> None:
             margins.phase - 180.0,
             0.0,
             "o",
-            color=style.BLACK,
-            markersize=5,
-            zorder=5,
-            linestyle="none",
+            **_MARK,
             label=f"phase margin {margins.phase:.3g}°",
         )
-    factors = (
-        ("gain margin", "s", margins.gain, margins.gain_at),
-        ("lower gain margin", "D", margins.lower_gain, margins.lower_gain_at),
-    )
-    for name, mark, factor, frequency in factors:
-        if not 0.0 < factor < math.inf:
-            continue
+    for name, mark, factor, frequency in _gain_margins(margins):
         phase = float(np.interp(frequency, worst.frequency, worst.phase))
         at = 360.0 * round((phase - 180.0) / 360.0) + 180.0  # the odd half turn next to it
         axes.plot(
             at,
             -20.0 * math.log10(factor),
             mark,
-            color=style.BLACK,
-            markersize=5,
-            zorder=5,
-            linestyle="none",
+            **_MARK,
             label=f"{name} {factor:.3g}",
         )
 
@@ -426,10 +417,7 @@ def _panel(axes: Axes, family: Family, quantity: str, limit: float) -> None:
             worst.frequency[k],
             20.0 * math.log10(size[k]),
             "o",
-            color=style.BLACK,
-            markersize=5,
-            zorder=5,
-            linestyle="none",
+            **_MARK,
             label=f"max |{quantity}| {size[k]:.3g}",
         )
     lowest = min((float(points(c)[1].min()) for c in family.curves), default=0.0)

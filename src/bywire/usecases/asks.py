@@ -65,7 +65,6 @@ LastBenchChanges = Annotated[Mapping[str, str], replace(BENCH_CHANGES, is_last=T
 NeededCase = Annotated[str, Ask("Run of the experiment; needed where there are several.", "Run")]
 CaseName = Annotated[str, Ask("Run of the experiment; the first by default.", "Run")]
 OUT = Ask("Folder for recordings, figures and the report.", is_folder=True)
-OutFolder = Annotated[str | Path | None, OUT]
 LastOutFolder = Annotated[str | Path | None, replace(OUT, is_last=True)]
 ExportFolder = Annotated[str | Path, Ask("Folder of the export.", is_folder=True)]
 
