@@ -22,8 +22,6 @@ from bywire.studies.study_file import read_study
 from bywire.synthesis.linear_case import LinearCase, existing_case, require_given
 from bywire.synthesis.outcome import Judged, judged_over
 
-DRAWN = 64
-"""models that gains are chosen for, by default"""
 _JUDGES = 512  # further ones, that judge the gains
 _MOST = 1000
 
