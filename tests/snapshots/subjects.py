@@ -224,7 +224,7 @@ def plain(text: str, folder: Path) -> str:
     text = text.replace(str(folder), "FOLDER").replace(folder.name, "FOLDER")
     text = text.replace(str(ROOT), "ROOT")
     text = re.sub(r"\bcc \([^)]*\) [\d.]+(, quick)?", "COMPILER", text)
-    text = re.sub(r"\b[0-9a-f]{12,64}\b", "HASH", text)
+    text = re.sub(r"(?<![.\w])(?=\d*[a-f])[0-9a-f]{12,64}\b", "HASH", text)  # and no decimals
     return re.sub(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?(\.\d+)?(Z|[+-]\d\d:\d\d)?", "TIME", text)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from snapshots.compared import difference
-from snapshots.subjects import GROUPS
+from snapshots.subjects import GROUPS, plain
 
 
 @pytest.mark.parametrize("group", GROUPS)
@@ -28,3 +28,9 @@ def test_a_change_is_found() -> None:
     assert "gain 8.9" in difference("a\ngain 8.6821", "a\ngain 8.9")
     assert "stable" in difference("stable", "unstable")
     assert "line 2" in difference("a", "a\nb")
+
+
+def test_numbers_are_kept_and_digests_are_not() -> None:
+    digest = "5a1c" * 16
+    text = plain(f"value 0.009689293411397553, of {digest}", Path("/folder"))
+    assert text == "value 0.009689293411397553, of HASH"
