@@ -212,7 +212,14 @@ def cut(self, answer, *more):
         os.kill(os.getpid(), signal.SIGKILL)
     send(self, answer, *more)
 
+close = Connection._close
+
+def slowly(self, *more):
+    close(self, *more)
+    time.sleep(0.05)
+
 Connection._send = cut
+Connection._close = slowly  # who watches the pool closes its pipe, and who ends it may not again
 with processes(2, list, is_copied=True) as pool:
     cut_short, other = pool.submit(bytes, 1_000_000), pool.submit(time.sleep, 0.2)
     for each in (cut_short, other):

@@ -102,8 +102,8 @@ def processes(
             else (_prepare, bytes(ForkingPickler.dumps((prepare, arguments)))),
         )
     workers: list[BaseProcess] = []
-    is_over = threading.Event()
-    watch = threading.Thread(target=_break_off, args=(pool, workers, is_over), daemon=True)
+    is_over, ending = threading.Event(), threading.Lock()
+    watch = threading.Thread(target=_break_off, args=(pool, workers, is_over, ending), daemon=True)
     try:
         with _deaf_to_interrupts() if is_copied else nullcontext():
             for _ in range(count):
@@ -112,13 +112,14 @@ def processes(
         watch.start()
         yield pool
     finally:  # at once, also after Ctrl-C: nobody waits for what they are at
-        is_over.set()
-        _end(pool)
+        with ending:
+            is_over.set()
+            _end(pool)
         # With its threads: the next copies must find none, and Python's own end would meet them
-        # while they close what it writes to.
-        pool.shutdown(wait=True, cancel_futures=True)
+        # while they close what it writes to. The watch first: it may be at the pool's queue.
         if watch.ident is not None:
             watch.join()
+        pool.shutdown(wait=True, cancel_futures=True)
 
 
 @contextmanager
@@ -166,7 +167,10 @@ def _know(
 
 
 def _break_off(
-    pool: ProcessPoolExecutor, workers: Sequence[BaseProcess], is_over: threading.Event
+    pool: ProcessPoolExecutor,
+    workers: Sequence[BaseProcess],
+    is_over: threading.Event,
+    ending: threading.Lock,
 ) -> None:
     """Have a pool break when a process of it is killed, wherever that process was.
 
@@ -175,8 +179,9 @@ def _break_off(
     others wait for their turn.
     """
     wait([process.sentinel for process in workers])
-    if not is_over.is_set():
-        _end(pool)
+    with ending:
+        if not is_over.is_set():
+            _end(pool)
 
 
 def _end(pool: ProcessPoolExecutor) -> None:
@@ -188,7 +193,8 @@ def _end(pool: ProcessPoolExecutor) -> None:
     while left:
         left = [each for each in left if each not in wait(left)]
     last_end: Connection = vars(pool._result_queue)["_writer"]
-    last_end.close()
+    if not last_end.closed:  # its number may be another file's by now
+        last_end.close()
 
 
 @contextmanager
