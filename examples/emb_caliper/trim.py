@@ -23,7 +23,7 @@ def overlap_at(F: float, par: Par) -> float:
     most = floating_caliper.elastic(par.caliper.n_max, par.caliper)
     if not 0.0 <= F <= most:
         raise ParameterError(
-            f"a clamp force of {F / 1e3:g} kN is not admissible: it must be >= 0 kN and <= "
+            f"a clamp force of {F / 1e3:g} kN is not valid: it must be >= 0 kN and <= "
             f"{most / 1e3:.4g} kN, where the caliper's measured curve ends (caliper.n_max)"
         )
 

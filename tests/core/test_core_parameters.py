@@ -190,18 +190,18 @@ def test_nothing_can_be_assigned_or_added():
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"inner.R": 0.0}, "inner.R = 0.0 ohm is not admissible: it must be > 0 ohm"),
-        ({"inner.R": math.nan}, "inner.R = nan ohm is not admissible: it must be > 0 ohm"),
-        ({"inner.R": math.inf}, "inner.R = inf ohm is not admissible: it must be > 0 ohm"),
-        ({"inner.R": "much"}, "inner.R = much ohm is not admissible: it must be > 0 ohm"),
-        ({"inner.R": None}, "inner.R = None ohm is not admissible: it must be > 0 ohm"),
-        ({"share": 1.1}, "share = 1.1 is not admissible: it must be > 0 and <= 1"),
-        ({"n": 2.5}, "n = 2.5 is not admissible: it must be a whole number, >= 1 and <= 9"),
-        ({"n": 10}, "n = 10 is not admissible: it must be >= 1 and <= 9"),
-        ({"table": (0.0, -1.0)}, "table.1 = -1.0 Pa is not admissible: it must be >= 0 Pa"),
-        ({"table": (math.nan,)}, "table.0 = nan Pa is not admissible: it must be >= 0 Pa"),
+        ({"inner.R": 0.0}, "inner.R = 0.0 ohm is not valid: it must be > 0 ohm"),
+        ({"inner.R": math.nan}, "inner.R = nan ohm is not valid: it must be > 0 ohm"),
+        ({"inner.R": math.inf}, "inner.R = inf ohm is not valid: it must be > 0 ohm"),
+        ({"inner.R": "much"}, "inner.R = much ohm is not valid: it must be > 0 ohm"),
+        ({"inner.R": None}, "inner.R = None ohm is not valid: it must be > 0 ohm"),
+        ({"share": 1.1}, "share = 1.1 is not valid: it must be > 0 and <= 1"),
+        ({"n": 2.5}, "n = 2.5 is not valid: it must be a whole number, >= 1 and <= 9"),
+        ({"n": 10}, "n = 10 is not valid: it must be >= 1 and <= 9"),
+        ({"table": (0.0, -1.0)}, "table.1 = -1.0 Pa is not valid: it must be >= 0 Pa"),
+        ({"table": (math.nan,)}, "table.0 = nan Pa is not valid: it must be >= 0 Pa"),
         ({"table": ()}, "table: at least 1 wanted, got ()"),
-        ({"table": 3.0}, "table = 3.0 Pa is not admissible: it must be >= 0 Pa"),
+        ({"table": 3.0}, "table = 3.0 Pa is not valid: it must be >= 0 Pa"),
         (
             {"inner.law": "papr"},
             "inner.law: it must be 'paper' or 'directional', got 'papr': did you mean 'paper'?",
@@ -224,16 +224,16 @@ def test_refusal_is_one_line_that_helps(changes, text):
     [
         (
             {"short": Written(-2e-5, "-0.02mm")},
-            "short = -2e-05 m is not admissible: it must be > 0 m, got '-0.02mm'",
+            "short = -2e-05 m is not valid: it must be > 0 m, got '-0.02mm'",
         ),
         (
             {"share": Written(1.2, "120 %")},
-            "share = 1.2 is not admissible: it must be > 0 and <= 1, got '120 %'",
+            "share = 1.2 is not valid: it must be > 0 and <= 1, got '120 %'",
         ),
-        ({"share": Written(1.2, "1.2")}, "share = 1.2 is not admissible: it must be > 0 and <= 1"),
+        ({"share": Written(1.2, "1.2")}, "share = 1.2 is not valid: it must be > 0 and <= 1"),
         (
             {"table": (Written(0.0, "0 bar"), Written(-1e5, "-1 bar"))},
-            "table.1 = -100000.0 Pa is not admissible: it must be >= 0 Pa, got '-1 bar'",
+            "table.1 = -100000.0 Pa is not valid: it must be >= 0 Pa, got '-1 bar'",
         ),
     ],
 )

@@ -181,7 +181,7 @@ def test_no_quantity(text):
     "value", [math.nan, math.inf, -math.inf, 10**400, 10**5000, "1e999 m"], ids=range(6)
 )
 def test_not_finite(value):
-    with pytest.raises(ParameterError, match="is not admissible: it must be any finite number"):
+    with pytest.raises(ParameterError, match="is not valid: it must be any finite number"):
         units.parse(value, "m", "x")
 
 

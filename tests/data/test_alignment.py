@@ -131,7 +131,7 @@ def test_jitter_is_the_largest_distance_from_the_median_step():
 @pytest.mark.parametrize(
     ("options", "kind", "text"),
     [
-        ({"interval": "0 s"}, ParameterError, "interval = '0 s' is not admissible"),
+        ({"interval": "0 s"}, ParameterError, "interval = '0 s' is not valid"),
         ({"interval": 1e-12}, ParameterError, "would make 2e[+]12 samples of each signal"),
         ({"interval": 2e-9}, ParameterError, r"14.9 GiB, and .* GiB are made at most"),
         (

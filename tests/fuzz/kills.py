@@ -10,8 +10,10 @@ import time
 from pathlib import Path
 from random import Random
 
+from bywire.campaigns.running import CampaignStore
 from bywire.core.scratch import PREFIX, UNFINISHED
 from bywire.report.result_folder import earlier_files
+from bywire.studies.store import StudyStore
 from fuzz import options
 from fuzz.forked import Forked
 from fuzz.judge import judged
@@ -161,7 +163,8 @@ def _half(out: Path, before: set[str]) -> str:
     if not out.exists() or UNFINISHED in names or names == before:
         return ""
     ours = earlier_files(out)
-    stored = {name for name in names if name.endswith(".jsonl")}  # finished parts of a search
+    kept = {StudyStore.RECORD, CampaignStore.RECORD}  # whose finished pieces lie beside a result
+    stored = {name for name in names if name.endswith(".jsonl") or name in kept}
     return (
         f"{sorted(names)}, of which {sorted(ours)} are one result" if names - stored != ours else ""
     )

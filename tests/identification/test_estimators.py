@@ -344,7 +344,7 @@ def test_several_starts_of_a_model_of_ones_own(axis: ModuleType, data: xr.Datase
     ("change", "said"),
     [
         (lambda d: d.rename(theta="phi"), "unknown measured signal 'theta': known are"),
-        (lambda d: d.isel(time=slice(None, None, 10)), "cutoff = 60 Hz is not admissible"),
+        (lambda d: d.isel(time=slice(None, None, 10)), "cutoff = 60 Hz is not valid"),
         (lambda d: d.assign(theta=-d["theta"]), r"theta goes against v \(J = -0.02 .*negate one"),
         (None, "none.nc cannot be read"),
     ],

@@ -208,7 +208,7 @@ def test_choosing_a_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
         for command in (str(named), ""):  # also where compilers that do not work are passed over
             find_compiler.cache_clear()
             monkeypatch.setenv("BYWIRE_CC", command)
-            with pytest.raises(CompilerError, match="BYWIRE_CC_QUICK = 'very' is not admissible"):
+            with pytest.raises(CompilerError, match="BYWIRE_CC_QUICK = 'very' is not valid"):
                 find_compiler()
         find_compiler.cache_clear()
         monkeypatch.delenv("BYWIRE_CC_QUICK")

@@ -76,7 +76,7 @@ def test_a_step_far_from_any_divisor_is_refused_at_once(
     ("duration", "step"), [(0.1, 0.0), (0.1, -1e-5), (0.1, np.nan), (0.0, 2e-5)]
 )
 def test_neither_zero_nor_negative(duration: float, step: float) -> None:
-    with pytest.raises(StepError, match="not admissible: it must be > 0 s"):
+    with pytest.raises(StepError, match="is not valid: it must be > 0 s"):
         plan(duration, step, {"drive": 1e-3}, 1e-3)
 
 

@@ -70,7 +70,7 @@ def test_pure_numbers_have_no_unit(study, written):
 
 def test_some_of_them_and_cut_off(study, written):
     written(estimate(value=0.02))
-    refused = r"\[measured\] motor.R_m: .* leaves what is admissible.*truncate = true"
+    refused = r"\[measured\] motor.R_m: .* leaves the valid range.*truncate = true"
     with pytest.raises(InputError, match=refused):
         read_study(study('[measured]\nfile = "id"\n'))
     plan = read_study(

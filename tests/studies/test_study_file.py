@@ -110,7 +110,7 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
         ),
         (
             '[vary]\n"motor.R_m" = "+-100 %"',
-            ["its end at 0 ohm is not admissible", "> 0 ohm", "narrower tolerance"],
+            ["its end at 0 ohm is not valid", "> 0 ohm", "narrower tolerance"],
         ),
         (
             '[vary]\n"motor.K_e" = { kind = "normal", sd = "1 %", together = ["ecu.K"] }',
@@ -260,7 +260,7 @@ def test_what_is_wrong_with_a_choice_among_the_options_is_said(study, text, said
         (
             STOPS,
             '"options.stops" = { kind = "discrete", values = [10, "+11 %"] }',
-            ["11.1 is not admissible"],
+            ["11.1 is not valid"],
         ),
     ],
 )

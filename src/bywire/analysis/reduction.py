@@ -235,10 +235,10 @@ def frequencies(full: LinearModel, reduced: LinearModel, high: float) -> Array:
         )
     nyquist = 0.5 / full.period if full.period else math.inf
     if not 0.0 < high < math.inf:
-        raise ParameterError(f"band = {high:g} Hz is not admissible: it must be > 0 Hz and finite")
+        raise ParameterError(f"band = {high:g} Hz is not valid: it must be > 0 Hz and finite")
     if high > nyquist:
         raise ParameterError(
-            f"band = {high:g} Hz is not admissible: it must be <= {nyquist:g} Hz, half the "
+            f"band = {high:g} Hz is not valid: it must be <= {nyquist:g} Hz, half the "
             "sampling frequency"
         )
     low = high * 10.0**-_DECADES
@@ -438,11 +438,11 @@ def reduce(
     least = max(kept, 1)
     if order is not None and not least <= order <= n:
         raise ParameterError(
-            f"order = {order} is not admissible: {full.name} has {n} states that act, {kept} of "
+            f"order = {order} is not valid: {full.name} has {n} states that act, {kept} of "
             f"them unstable or on the border of stability: it must be >= {least} and <= {n}"
         )
     if not 0.0 < tolerance < 1.0:
-        raise ParameterError(f"tolerance = {tolerance:g} is not admissible: it must be > 0 and < 1")
+        raise ParameterError(f"tolerance = {tolerance:g} is not valid: it must be > 0 and < 1")
     rungs = _balanced(full) if method == "balanced" else _modal(full)
     best = math.inf
     for size in range(least, n + 1) if order is None else (order,):
@@ -551,7 +551,7 @@ def _band(model: LinearModel, band: float | None) -> float:
         most = _FAR * float(natural(model).max(initial=0.0))
         if not model.period and band > most > 0.0:
             raise ParameterError(
-                f"band = {band:g} Hz is not admissible: it must be <= {most:.3g} Hz, {_FAR:g} "
+                f"band = {band:g} Hz is not valid: it must be <= {most:.3g} Hz, {_FAR:g} "
                 f"times the fastest corner of {model.name}"
             )
         return band

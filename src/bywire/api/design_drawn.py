@@ -171,11 +171,11 @@ def drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
     Raises
     ------
     InputError
-        For a study file that does not fit the loop, a count that is not admissible, and models of
+        For a study file that does not fit the loop, a count that is not valid, and models of
         which none exists.
     """
     if not 1 <= count <= _MOST:
-        raise ParameterError(f"drawn = {count} is not admissible: 1 to {_MOST} models")
+        raise ParameterError(f"drawn = {count} is not valid: 1 to {_MOST} models")
     plan = replace(read_study(file), design="monte-carlo")
     _require_fitting(case, plan, file)
     columns = [plan.values(chunk) for chunk in range(-(-(count + _JUDGES) // CHUNK))]

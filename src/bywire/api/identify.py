@@ -210,7 +210,7 @@ def _options(method: Method, values: Mapping[str, Any]) -> ParameterSet:
         given = parsed(method.options, values, f"option of {method.name}")
         return method.defaults.replace(given)
     except InputError as error:
-        raise type(error)(f"{error}; 'bywire list {method.name}' shows the options") from None
+        raise error.reworded(f"{error}; 'bywire list {method.name}' shows the options") from None
 
 
 def _require_not_fitted(holdout: Source, measurements: Sequence[Source]) -> None:

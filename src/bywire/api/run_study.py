@@ -82,7 +82,7 @@ def kept_plan(store: StudyStore) -> tuple[StudyPlan, Origin]:
         unloaded = [path for path in said["systems"] if path not in loaded_files()]
         if not unloaded:
             raise
-        raise type(error)(
+        raise error.reworded(
             f"{error}; the study was run with {' '.join(map(_loaded_by, unloaded))}"
         ) from None
     is_listed = plan.design in SPANNED

@@ -217,7 +217,7 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
         bench = from_mapping(_changed(content, plain), file.parent, _printable(file.stem))
         return bench.with_overrides(relative) if relative else bench
     except InputError as error:
-        raise type(error)(f"{file}: {error}") from None
+        raise error.reworded(f"{file}: {error}") from None
 
 
 def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:

@@ -237,7 +237,7 @@ def changed(bench: Bench, values: Mapping[str, float | str], seed: int | None = 
             f"{name} = {value}" if isinstance(value, str) else f"{name} = {value:g}"
             for name, value in values.items()
         )
-        raise type(error)(f"{said} (in SI): {error}") from None
+        raise error.reworded(f"{said} (in SI): {error}") from None
 
 
 def run_benches(

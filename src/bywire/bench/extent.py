@@ -25,7 +25,7 @@ def checked_step(value: Any) -> float:
     step = units.parse(value, "s", "simulation.step")
     if step < SHORTEST_STEP:
         raise StepError(
-            f"simulation.step = {step:g} s is not admissible: "
+            f"simulation.step = {step:g} s is not valid: "
             f"it must be >= {SHORTEST_STEP:g} s, usually 20 us"
         )
     return step
@@ -38,7 +38,7 @@ def checked_interval(value: Any) -> float | None:
     interval = units.parse(value, "s", "simulation.record")
     if interval <= 0:
         raise StepError(
-            f"simulation.record = {interval:g} s is not admissible: it must be > 0 s, usually 1 ms"
+            f"simulation.record = {interval:g} s is not valid: it must be > 0 s, usually 1 ms"
         )
     return interval
 
@@ -48,7 +48,7 @@ def check_seed(value: Any) -> None:
     whole = isinstance(value, int) and not isinstance(value, bool)
     if not whole or not 0 <= value <= LARGEST_SEED:
         raise ParameterError(
-            f"simulation.seed = {quoted(value)} is not admissible: "
+            f"simulation.seed = {quoted(value)} is not valid: "
             f"it must be a whole number, >= 0 and <= {LARGEST_SEED}"
         )
 

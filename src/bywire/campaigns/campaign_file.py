@@ -109,7 +109,7 @@ def read_campaign(
         require_kind(content, CAMPAIGN, file)
         return _plan({"name": file.stem, **content}, file.parent, overrides)
     except InputError as error:
-        raise type(error)(f"{file}: {error}") from None
+        raise error.reworded(f"{file}: {error}") from None
 
 
 def _plan(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]) -> CampaignPlan:

@@ -21,9 +21,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from copy import copy
 from datetime import date, time
 from difflib import SequenceMatcher, get_close_matches
-from typing import Any
+from typing import Any, Self
 
 from bywire.core.clean_text import shortened
 
@@ -33,12 +34,44 @@ _BARE_KEY = re.compile(r"[\w-]+", re.ASCII)
 
 
 class BywireError(Exception):
-    """Base of all errors raised on purpose; its text is meant for the user."""
+    """Base of all errors raised on purpose: a text for the user, and fields for programs.
+
+    Parameters
+    ----------
+    text
+        What is wrong with its value, what is valid, and what to type.
+    name
+        What is wrong, as the user writes it: a parameter, an option, a key, a column, a path.
+    value
+        Its value, as the text shows it.
+    valid
+        What would be accepted: a range with its unit, or the nearest names.
+    """
 
     exit_status = 3
 
+    def __init__(self, text: str = "", *, name: str = "", value: str = "", valid: str = "") -> None:
+        super().__init__(text)
+        self.name, self.value, self.valid = name, value, valid
+
     def __str__(self) -> str:
         return shortened(super().__str__())
+
+    def reworded(self, text: str) -> Self:
+        """Return the same error with another text, for instance with the file in front.
+
+        Examples
+        --------
+        >>> error = not_valid("motor.R_m", "-3 ohm", "> 0 ohm")
+        >>> longer = error.reworded(f"step.toml: {error}")
+        >>> print(longer)
+        step.toml: motor.R_m = -3 ohm is not valid: it must be > 0 ohm
+        >>> longer.name, longer.value, longer.valid
+        ('motor.R_m', '-3 ohm', '> 0 ohm')
+        """
+        other = copy(self)
+        other.args = (text,)
+        return other
 
 
 class InputError(BywireError):
@@ -101,6 +134,39 @@ def place_of(thing: Any) -> str:
         return str(getattr(thing, "__qualname__", thing))
 
 
+def not_valid(
+    name: str,
+    value: str,
+    valid: str,
+    advice: str = "",
+    kind: type[InputError] = ParameterError,
+) -> InputError:
+    """Build the error for a value that is out of range, or of another kind than is needed.
+
+    Parameters
+    ----------
+    name
+        What has the value, as the user writes it.
+    value
+        The value with its unit, as the user reads it.
+    valid
+        What it must be, to end the sentence "it must be ...".
+    advice
+        What to do, where that does not follow.
+    kind
+        Class of the error.
+
+    Examples
+    --------
+    >>> print(not_valid("threads", "0", ">= 1"))
+    threads = 0 is not valid: it must be >= 1
+    >>> print(not_valid("band", "600 Hz", "<= 500 Hz", "half the loop's rate"))
+    band = 600 Hz is not valid: it must be <= 500 Hz, half the loop's rate
+    """
+    text = f"{name} = {value} is not valid: it must be {valid}{advice and f', {advice}'}"
+    return kind(text, name=name, value=value, valid=valid)
+
+
 def unknown_name(
     kind: str, name: str, known: Iterable[str], first: Iterable[str] = ()
 ) -> UnknownNameError:
@@ -121,7 +187,8 @@ def unknown_name(
     candidates = [*leading, *sorted(every.difference(leading))]
     close = get_close_matches(name, candidates, n=3, cutoff=0.5)
     hint = f"did you mean {', '.join(map(repr, close))}?" if close else _listing(candidates)
-    return UnknownNameError(f"unknown {kind} {quoted(name)}: {hint}")
+    text = f"unknown {kind} {quoted(name)}: {hint}"
+    return UnknownNameError(text, name=kind, value=name, valid=", ".join(close or candidates))
 
 
 def unknown_of_few(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
@@ -139,7 +206,8 @@ def unknown_of_few(kind: str, name: str, known: Iterable[str]) -> UnknownNameErr
     every = list(known)
     near = get_close_matches(name, every, n=1, cutoff=_NEAR)
     meant = f"did you mean {near[0]!r}? Known" if near else "known"
-    return UnknownNameError(f"unknown {kind} {quoted(name)}: {meant} are {_shown(every)}")
+    text = f"unknown {kind} {quoted(name)}: {meant} are {_shown(every)}"
+    return UnknownNameError(text, name=kind, value=name, valid=", ".join(every))
 
 
 def nearest_first(names: Iterable[str], wanted: Iterable[str]) -> str:

@@ -27,7 +27,15 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
-from bywire.core.errors import ModelError, ParameterError, place_of, quoted, unknown_name
+from bywire.core.errors import (
+    InputError,
+    ModelError,
+    ParameterError,
+    not_valid,
+    place_of,
+    quoted,
+    unknown_name,
+)
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
 from bywire.core.units import Written, split
@@ -140,10 +148,10 @@ _BOOL, _TEXT = "it must be true or false", "it must be a text"
 _PLAIN_WORDS = {"bool_parsing": _BOOL, "bool_type": _BOOL, "string_type": _TEXT}
 
 
-def refusals(
+def refusal(
     error: ValidationError, owner: str, leaves: Mapping[str, Leaf], texts: Mapping[str, str]
-) -> list[str]:
-    """Return a line for every value that was refused.
+) -> InputError:
+    """Return one error for all values that are not valid, with a line for each.
 
     Parameters
     ----------
@@ -160,16 +168,22 @@ def refusals(
     places = {detail["loc"][:-1] for detail in details}
     # A table with a wrong node also counts as too short: the node alone is worth a line.
     details = [d for d in details if not (_is_length(d) and d["loc"] in places)]
-    return [_explain(detail, owner, leaves, texts) for detail in details]
+    each = [_explain(detail, owner, leaves, texts) for detail in details]
+    if len(each) == 1:
+        return each[0]
+    names, values, valid = (
+        "\n".join(getattr(error, field) for error in each) for field in ("name", "value", "valid")
+    )
+    return ParameterError("\n".join(map(str, each)), name=names, value=values, valid=valid)
 
 
 def _explain(
     detail: Mapping[str, Any], owner: str, leaves: Mapping[str, Leaf], texts: Mapping[str, str]
-) -> str:
+) -> InputError:
     name = ".".join(str(part) for part in detail["loc"])
     value, kind = detail["input"], detail["type"]
     if kind == "missing":
-        return f"{owner}: {name} is missing: give it a value"
+        return ParameterError(f"{owner}: {name} is missing: give it a value", name=name)
     if kind == "literal_error":
         return _unknown_choice(name, value, detail["ctx"]["expected"])
     leaf = leaves.get(name) or leaves.get(name.rpartition(".")[0])
@@ -181,38 +195,38 @@ def _explain(
         return _wrong_count(name, detail, texts)
     message = _PLAIN_WORDS.get(kind, str(detail["msg"]).removeprefix("Value error, "))
     given = "" if isinstance(value, dict) else f", got {quoted(value)}"
-    return f"{name or owner}: {message}{given}"
+    return ParameterError(f"{name or owner}: {message}{given}", name=name or owner)
 
 
-def _out_of_range(name: str, value: Any, leaf: Leaf, wanted: str, text: str) -> str:
+def _out_of_range(name: str, value: Any, leaf: Leaf, wanted: str, text: str) -> InputError:
     symbol = leaf.unit.symbol
     number, written = split(text)
     if symbol == "rad" and written not in ("", symbol):  # drawings have angles in degrees
-        refused = f"{name} = {number} {written} is not admissible"
-        return f"{refused}: it must be {wanted}{leaf.range_in(written)}"
+        return not_valid(name, f"{number} {written}", wanted + leaf.range_in(written))
     unit = "" if symbol == "1" else f" {symbol}"
-    got = "" if written in ("", symbol) else f", got {quoted(text)}"
-    return f"{name} = {value}{unit} is not admissible: it must be {wanted}{leaf.range_text}{got}"
+    got = "" if written in ("", symbol) else f"got {quoted(text)}"
+    return not_valid(name, f"{value}{unit}", wanted + leaf.range_text, got)
 
 
-def _wrong_count(name: str, detail: Mapping[str, Any], texts: Mapping[str, str]) -> str:
-    """Return what is said of a table with too few or too many nodes."""
+def _wrong_count(name: str, detail: Mapping[str, Any], texts: Mapping[str, str]) -> InputError:
+    """Return the error for a table with too few or too many nodes."""
     context, value = detail["ctx"], detail["input"]
     short = detail["type"] == "too_short"
     wanted = f"at least {context['min_length']}" if short else f"at most {context['max_length']}"
     written = [texts.get(f"{name}.{k}", "") for k in range(len(value))]
     got = quoted(", ".join(written)) if written and all(written) else quoted(value)
-    return f"{name}: {wanted} wanted, got {got}"
+    return ParameterError(f"{name}: {wanted} wanted, got {got}", name=name, valid=wanted)
 
 
 def _is_length(detail: Mapping[str, Any]) -> bool:
     return detail["type"] in ("too_short", "too_long")
 
 
-def _unknown_choice(name: str, value: Any, expected: str) -> str:
+def _unknown_choice(name: str, value: Any, expected: str) -> InputError:
     near = get_close_matches(quoted(value), re.findall(r"'[^']*'", expected), n=1, cutoff=0.6)
     hint = f": did you mean {near[0]}?" if near else ""
-    return f"{name}: it must be {expected}, got {quoted(value)}{hint}"
+    text = f"{name}: it must be {expected}, got {quoted(value)}{hint}"
+    return ParameterError(text, name=name, value=quoted(value), valid=expected)
 
 
 # --- Parameter sets
@@ -540,5 +554,4 @@ def _validated(cls: type[T], tree: dict[str, Any], values: Mapping[str, Any]) ->
     try:
         return cls.model_validate(tree)
     except ValidationError as error:
-        messages = refusals(error, cls.__name__, leaf_fields(cls), texts)
-        raise ParameterError("\n".join(messages)) from None
+        raise refusal(error, cls.__name__, leaf_fields(cls), texts) from None

@@ -7,7 +7,7 @@ import re
 from typing import Any, Self, TypeVar, cast
 
 from bywire.core.clean_text import clean
-from bywire.core.errors import ParameterError, UnitError, quoted
+from bywire.core.errors import UnitError, not_valid, quoted
 from bywire.core.quantities import display_unit
 from bywire.core.unit_list import (
     BASES,
@@ -93,10 +93,7 @@ def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> f
     except OverflowError:  # a whole number of 309 digits or more
         number = math.inf
     if not math.isfinite(number):
-        raise ParameterError(
-            f"{name} = {quoted(value)} is not admissible: "
-            f"it must be any finite number{_in_unit(symbol)}"
-        )
+        raise not_valid(name, quoted(value), f"any finite number{_in_unit(symbol)}")
     return number
 
 

@@ -193,7 +193,7 @@ def instants_of(measurement: xr.Dataset, name: str) -> NDArray[np.float64]:
 def _positive(value: str | float, name: str) -> float:
     number = units.parse(value, "s", name)
     if not number > 0.0:
-        raise ParameterError(f"{name} = {value!r} is not admissible: it must be > 0 s")
+        raise ParameterError(f"{name} = {value!r} is not valid: it must be > 0 s")
     return number
 
 

@@ -90,7 +90,7 @@ def estimate_lag(
     most = int(np.ceil(reach / step))
     if not most >= 1 or a.size - most < _LEAST:
         raise ParameterError(
-            f"largest = {reach:g} s is not admissible: it must be at least a step, {step:g} s, and "
+            f"largest = {reach:g} s is not valid: it must be at least a step, {step:g} s, and "
             f"leave an overlap of {_LEAST} steps in {a.size * step:g} s"
         )
     rough = _coefficients(a, b, most)

@@ -361,4 +361,4 @@ def read_mapping(path: str | Path) -> MeasurementMapping:
     try:
         return mapping_from(content)
     except InputError as error:
-        raise type(error)(f"{file}: {error}") from None
+        raise error.reworded(f"{file}: {error}") from None

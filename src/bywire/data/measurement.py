@@ -185,7 +185,7 @@ def read_measurement(
     UnitError
         When a unit is missing, unknown or contradicts that of the file.
     ParameterError
-        When an entry of the mapping is not admissible.
+        When an entry of the mapping is not valid.
     """
     dataset, notes = read_with_notes(
         path, mapping, signals=signals, progress=progress, largest=largest

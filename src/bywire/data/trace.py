@@ -72,7 +72,7 @@ def read_trace(
     """
     longest = units.parse(max_gap, "s", "max_gap")
     if not longest > 0:
-        raise ParameterError(f"max_gap = {max_gap!r} is not admissible: it must be > 0 s")
+        raise ParameterError(f"max_gap = {max_gap!r} is not valid: it must be > 0 s")
     file = Path(path)
     meaning = _meaning(file, mapping)
     with opened(file, meaning) as source:

@@ -43,7 +43,7 @@ def low_passed(values: Array, interval: float, cutoff: float) -> Array:
     nyquist = 0.5 / interval
     if not 0.0 < cutoff < nyquist:
         raise ParameterError(
-            f"cutoff = {cutoff:g} Hz is not admissible: it must be > 0 Hz and < {nyquist:g} Hz, "
+            f"cutoff = {cutoff:g} Hz is not valid: it must be > 0 Hz and < {nyquist:g} Hz, "
             "half the sample rate"
         )
     sos = signal.butter(_ORDER, cutoff / nyquist, output="sos")

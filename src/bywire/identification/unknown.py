@@ -51,7 +51,7 @@ class Unknown:
     def __post_init__(self) -> None:
         if not self.low <= self.start <= self.high:
             raise ParameterError(
-                f"start of {self.label} = {self.start:g} {self.unit} is not admissible: it must "
+                f"start of {self.label} = {self.start:g} {self.unit} is not valid: it must "
                 f"lie within {self.low:g} and {self.high:g} {self.unit}"
             )
         if not (self.scale > 0.0 and math.isfinite(self.scale)):

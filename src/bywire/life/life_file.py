@@ -169,7 +169,7 @@ def read_life(source: str | Path, overrides: Mapping[str, str] = MappingProxyTyp
     except InputError as error:
         if is_name:
             raise
-        raise type(error)(f"{file}: {error}") from None
+        raise error.reworded(f"{file}: {error}") from None
 
 
 def _plan(content: Mapping[str, Any], name: str, overrides: Mapping[str, str]) -> LifePlan:

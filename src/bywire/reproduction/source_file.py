@@ -189,7 +189,7 @@ def _naming(file: Path) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise type(error)(f"{file}: {error}") from None
+        raise error.reworded(f"{file}: {error}") from None
 
 
 class Facts:
@@ -274,7 +274,7 @@ def _made(make: Callable[..., T], entry: Section, place: str) -> T:
     try:
         return make(**entry)
     except InputError as error:
-        raise type(error)(f"{place}: {error}") from None
+        raise error.reworded(f"{place}: {error}") from None
 
 
 def _filled(value: Any, places: Mapping[str, str]) -> Any:

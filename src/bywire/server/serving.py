@@ -77,7 +77,7 @@ def opened(
     """
     place, bench = _asked(str(subject), str(folder))
     if not 0 <= port < 65536:
-        raise ParameterError(f"{_flag('port')} {port} is not admissible: it must be 0 to 65535")
+        raise ParameterError(f"{_flag('port')} {port} is not valid: it must be 0 to 65535")
     try:
         handler = type("FolderHandler", (Handler,), {})
         server = _Server((HERE, port), handler)

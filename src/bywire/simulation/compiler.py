@@ -128,7 +128,7 @@ def _is_quick() -> bool:
     """
     quick = os.environ.get("BYWIRE_CC_QUICK") or "0"
     if quick not in ("0", "1"):
-        raise CompilerError(f"BYWIRE_CC_QUICK = {quick!r} is not admissible: set it to 0 or 1")
+        raise CompilerError(f"BYWIRE_CC_QUICK = {quick!r} is not valid: set it to 0 or 1")
     return quick == "1"
 
 

@@ -163,7 +163,7 @@ def simulate_ensemble(
     """
     prepared = prepare(run.model, run.par)
     if threads is not None and threads < 1:
-        raise ParameterError(f"threads = {threads} is not admissible: it must be >= 1")
+        raise ParameterError(f"threads = {threads} is not valid: it must be >= 1")
     matrix = case_matrix(run, variations)
     if not is_side_by_side(engine):
         return _one_by_one(run, variations, tuple(signals), engine)

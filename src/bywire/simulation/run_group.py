@@ -169,7 +169,7 @@ def simulate_group(
         For ``cuda`` where there is no graphics processor, or no room on it.
     """
     if threads is not None and threads < 1:
-        raise ParameterError(f"threads = {threads} is not admissible: it must be >= 1")
+        raise ParameterError(f"threads = {threads} is not valid: it must be >= 1")
     if not fit_lanes(runs, engine):
         raise ParameterError(
             "these runs cannot be computed side by side: that takes a C compiler, and one model, "

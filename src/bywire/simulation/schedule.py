@@ -107,9 +107,9 @@ def _planned(
     duration: float, step: float, periods: tuple[tuple[str, float], ...], record: float
 ) -> Schedule:
     if not (math.isfinite(step) and step > 0):
-        raise StepError(f"step = {step:g} s is not admissible: it must be > 0 s, usually 20 us")
+        raise StepError(f"step = {step:g} s is not valid: it must be > 0 s, usually 20 us")
     if not (math.isfinite(duration) and duration > 0):
-        raise StepError(f"duration = {duration:g} s is not admissible: it must be > 0 s")
+        raise StepError(f"duration = {duration:g} s is not valid: it must be > 0 s")
     counts = {name: _whole(period, step, name) for name, period in periods}
     recorded = _whole(record, step, "recording")
     frame = _divided(math.gcd(recorded, *counts.values()))

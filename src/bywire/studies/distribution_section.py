@@ -68,7 +68,7 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
     if beyond > NEVER:
         often = f", with a probability of {beyond:.2g}" if beyond < 1.0 else ""
         raise ParameterError(
-            f"{where}: {made.text} leaves what is admissible, {wanted}{often}: {advice}"
+            f"{where}: {made.text} leaves the valid range, {wanted}{often}: {advice}"
         )
     low, high = (_at_limit(end, leaf, made.high - made.low) for end in (made.low, made.high))
     if made.kind == "normal":
@@ -78,7 +78,7 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
         if math.isfinite(end) and not leaf.admits(end):
             raise ParameterError(
                 f"{where}: {made.text}: its end at {shown(end, leaf.unit.symbol)} is not "
-                f"admissible, it must be {wanted}: {advice}"
+                f"valid: it must be {wanted}; {advice}"
             )
     return replace(made, low=low, high=high)
 
@@ -121,7 +121,7 @@ def whole(where: str, values: Sequence[float], leaf: Leaf) -> list[float]:
     for value in values:
         if not math.isfinite(value) or abs(value - round(value)) > _ROUNDING * abs(value):
             raise ParameterError(
-                f"{where}.values: {value:.10g} is not admissible: it must be a whole number, "
+                f"{where}.values: {value:.10g} is not valid: it must be a whole number, "
                 f"{leaf.range_text}"
             )
     return [float(round(value)) for value in values]
@@ -156,7 +156,7 @@ def _require_singles(where: str, values: Sequence[float], leaf: Leaf) -> None:
     if beyond:
         texts = [", ".join(shown(x, leaf.unit.symbol) for x in each) for each in (values, beyond)]
         raise ParameterError(
-            f"{where}: one of {texts[0]} leaves what is admissible, {leaf.range_text}: leave out "
+            f"{where}: one of {texts[0]} leaves the valid range, {leaf.range_text}: leave out "
             f"{texts[1]}"
         )
 

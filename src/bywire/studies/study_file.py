@@ -143,7 +143,7 @@ def _probability(kpi: str, text: str, given: str) -> float:
     share = parse(given, "1", f"probability of requirement {kpi}")
     if not 0.0 < share < 1.0:
         raise ParameterError(
-            f"requirement {kpi}: a probability of {given} is not admissible: it must lie between 0 "
+            f"requirement {kpi}: a probability of {given} is not valid: it must lie between 0 "
             "and 100 %, as 'with 99.9 %'; leave it out where every case has to meet the limit"
         )
     return share
@@ -326,7 +326,7 @@ def read_study(path: str | Path, overrides: Mapping[str, str] = MappingProxyType
         require_kind(content, STUDY, file)
         return _plan(content, file, overrides)
     except InputError as error:
-        raise type(error)(f"{file}: {error}") from None
+        raise error.reworded(f"{file}: {error}") from None
 
 
 def _plan(content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]) -> StudyPlan:

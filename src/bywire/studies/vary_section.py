@@ -314,7 +314,7 @@ def _require_alike(bench: Bench, name: str, values: Sequence[str]) -> None:
         try:
             other = replace(bench, options=options, requirements={})
         except InputError as error:
-            raise type(error)(f"[vary] {name} = {value!r}: {error}") from None
+            raise error.reworded(f"[vary] {name} = {value!r}: {error}") from None
         given = other.definition.kpis_with(other.chosen_options)
         if given != figures:
             differing = sorted(given.keys() ^ figures.keys()) or sorted(figures)

@@ -171,6 +171,6 @@ def case_of(
         try:
             return loop.gain_and_closed(base.replace(gains), at)
         except CornerError as error:
-            raise CornerError(error if label == NOMINAL else f"{label}: {error}") from None
+            raise (error if label == NOMINAL else error.reworded(f"{label}: {error}")) from None
 
     return LinearCase(label, build, changes, at)

@@ -91,7 +91,7 @@ def test_start_beyond_the_end_stop_is_refused(changes: dict[str, Any]) -> None:
 
 def test_bench_that_starts_beyond_the_end_stop_is_refused() -> None:
     stimulus = {"kind": "step", "start": 0, "end": "1 A", "t_step": 0}
-    with pytest.raises(ParameterError, match=r"60 bar is not admissible.*<= 51\.27 bar"):
+    with pytest.raises(ParameterError, match=r"60 bar is not valid.*<= 51\.27 bar"):
         bywire.Bench(
             "motor-open-loop", "dardanelli2010", options={"p_start": "60 bar"}, stimulus=stimulus
         ).cases()

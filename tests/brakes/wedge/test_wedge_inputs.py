@@ -14,23 +14,23 @@ from bywire.cli.main import main
 from run_once import run_once
 
 BAD = [
-    ("heart.g_1=-20um", "heart.g_1 = -2e-05 m is not admissible: it must be >= 0 m, got '-20um'"),
-    ("heart.g_12=-1um", "heart.g_12 = -1e-06 m is not admissible: it must be >= 0 m"),
-    ("wedge.alpha=0", "wedge.alpha = 0.0 rad is not admissible: it must be > 0 rad"),
-    ("wedge.alpha=-5deg", "wedge.alpha = -5 deg is not admissible"),
-    ("wedge.alpha=90deg", "alpha = 90 deg is not admissible: it must be > 0 deg and < 90 deg\n"),
-    ("wedge.alpha=1600 mrad", "alpha = 1600 mrad is not admissible: it must be > 0 mrad"),
+    ("heart.g_1=-20um", "heart.g_1 = -2e-05 m is not valid: it must be >= 0 m, got '-20um'"),
+    ("heart.g_12=-1um", "heart.g_12 = -1e-06 m is not valid: it must be >= 0 m"),
+    ("wedge.alpha=0", "wedge.alpha = 0.0 rad is not valid: it must be > 0 rad"),
+    ("wedge.alpha=-5deg", "wedge.alpha = -5 deg is not valid"),
+    ("wedge.alpha=90deg", "alpha = 90 deg is not valid: it must be > 0 deg and < 90 deg\n"),
+    ("wedge.alpha=1600 mrad", "alpha = 1600 mrad is not valid: it must be > 0 mrad"),
     ("wedge.alpha=1", "a pure number cannot be rad"),
     ("motor_1.dT=40 degC", "degC cannot be a temperature difference in K"),
     ("caliper.n_table=0 mm, 1 mm, 0.5 mm", "as node 3 of 3, 0.0005 m follows 0.001 m"),
     ("wedge.alpha=20mm", "mm cannot be rad"),
-    ("screw.eta_f=0", "screw.eta_f = 0.0 is not admissible: it must be > 0 and <= 1"),
-    ("screw.eta_f=1.01", "screw.eta_f = 1.01 is not admissible: it must be > 0 and <= 1"),
-    ("screw.eta_b=-0.1", "screw.eta_b = -0.1 is not admissible: it must be >= 0 and <= 1"),
-    ("screw.eta_b=1.1", "screw.eta_b = 1.1 is not admissible"),
-    ("wedge.mu_B=-0.1", "wedge.mu_B = -0.1 is not admissible: it must be >= 0"),
+    ("screw.eta_f=0", "screw.eta_f = 0.0 is not valid: it must be > 0 and <= 1"),
+    ("screw.eta_f=1.01", "screw.eta_f = 1.01 is not valid: it must be > 0 and <= 1"),
+    ("screw.eta_b=-0.1", "screw.eta_b = -0.1 is not valid: it must be >= 0 and <= 1"),
+    ("screw.eta_b=1.1", "screw.eta_b = 1.1 is not valid"),
+    ("wedge.mu_B=-0.1", "wedge.mu_B = -0.1 is not valid: it must be >= 0"),
     ("wedge_friction.stopped_disc=stuck", "did you mean 'stick'?"),
-    ("options.M_high=-200Nm", "M_high = -200.0 N*m is not admissible: it must be > 0 N*m"),
+    ("options.M_high=-200Nm", "M_high = -200.0 N*m is not valid: it must be > 0 N*m"),
 ]
 
 
@@ -50,7 +50,7 @@ def test_bad_value_gets_one_clear_line(change, text, monkeypatch, capsys):
     ("mu_B", "text"),
     [
         ("0.2, 0.2", "mu_B: 0.2 stands there twice"),
-        ("0.2, 0", "mu_B.1 = 0.0 is not admissible: it must be > 0 and <= 2"),
+        ("0.2, 0", "mu_B.1 = 0.0 is not valid: it must be > 0 and <= 2"),
         ((), "mu_B: at least 1 wanted"),
     ],
 )

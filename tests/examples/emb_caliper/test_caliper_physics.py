@@ -121,5 +121,5 @@ def test_brakes_that_cannot_be_are_refused(change: dict[str, float], words: str,
 
 
 def test_a_force_beyond_the_curve_is_refused(emb: Any, par: Any) -> None:
-    with pytest.raises(ParameterError, match=r"50 kN is not admissible.*<= 4\d"):
+    with pytest.raises(ParameterError, match=r"50 kN is not valid.*<= 4\d"):
         emb("trim").state_at(50e3, par)

@@ -130,10 +130,10 @@ def test_it_can_be_taken_back_and_moved_to_another_instance(client: Client) -> N
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
-        ("motor.R_m", -1.0, "motor.R_m = -1 ohm is not admissible: it must be > 0 ohm"),
-        ("motor.R_m", 0.0, "motor.R_m = 0 ohm is not admissible"),
-        ("motor.R_m", float("nan"), "motor.R_m = nan ohm is not admissible"),
-        ("p_set", float("inf"), "p_set = inf Pa is not admissible: it must be any finite number"),
+        ("motor.R_m", -1.0, "motor.R_m = -1 ohm is not valid: it must be > 0 ohm"),
+        ("motor.R_m", 0.0, "motor.R_m = 0 ohm is not valid"),
+        ("motor.R_m", float("nan"), "motor.R_m = nan ohm is not valid"),
+        ("p_set", float("inf"), "p_set = inf Pa is not valid: it must be any finite number"),
         ("p_mc", 1e5, "p_mc is computed and cannot be set"),
     ],
 )
@@ -156,7 +156,7 @@ def test_an_input_outside_its_declared_range_is_refused(
     for value in (2.0, -0.5, float("nan")):
         with pytest.raises(FMICallException):
             client["power_off"] = value
-    assert "power_off = 2 is not admissible: it must be >= 0 and <= 1" in capfd.readouterr().out
+    assert "power_off = 2 is not valid: it must be >= 0 and <= 1" in capfd.readouterr().out
     client["power_off"] = 1.0
     client.follow(1e-3, 0, 2)
     (described,) = (v for v in client.description.modelVariables if v.name == "power_off")

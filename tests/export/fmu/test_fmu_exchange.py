@@ -163,8 +163,8 @@ def test_what_it_refuses_leaves_it_usable(
 ) -> None:
     client = SolverClient(thrown.path)
     for name, value, said in (
-        ("motor.R_m", -1.0, "motor.R_m = -1 ohm is not admissible"),
-        ("v_source", float("nan"), "v_source = nan V is not admissible"),
+        ("motor.R_m", -1.0, "motor.R_m = -1 ohm is not valid"),
+        ("v_source", float("nan"), "v_source = nan V is not valid"),
         ("p_mc", 1e5, "p_mc is computed"),
     ):
         with pytest.raises(FMICallException):

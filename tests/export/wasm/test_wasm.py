@@ -96,8 +96,8 @@ def test_changed_parameters_begin_at_rest_and_run_alike(folder: Path) -> None:
     ("task", "said"),
     [
         ({"parameters": {"motor.R": 1.0}}, "RangeError: there is no parameter 'motor.R'"),
-        ({"parameters": {"caliper.clearance": "x"}}, "is not admissible: it must be >= 0 m"),
-        ({"parameters": {"caliper.clearance": -1.0}}, "caliper.clearance = -1 m is not admissible"),
+        ({"parameters": {"caliper.clearance": "x"}}, "is not valid: it must be >= 0 m"),
+        ({"parameters": {"caliper.clearance": -1.0}}, "caliper.clearance = -1 m is not valid"),
         ({"stimulus": {"demand": [1.0]}}, "there is no stimulus 'demand'"),
         ({"stimulus": {"M_set": [1.0]}}, "M_set: "),
         ({"duration": -1.0}, "duration must be > 0"),

@@ -86,7 +86,7 @@ def variants_over(base: Variant, name: str, values: Sequence[float]) -> list[Var
     UnknownNameError
         When there is no such number.
     ParameterError
-        When there is no value, or one is not admissible.
+        When there is no value, or one is not valid.
     """
     if not values:
         raise ParameterError(f"{name}: give at least one value")

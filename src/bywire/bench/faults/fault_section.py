@@ -161,7 +161,7 @@ def require_admissible(mode: Mode, value: float, where: str) -> None:
     if not low <= value <= high or (is_whole and value % 1):
         kind = "a whole number" if is_whole else "a number"
         raise ParameterError(
-            f"{where} = {value:g} of {mode.name} is not admissible: {kind} from {low:g} to "
+            f"{where} = {value:g} of {mode.name} is not valid: {kind} from {low:g} to "
             f"{high:g} is wanted"
         )
 

@@ -33,7 +33,7 @@ class Parameters(ParameterSet):
     def _counts_harmonics(cls, data: Any) -> Any:
         n = data.get("n") if isinstance(data, dict) else None
         if isinstance(n, float) and not n.is_integer():
-            raise ValueError(f"n = {n:g} is not admissible: it must be a whole number")
+            raise ValueError(f"n = {n:g} is not valid: it must be a whole number")
         return data
 
 

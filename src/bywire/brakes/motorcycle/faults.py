@@ -60,7 +60,7 @@ def _boiling(par: Any, T: float) -> Mapping[str, Any]:
     """Return the vapor of fluid at a temperature [K] as gas in line and caliper."""
     if not 0.0 < T <= par.vapor.T_most:
         raise ParameterError(
-            f"fluid.vapor at {shown(T, 'K')} is not admissible: it must be > {shown(0.0, 'K')} and "
+            f"fluid.vapor at {shown(T, 'K')} is not valid: it must be > {shown(0.0, 'K')} and "
             f"<= {shown(par.vapor.T_most, 'K')} (vapor.T_most), up to which the law of vapor holds"
         )
     return {"fluid.air": "caliper", "fluid.V_air": fluid_vapor.volume(T, par.vapor)}

@@ -123,7 +123,7 @@ def state_at(p: float, par: Par, current: float | None = None) -> Any:
     if not ops.is_symbol(x) and not (p >= 0 and x <= par.master_cylinder.x_end):
         limit = math.floor(highest_pressure(par) / 1e3) / 100.0
         raise ParameterError(
-            f"a start at rest at {p / 1e5:g} bar is not admissible: it must be >= 0 bar and "
+            f"a start at rest at {p / 1e5:g} bar is not valid: it must be >= 0 bar and "
             f"<= {limit:g} bar, where the piston meets its end stop: start lower, or move the "
             "stop (master_cylinder.x_end)"
         )

@@ -39,7 +39,7 @@ def whole(par: ParameterSet, at: PlantPoint) -> LinearModel:
     if at.quantity is _CURRENT:
         if not abs(at.value) < brake.drive.i_max:
             raise ParameterError(
-                f"current = {at.value:g} A is not admissible: its size must be < drive.i_max = "
+                f"current = {at.value:g} A is not valid: its size must be < drive.i_max = "
                 f"{brake.drive.i_max:g} A"
             )
         F_N = force_for_current(at.value, brake)

@@ -115,7 +115,7 @@ static int64_t frames_of(const run *r, double time, double step, char *said) {
     return 0;
   }
   if (!(frames > 0.5 && frames < 1e15 && fabs(frames - round(frames)) <= 1e-6 + 2.0 * once / frame)) {
-    snprintf(said, MESSAGE, "a communication step of %.9g s is not admissible: it must be a whole "
+    snprintf(said, MESSAGE, "a communication step of %.9g s is not valid: it must be a whole "
         "multiple of %.9g s, which divides the sample times of the ECU", step, frame);
     return 0;
   }

@@ -69,7 +69,7 @@ static void set_value(run *r, unsigned k, double value, int is_running, char *sa
   } else if (v->kind == FIXED && is_running) {
     snprintf(said, MESSAGE, "%s is fixed: set it before or during initialization", v->name);
   } else if (!isfinite(value) || value < v->low || value > v->high) {
-    snprintf(said, MESSAGE, "%s = %.6g%s is not admissible: it must be %s", v->name, value,
+    snprintf(said, MESSAGE, "%s = %.6g%s is not valid: it must be %s", v->name, value,
         v->unit, v->range);
   } else {
     *place_of(r, k) = value;

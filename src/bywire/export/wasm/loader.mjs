@@ -18,7 +18,7 @@ function vectorOf(description, values) {
       && value >= (low ?? -Infinity) && value <= (high ?? Infinity);
     if (!isWithin) {
       const shown = unit === "1" ? `${value}` : `${value} ${unit}`;
-      throw new RangeError(`${name} = ${shown} is not admissible: it must be ${range}`);
+      throw new RangeError(`${name} = ${shown} is not valid: it must be ${range}`);
     }
     vector[k] = value;
   }

@@ -69,7 +69,7 @@ def noise_given(name: str, text: str, unit: str) -> float:
     """
     noise = number(text, unit, f"noise of {name}")
     if not noise > 0.0:
-        raise ParameterError(f"noise of {name} = {text} is not admissible: it must be > 0 {unit}")
+        raise ParameterError(f"noise of {name} = {text} is not valid: it must be > 0 {unit}")
     return noise
 
 

@@ -213,7 +213,7 @@ class Options(ParameterSet):
 
 # --- Unknowns as texts: names, ranges ``LOW..HIGH``, priors ``MEAN +- DEVIATION``
 
-_OPEN = 1e-6  # of a range: how near an end comes to zero that is not admissible
+_OPEN = 1e-6  # of a range: how near an end comes to zero that is not valid
 _EXAMPLES = {"range": (0.5, 2.0), "prior": (1.0, 0.1)}  # of the usual magnitude
 _STIMULUS, _OFFSET = "stimulus.", "offset."
 
@@ -313,7 +313,7 @@ def _with_texts(unknown: Unknown, within: str, prior: str, leaf: Leaf | None) ->
         )
     if leaf is not None and (low < leaf.low or high > leaf.high):
         raise ParameterError(
-            f"range of {unknown.name}: {quoted(within)} is not admissible: {unknown.name} must be "
+            f"range of {unknown.name}: {quoted(within)} is not valid: {unknown.name} must be "
             f"{leaf.range_text}"
         )
     low = low if low > unknown.low or leaf is None or not leaf.low_open else max(low, _OPEN * high)

@@ -132,7 +132,7 @@ def read_segments(path: str | Path, tolerances: Mapping[str, str]) -> list[Segme
     try:
         return _from(content, tolerances)
     except InputError as error:
-        raise type(error)(f"{file}: {error}") from None
+        raise error.reworded(f"{file}: {error}") from None
 
 
 def _from(content: Mapping[str, Any], tolerances: Mapping[str, str]) -> list[Segment]:

@@ -333,6 +333,6 @@ def with_slow_pair(K: float, tau_L: float, T_1: float, T_2: float, T_L: float) -
     """
     for name, T in (("tau_L", tau_L), ("T_1", T_1), ("T_2", T_2), ("T_L", T_L)):
         if not 0.0 < T < math.inf:
-            raise ParameterError(f"{name} = {T:g} s is not admissible: it must be > 0 s and finite")
+            raise ParameterError(f"{name} = {T:g} s is not valid: it must be > 0 s and finite")
     corners = tuple(1.0 / (2.0 * math.pi * T) for T in (T_1, T_2, T_L))
     return first_orders("eq-22", K, (1.0 / (2.0 * math.pi * tau_L),), corners)

@@ -186,7 +186,7 @@ def compute(par: Par, options: Options, progress: Progress) -> Findings:
     highest = highest_pressure(par)
     if not options.p_peak < highest:
         raise ParameterError(
-            f"p_peak = {options.p_peak / 1e5:g} bar is not admissible: it must be < "
+            f"p_peak = {options.p_peak / 1e5:g} bar is not valid: it must be < "
             f"{highest / 1e5:.4g} bar, where the piston meets its end stop: lower it, or move the "
             "stop (master_cylinder.x_end)"
         )

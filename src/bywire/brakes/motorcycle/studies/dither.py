@@ -255,7 +255,7 @@ def _require_reachable(par: Par, options: Options) -> None:
     if not wanted < highest:
         raise ParameterError(
             f"pressures: {max(options.pressures) / 1e5:g} bar, approached from {wanted / 1e5:g} "
-            f"bar, is not admissible: the piston meets its end stop at {highest / 1e5:.4g} bar"
+            f"bar, is not valid: the piston meets its end stop at {highest / 1e5:.4g} bar"
         )
 
 

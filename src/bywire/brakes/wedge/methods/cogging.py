@@ -338,7 +338,7 @@ def _turning(data: xr.Dataset, par: WedgeParameters, options: Options) -> Turnin
     passes = 2.0 * np.pi * options.cutoff / fastest
     if options.highest > passes:
         raise ParameterError(
-            f"options.highest = {options.highest} is not admissible: at {fastest:.3g} rad/s the "
+            f"options.highest = {options.highest} is not valid: at {fastest:.3g} rad/s the "
             f"low-pass of {options.cutoff:g} Hz lets orders up to {passes:.0f} pass; turn slower, "
             "raise options.cutoff, or ask for lower orders"
         )

@@ -98,7 +98,7 @@ def check_current(name: str, i: float, par: WedgeParameters) -> None:
     limit = par.drive.i_max
     if i > limit:
         raise ParameterError(
-            f"options.{name} = {i:g} A is not admissible: the drives give {limit:g} A at most "
+            f"options.{name} = {i:g} A is not valid: the drives give {limit:g} A at most "
             "(drive.i_max); ask for less"
         )
 
