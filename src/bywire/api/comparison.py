@@ -15,10 +15,10 @@ from bywire.bench.bench import Bench
 from bywire.bench.bench_source import names_experiment
 from bywire.bench.result import Result
 from bywire.bench.result_folder import is_result_folder, verdict_record
-from bywire.bench.running import Progress
 from bywire.bench.step_error import are_distinct
 from bywire.core.callers import is_command_line
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Progress
 from bywire.core.units import difference_unit
 from bywire.report.answer import Answer
 from bywire.report.document import (

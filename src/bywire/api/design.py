@@ -22,10 +22,10 @@ from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase, loop_case, over_range, spread
 from bywire.bench.bench import Bench
 from bywire.bench.requirements import Limit
-from bywire.bench.running import Progress
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields
+from bywire.core.typing import Progress
 from bywire.core.units import shown
 from bywire.data.toml_file import read_toml
 from bywire.report.answer import Answer

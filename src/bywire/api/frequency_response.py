@@ -33,11 +33,11 @@ from bywire.api.bandwidth_tables import (
 )
 from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase
-from bywire.bench.running import Progress
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, of_difference
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields
+from bywire.core.typing import Progress
 from bywire.core.units import shown
 from bywire.report.answer import Answer
 from bywire.report.document import (

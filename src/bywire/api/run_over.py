@@ -19,10 +19,9 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
 from bywire.bench.result import Result
 from bywire.bench.result_folder import kpi_record, verdict_record
-from bywire.bench.running import Progress
 from bywire.bench.step_error import are_distinct
 from bywire.core.errors import ParameterError
-from bywire.core.typing import Array
+from bywire.core.typing import Array, Progress
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Attachment,

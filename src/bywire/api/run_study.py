@@ -10,12 +10,11 @@ from bywire.api.study_run import StudyRun
 from bywire.bench import running
 from bywire.bench.requirements import status_of
 from bywire.bench.result import Result
-from bywire.bench.running import Progress
 from bywire.core.brake import loaded_files
 from bywire.core.callers import is_command_line
 from bywire.core.errors import FileError, InputError
 from bywire.core.field_notes import field_notes
-from bywire.core.typing import silent
+from bywire.core.typing import Progress, silent
 from bywire.studies.designs import SPANNED, WORST
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan

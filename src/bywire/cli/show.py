@@ -20,7 +20,7 @@ from bywire.core.interrupts import interrupt_heard
 from bywire.core.scratch import made_folder
 
 if TYPE_CHECKING:
-    from bywire.bench.running import Progress
+    from bywire.core.typing import Progress
     from bywire.report.answer import Answer
 
 _INTERVAL = 0.1  # s between two drawings of the bar
