@@ -115,7 +115,7 @@ class Replay(Answer):
         )
 
     def _figures(self) -> list[FigureBlock]:
-        from bywire.report.replay_figures import replay_figure
+        from bywire.report.estimate_figures import replay_figure
 
         return [
             FigureBlock(
@@ -134,7 +134,7 @@ class Replay(Answer):
         ]
 
     def _track_figures(self) -> list[FigureBlock]:
-        from bywire.report.replay_figures import track_figure
+        from bywire.report.estimate_figures import track_figure
 
         known = self.replayed.run.par.leaves()
         return [

@@ -234,8 +234,8 @@ class BenchRange(Answer):
         return Banner(text, "good" if self.holds else "bad" if "failed" in statuses else "open")
 
     def _figures(self) -> list[Block]:
-        from bywire.report.kpi_curves import kpi_curves
-        from bywire.report.overlaid import can_overlay
+        from bywire.report.range_figures import kpi_curves
+        from bywire.report.time_traces import can_overlay
 
         captions = {
             "curves": "The values on top of each other, in the color that the scale shows.",
@@ -256,8 +256,8 @@ class BenchRange(Answer):
         return blocks
 
     def _drawn(self, label: str, recordings: Sequence[xr.Dataset]) -> Figure:
-        from bywire.report.overlaid import Scale, overlaid_panels
         from bywire.report.step_response import step_limits
+        from bywire.report.time_traces import Scale, overlaid_panels
 
         steps = [
             step_limits(r.bench.definition, r.bench.chosen_options, r.verdicts)

@@ -210,6 +210,6 @@ def cut_table(cut: Cut) -> Table:
 
 
 def _drawn(data: xr.Dataset, shown: Map) -> Figure:
-    from bywire.report.contour import contour
+    from bywire.report.range_figures import contour
 
     return contour(data, shown)

@@ -8,8 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bywire.api.study_rare import rare_figures, sensitivity_figures
-from bywire.api.study_tables import moving_effects, shown_figures, strongest
+from bywire.api.study_tables import (
+    moving_effects,
+    rare_figures,
+    sensitivity_figures,
+    shown_figures,
+    strongest,
+)
 from bywire.report.document import Block, FigureBlock
 from bywire.report.study.drawn_cases import LINES, POINTS, DrawnCases, drawn_cases
 from bywire.studies.findings import Findings, Judgment
@@ -141,7 +146,7 @@ Recordings = Callable[[], Mapping[str, Mapping[str, "xr.Dataset"]]]
 def load_drawing() -> None:
     """Load what draws the figures of a study and writes its report, ahead of its findings."""
     from bywire.data import netcdf  # noqa: F401
-    from bywire.report import overlaid, page  # noqa: F401
+    from bywire.report import page, time_traces  # noqa: F401
 
 
 def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
@@ -303,7 +308,7 @@ def _overlays(findings: Findings, recordings: Recordings) -> list[Block]:
 
 
 def _overlaid(each: Mapping[str, xr.Dataset]) -> Figure:
-    from bywire.report.overlaid import overlaid_panels
+    from bywire.report.time_traces import overlaid_panels
 
     return overlaid_panels(_alike_once(each))
 

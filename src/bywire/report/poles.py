@@ -16,7 +16,7 @@ from bywire.analysis.linear.linear_model import STILL
 from bywire.analysis.locus import Border, Locus
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.legend import legend_outside
+from bywire.report.style import legend_outside
 from bywire.report.wording import amount, in_display_unit
 
 RATIOS = (0.1, 0.2, 0.4, 0.6, 0.8)

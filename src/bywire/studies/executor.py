@@ -25,8 +25,8 @@ from bywire.core.unneeded import allow_dask
 from bywire.core.workers import worker_count
 from bywire.data.file_format import library
 from bywire.simulation.engine import CUDA
-from bywire.studies.chunk import Columns, PlacedChunk, computed_chunk, computed_chunks, number_of
 from bywire.studies.plan import StudyPlan
+from bywire.studies.store import Columns, PlacedChunk, computed_chunk, computed_chunks, number_of
 
 Chunks = Iterable[int | PlacedChunk]
 T = TypeVar("T")

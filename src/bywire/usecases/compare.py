@@ -85,10 +85,10 @@ def compare(
     KeyboardInterrupt
         When interrupted: half a run compares with nothing.
     """
-    from bywire.api.compared_run import kept
     from bywire.api.comparison import (
         Comparison,
         is_folder,
+        kept,
         require_comparable,
         resolved,
         told_apart,

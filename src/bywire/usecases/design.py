@@ -146,14 +146,16 @@ def design(
     from bywire.api.design import (
         LoopDesign,
         designed_by_region,
+        drawn_models,
         for_ecu,
         left_to_choose,
         narrowed,
+        probability_of,
+        probability_wanted,
         requirements_of,
         trial_of,
         tunables_of,
     )
-    from bywire.api.design_drawn import drawn_models, probability_of, probability_wanted
     from bywire.api.loop_case import loop_case, over_range
     from bywire.core.arguments import whole_number
     from bywire.core.errors import ParameterError

@@ -6,7 +6,7 @@ from bywire.usecases.asks import BenchName, ExportFolder, LastBenchChanges
 from bywire.usecases.declare import NOTHING, Ask, Command, use_case
 
 if TYPE_CHECKING:
-    from bywire.api.export_controller import ControllerExport
+    from bywire.api.exports import ControllerExport
 
 Precision = Annotated[str, Ask("Numbers of the C: double, or single.")]
 Vectors = Annotated[int, Ask("Test vectors of each task.")]
@@ -83,8 +83,7 @@ def export_controller(
     import os
     from dataclasses import replace
 
-    from bywire.api.export_controller import ControllerExport, check_controller
-    from bywire.api.export_folder import export_folder
+    from bywire.api.exports import ControllerExport, check_controller, export_folder
     from bywire.bench.bench import Bench
     from bywire.bench.bench_file import read
     from bywire.core.arguments import whole_number

@@ -7,7 +7,7 @@ from bywire.usecases.asks import BenchName, ExportFolder, LastBenchChanges, Need
 from bywire.usecases.declare import NOTHING, Ask, Command, use_case
 
 if TYPE_CHECKING:
-    from bywire.api.export_fmu import ExportedFmu
+    from bywire.api.exports import ExportedFmu
     from bywire.core.typing import Progress
 
 Part = Annotated[str, Ask("brake, plant or ecu.", shown_default="brake; plant for model-exchange")]
@@ -70,15 +70,13 @@ def export_fmu(
     CompilerError
         When there is no compiler for a system, or it fails.
     """
-    from bywire.api.export_fmu import ExportedFmu
-    from bywire.api.export_folder import export_folder
+    from bywire.api.exports import ExportedFmu, export_folder
     from bywire.bench import bench_file
     from bywire.bench.bench import Bench
     from bywire.core.errors import ParameterError, quoted, unknown_name
     from bywire.core.typing import silent
-    from bywire.export.fmu.archive import unit_of, write_unit
-    from bywire.export.fmu.binaries import PLATFORMS, this_platform
-    from bywire.export.interface import KINDS, PARTS
+    from bywire.export.exported import KINDS, PARTS
+    from bywire.export.fmu.archive import PLATFORMS, this_platform, unit_of, write_unit
 
     if kind not in KINDS:
         raise unknown_name("kind", kind, KINDS)

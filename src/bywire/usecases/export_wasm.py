@@ -6,7 +6,7 @@ from bywire.usecases.asks import BenchName, ExportFolder, LastBenchChanges, Need
 from bywire.usecases.declare import NOTHING, Command, use_case
 
 if TYPE_CHECKING:
-    from bywire.api.export_wasm import ExportedWasm
+    from bywire.api.exports import ExportedWasm
 
 
 @use_case(Command("export wasm", writes=""))
@@ -45,8 +45,7 @@ def export_wasm(
     """
     import os
 
-    from bywire.api.export_folder import export_folder
-    from bywire.api.export_wasm import ExportedWasm
+    from bywire.api.exports import ExportedWasm, export_folder
     from bywire.bench import bench_file
     from bywire.bench.bench import Bench
     from bywire.core.scratch import scratch_folder
@@ -55,8 +54,7 @@ def export_wasm(
         bench = bench_file.read(bench, overrides)
     elif overrides:
         bench = bench.with_overrides(overrides)
-    from bywire.export.exported import exported
-    from bywire.export.interface import identifier_of
+    from bywire.export.exported import exported, identifier_of
     from bywire.export.wasm.module import module_files
 
     made = exported(bench, case)

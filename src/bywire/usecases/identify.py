@@ -303,9 +303,9 @@ def identify(
     ['A', 'F_0', 'f']
     """
     from bywire.api import identification
-    from bywire.api.identification import Identification
-    from bywire.api.identify import (
+    from bywire.api.identification import (
         STARTS,
+        Identification,
         Source,
         begun_at,
         choose,

@@ -9,8 +9,7 @@ from bywire.usecases.asks import At, Changes, ParameterSetName, Side
 from bywire.usecases.declare import NOTHING, Ask, Form, use_case
 
 if TYPE_CHECKING:
-    from bywire.api.linearize import LinearizedLoop
-    from bywire.api.linearize_plant import LinearizedPlant, PlantLocus
+    from bywire.api.linearize import LinearizedLoop, LinearizedPlant, PlantLocus
 
 LoopOrPlant = Annotated[
     str, Ask("Loop or plant, see 'bywire list'.", "Loop", name="loop", known=("loops", "plants"))
@@ -118,8 +117,7 @@ def linearize(
         When the motion under dither does not repeat itself.
     """
     from bywire.analysis.linear.plant import PLANTS
-    from bywire.api.linearize import linear_loop_case, linearized_loop
-    from bywire.api.linearize_plant import linearize_plant, plant_locus
+    from bywire.api.linearize import linear_loop_case, linearize_plant, linearized_loop, plant_locus
 
     if name in PLANTS.all():
         if dither:

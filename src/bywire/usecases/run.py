@@ -138,7 +138,7 @@ def run(
         bench = bench.with_overrides(overrides)
     bench = faulty(bench, faults)
     if animate:
-        from bywire.api.animation import require_scene
+        from bywire.api.run import require_scene
 
         require_scene(bench, over)
     if over:

@@ -8,8 +8,15 @@ from xml.etree.ElementTree import Element, SubElement
 
 from bywire.core.quantities import display_unit
 from bywire.core.units import base_powers, convert
-from bywire.export.exported import Exported
-from bywire.export.interface import Interface, Kind, Numbered, Variable, finite_range, tables
+from bywire.export.exported import (
+    Exported,
+    Interface,
+    Kind,
+    Numbered,
+    Variable,
+    finite_range,
+    tables,
+)
 
 _BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
