@@ -30,6 +30,7 @@ from bywire.report.document import (
     Attachment,
     Banner,
     Block,
+    Details,
     Document,
     FigureBlock,
     Listing,
@@ -164,7 +165,6 @@ class BenchResult(Result, Answer):
         """Return verdict and changes, figures, key figures, energy, and how it was made."""
         bench = self.bench
         table = TableBlock(kpi_table(self.rows))
-        narrow = TableBlock(kpi_table([replace(row, where="") for row in self.rows]))
         said = [*remarks(self), *self._unplayed()]
         notes: list[Block] = [Paragraph(f"Warning: {text}.") for text in self.warnings]
         notes += [Listing(said)] if said else []
@@ -181,8 +181,8 @@ class BenchResult(Result, Answer):
             ],
             brief=[
                 *([Listing(said)] if said else []),
-                *([narrow] if self.kpis else []),
-                *self._scatter(),
+                *([table] if self.kpis else []),
+                Details("", self._scatter()),
             ],
             data={**self._data(), "remarks": said},
             banner=self._banner(),
@@ -239,7 +239,7 @@ class BenchResult(Result, Answer):
 
     def _banner(self) -> Banner:
         if not self.verdicts:
-            return Banner("done")
+            return Banner("done, no requirement is stated")
         met = sum(v.met for v in self.verdicts)
         text = f"{met} of {len(self.verdicts)} requirements met"
         if open_ := sum(not v.is_decided for v in self.verdicts):

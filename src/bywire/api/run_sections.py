@@ -239,9 +239,11 @@ def tested_line(plan: StudyPlan) -> str:
     return f"{line}, with the fault{'s' * (len(names) > 1)} {', '.join(names)}"
 
 
-def tested_brief(nominal: Result, plan: StudyPlan) -> list[Listing]:
+def tested_brief(nominal: Result, plan: StudyPlan) -> list[Block]:
     """Return for a terminal the faults, if there are any, and what varies."""
-    return [Listing([*fault_texts(nominal.bench, nominal.recordings), *varied_texts(plan.varied)])]
+    faults = fault_texts(nominal.bench, nominal.recordings)
+    varied = Details("", [Listing(varied_texts(plan.varied))])
+    return [*([Listing(faults)] if faults else []), varied]
 
 
 def varied_texts(varied: Sequence[Varied]) -> list[str]:

@@ -89,9 +89,10 @@ class Answer(ABC):
         return write_document(self.document(), Path(folder))
 
     def __str__(self) -> str:
-        from bywire.report.terminal import terminal_text
+        from bywire.report.terminal import terminal_text, verdict_line
 
-        return terminal_text(self.document())
+        document = self.document()
+        return "\n".join(filter(None, [terminal_text(document), verdict_line(document)]))
 
     def _repr_html_(self) -> str:
         from bywire.report.page import fragment_html
