@@ -14,7 +14,7 @@ import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case, as_run
-from bywire.bench.extent import check_extent
+from bywire.bench.extent import check_extent, check_recordings
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.recording import record, rows_of, run_notes, watch
 from bywire.bench.requirements import judge, status_of
@@ -81,7 +81,9 @@ def run(
             try:
                 other = replace(bench, step=factor * bench.step)
                 made: dict[str, xr.Dataset] = {}
-                _make_runs(other, made, progress, engine, {}, f", {factor:g} of the step", work)
+                held = _bytes_of(recordings, *others.values())
+                remark = f", {factor:g} of the step"
+                _make_runs(other, made, progress, engine, {}, remark, work, held)
                 others[factor] = made
             except NO_ESTIMATE as error:
                 failures[factor] = error
@@ -102,15 +104,18 @@ def _make_runs(
     work: dict[str, float],
     remark: str = "",
     compared: Mapping[str, float] | None = None,
+    held: float = 0.0,
 ) -> None:
     """Make all recordings of a bench, each kept as soon as it is there, and what work they took.
 
-    ``compared``: the work of the same runs in the bench's own step, of which these may take some.
+    ``compared``: the work of the same runs in the bench's own step, of which these may take some;
+    ``held``: bytes of the recordings that are in memory already.
     """
     engine = bench.engine if engine == "auto" else engine
     recordings |= static_recordings(bench)
-    for number, case in enumerate(bench.cases()):
-        computed = run_of(bench, case, number)
+    runs = [(case, run_of(bench, case, k)) for k, case in enumerate(bench.cases())]
+    check_recordings([computed for _, computed in runs], held)
+    for case, computed in runs:
         if compared is not None:
             computed = replace(computed, most_work=MOST_WORK * compared[case.label])
         report = None if progress is None else partial(progress, case.label + remark)
@@ -124,6 +129,10 @@ def _make_runs(
             recordings[case.label] = recording_of(bench, case, computed, trajectory)
         if not is_complete:
             raise KeyboardInterrupt
+
+
+def _bytes_of(*made: Mapping[str, xr.Dataset]) -> float:
+    return float(sum(each.nbytes for recordings in made for each in recordings.values()))
 
 
 def static_recordings(bench: Bench) -> dict[str, xr.Dataset]:
