@@ -20,8 +20,8 @@ from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
-from bywire.bench.kpis.registry import FAMILIES
-from bywire.bench.stimuli.registry import STIMULI
+from bywire.bench.kpis.families import FAMILIES
+from bywire.bench.stimulus import STIMULI
 from bywire.brakes.wedge import elements, laws
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.field_notes import field_notes

@@ -12,8 +12,8 @@ from bywire.api.describe import Description, described
 from bywire.api.described import fault_summaries
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
-from bywire.bench.kpis.registry import definitions
-from bywire.bench.stimuli.registry import STIMULI
+from bywire.bench.kpis.families import definitions
+from bywire.bench.stimulus import STIMULI
 from bywire.campaigns.declared import CAMPAIGNS
 from bywire.core.brake import brakes
 from bywire.core.catalog import PARAMETER_SETS

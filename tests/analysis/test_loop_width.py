@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.analysis.loop_width import closed_above, widths
 from bywire.analysis.response.harmonics import amplitudes, total_distortion
-from bywire.bench.kpis.hysteresis import Loop
+from bywire.bench.kpis.hysteresis import Loop, closed_above, widths
 from bywire.brakes.motorcycle.staircase import jumps
 
 

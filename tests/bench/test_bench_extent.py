@@ -7,7 +7,7 @@ import math
 import pytest
 
 import bywire
-from bywire.bench import extent
+from bywire.bench import experiment
 from bywire.core.errors import StepError
 from run_once import run_once
 
@@ -75,7 +75,7 @@ def test_settling_that_no_float_counts_in_bytes():
 
 
 def test_recording_less_often_needs_less(monkeypatch):
-    monkeypatch.setattr(extent, "_memory", lambda: 2e6)
+    monkeypatch.setattr(experiment, "_memory", lambda: 2e6)
     with pytest.raises(StepError, match=r"0\.002 GB.*record less often"):
         run_once(braking())
     assert run_once(braking(record="10 ms")).status == "done"
@@ -88,7 +88,7 @@ def test_infinite_duration():
 
 
 def test_memory_of_this_machine_is_plausible():
-    assert 1e8 < extent._memory() < 1e16
+    assert 1e8 < experiment._memory() < 1e16
 
 
 def test_system_that_does_not_tell_its_memory(monkeypatch):
@@ -96,19 +96,19 @@ def test_system_that_does_not_tell_its_memory(monkeypatch):
         raise ValueError(name)
 
     monkeypatch.setattr("os.sysconf", unknown, raising=False)
-    assert extent._memory.__wrapped__() == 8e9
+    assert experiment._memory.__wrapped__() == 8e9
 
 
 @pytest.mark.parametrize("value", [1e-9, 1, "3 ms"])
 def test_admissible_step(value):
-    assert extent.checked_step(value) >= extent.SHORTEST_STEP
-    assert extent.checked_interval(value) == extent.checked_step(value)
+    assert experiment.checked_step(value) >= experiment.SHORTEST_STEP
+    assert experiment.checked_interval(value) == experiment.checked_step(value)
 
 
 @pytest.mark.parametrize("value", [0, 9.99e-10, -1, -math.inf, math.nan, "x", [1], None, False])
 def test_inadmissible_step(value):
     with pytest.raises(bywire.BywireError, match=r"simulation\.step"):
-        extent.checked_step(value)
+        experiment.checked_step(value)
 
 
 def test_sample_times_that_would_make_it_settle_for_long():

@@ -30,8 +30,8 @@ from bywire.api.described import (
 )
 from bywire.bench.experiment import EXPERIMENTS, Experiment
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
-from bywire.bench.kpis.registry import definitions
-from bywire.bench.stimuli.registry import STIMULI, StimulusKind
+from bywire.bench.kpis.families import definitions
+from bywire.bench.stimulus import STIMULI, StimulusKind
 from bywire.campaigns.declared import CAMPAIGNS, DeclaredCampaign
 from bywire.contracts.elements import Element, elements_by_name, parameter_classes
 from bywire.core.arguments import checked

@@ -9,8 +9,8 @@ from bywire.analysis.loop import LOOPS
 from bywire.api.described import fault_summaries
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
-from bywire.bench.kpis.registry import definitions
-from bywire.bench.stimuli.registry import STIMULI
+from bywire.bench.kpis.families import definitions
+from bywire.bench.stimulus import STIMULI
 from bywire.campaigns.declared import CAMPAIGNS
 from bywire.campaigns.residual import RESIDUALS
 from bywire.contracts.elements import every_element

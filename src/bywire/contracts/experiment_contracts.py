@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import EXPERIMENTS, Case, Experiment
-from bywire.bench.stimuli.registry import create
+from bywire.bench.stimulus import create
 from bywire.contracts.evidence import Contract, Demand, Demands, Evidence, NotCheckedError, Place
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.errors import BywireError, UnknownNameError, unknown_name

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from bywire.bench import running
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.core.typing import Progress
 from bywire.simulation.cuda_device import find_device
 from bywire.simulation.engine import CUDA

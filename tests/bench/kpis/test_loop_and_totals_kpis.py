@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.bench.kpis import effort, hysteresis, occupation, registry, release, warming
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis import effort, hysteresis, occupation, release, warming
+from bywire.bench.kpis import families as registry
+from bywire.bench.kpis.samples import smoothed
 
 LAG = 0.3
 
