@@ -9,7 +9,7 @@ from functools import partial
 from bywire.bench.ensemble import changed, needed, rounds
 from bywire.bench.kpis.families import FamilyJudge
 from bywire.bench.recording import rows_of_group
-from bywire.simulation.run_group import RunGroup
+from bywire.simulation.ensemble import RunGroup
 from bywire.studies.plan import CHUNK, StudyPlan
 
 

@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from bywire import control, plant
-from bywire.analysis.linear.plant import PLANTS
-from bywire.analysis.loop import LOOPS
+from bywire.analysis.loop import LOOPS, PLANTS
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.kpis.families import FAMILIES

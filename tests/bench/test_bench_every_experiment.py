@@ -20,7 +20,7 @@ from bywire.core.brake import brakes
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError
 from bywire.report.bench_figures import bench_figures
-from bywire.simulation.run_group import fit_lanes
+from bywire.simulation.ensemble import fit_lanes
 
 NAMES = sorted(EXPERIMENTS.all())
 PAIRS = [

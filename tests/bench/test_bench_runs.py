@@ -16,8 +16,8 @@ from bywire.bench.experiment import as_run
 from bywire.bench.running import Result, run
 from bywire.brakes.motorcycle.operating_point import settled_start
 from bywire.core.errors import WorkLimitError
+from bywire.simulation.ensemble import simulate_group
 from bywire.simulation.run import simulate
-from bywire.simulation.run_group import simulate_group
 from run_once import run_once
 
 SET = "dardanelli2010"

@@ -2,11 +2,11 @@
 
 from bywire.analysis.linear.linear_model import LinearModel as LinearModel
 from bywire.analysis.linear.linearize import linearize as linearize
-from bywire.analysis.linear.plant import Plant as Plant
-from bywire.analysis.linear.plant import PlantPoint as PlantPoint
 from bywire.analysis.linear.sampled_loops import closed_loop as closed_loop
 from bywire.analysis.loop import LOOPS as LOOPS
 from bywire.analysis.loop import Loop as Loop
+from bywire.analysis.loop import Plant as Plant
+from bywire.analysis.loop import PlantPoint as PlantPoint
 from bywire.analysis.loop import Point as Point
 from bywire.analysis.loop import Quantity as Quantity
 from bywire.bench.bench import Bench as Bench
@@ -32,7 +32,7 @@ from bywire.bench.stated import StatedFigure as StatedFigure
 from bywire.bench.stated import StatedLevel as StatedLevel
 from bywire.bench.stated import StatedRange as StatedRange
 from bywire.bench.stimulus import Stimulus as Stimulus
-from bywire.campaigns.declared import DeclaredCampaign as DeclaredCampaign
+from bywire.campaigns.residual import DeclaredCampaign as DeclaredCampaign
 from bywire.campaigns.residual import Residual as Residual
 from bywire.core import quantities as quantities
 from bywire.core import signals as signals

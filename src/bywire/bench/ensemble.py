@@ -39,9 +39,8 @@ from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf
 from bywire.core.typing import Array
 from bywire.simulation import ensemble
 from bywire.simulation.engine import CUDA
-from bywire.simulation.ensemble import Ensemble, Variations
+from bywire.simulation.ensemble import Ensemble, RunGroup, Variations, fit_lanes, simulate_group
 from bywire.simulation.run import Run, Trajectory, simulate
-from bywire.simulation.run_group import RunGroup, fit_lanes, simulate_group
 
 
 def varied_choices(bench: Bench) -> Mapping[str, tuple[Any, ...]]:

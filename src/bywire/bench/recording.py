@@ -18,8 +18,8 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
 from bywire.core.version import __version__
 from bywire.simulation.advance import put_in_signals
+from bywire.simulation.ensemble import RunGroup
 from bywire.simulation.run import Run, Trajectory, doubts_of
-from bywire.simulation.run_group import RunGroup
 
 
 def parameter_hash(par: ParameterSet) -> str:

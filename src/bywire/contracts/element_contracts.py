@@ -23,7 +23,7 @@ from bywire.contracts.elements import (
     signature_of,
 )
 from bywire.contracts.evidence import Contract, Demand, Demands, Evidence, measured, place_of
-from bywire.contracts.sampling import (
+from bywire.contracts.values import (
     Arguments,
     Sampler,
     call,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.analysis.response.harmonics import amplitudes
+from bywire.analysis.response.sweep import amplitudes
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import as_run
 from bywire.bench.kpis import hysteresis

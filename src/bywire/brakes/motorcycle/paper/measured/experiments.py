@@ -24,8 +24,8 @@ from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.typing import Array, Complex
 from bywire.data.recursive_filter import filtered
 from bywire.identification.least_squares import solve
+from bywire.simulation.ensemble import fit_lanes, simulate_group
 from bywire.simulation.run import Run, Trajectory, simulate
-from bywire.simulation.run_group import fit_lanes, simulate_group
 
 Par = MotorcycleParameters
 
