@@ -16,6 +16,7 @@ from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
 from bywire.bench.faults.modes import modes_of
 from bywire.bench.recording import record
 from bywire.contracts.dimensioned import Dimensioned, fits
+from bywire.contracts.element_contracts import set_keeps_its_ranges, set_survives_json
 from bywire.contracts.evidence import (
     Contract,
     Demand,
@@ -27,7 +28,6 @@ from bywire.contracts.evidence import (
 )
 from bywire.contracts.small_signal import is_its_linear_model, is_linear_beside_its_corners
 from bywire.contracts.trial import LARGE, Start, Trial, constants, lanes, states
-from bywire.contracts.values import set_keeps_its_ranges, set_survives_json
 from bywire.core.errors import ParameterError, SolverError
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import Signal, signals_of
