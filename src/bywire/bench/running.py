@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any, cast
@@ -13,12 +13,10 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.experiment import Case, as_run
-from bywire.bench.extent import check_extent, check_recordings
+from bywire.bench.experiment import Case, as_run, check_extent, check_recordings
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.recording import record, rows_of, run_notes, watch
-from bywire.bench.requirements import judge, status_of
-from bywire.bench.result import Result
+from bywire.bench.requirements import Verdict, judge, status_of
 from bywire.bench.rows import Rows
 from bywire.bench.step_error import (
     MOST_WORK,
@@ -29,11 +27,71 @@ from bywire.bench.step_error import (
     unestimated,
     with_step_errors,
 )
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.stimulus import Stimulus
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.interrupts import interrupt_heard, interrupts_deferred
 from bywire.core.signals import signals_of
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, Trajectory, simulate
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a bench gave.
+
+    Parameters
+    ----------
+    recordings
+        One dataset per run of the experiment, by label.
+    status
+        ``done`` (nothing was required), ``passed``, ``failed`` (a requirement was not met),
+        ``undecided`` (one is no further from its limit than its error from the step) or
+        ``interrupted``.
+    unestimated
+        Why the error from the step is not known although it was asked for; empty where it is.
+    """
+
+    bench: Bench
+    recordings: Mapping[str, xr.Dataset]
+    kpis: tuple[Kpi, ...]
+    verdicts: tuple[Verdict, ...]
+    status: str
+    unestimated: str = ""
+
+    @property
+    def recording(self) -> xr.Dataset:
+        """The recording of an experiment that makes one run."""
+        if len(self.recordings) != 1:
+            labels = ", ".join(self.recordings)
+            raise ParameterError(f"this experiment made several recordings: take one of {labels}")
+        return next(iter(self.recordings.values()))
+
+    def kpi(self, name: str) -> Kpi:
+        """Return one KPI by name.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest known names.
+        """
+        by_name = {kpi.name: kpi for kpi in self.kpis}
+        if name not in by_name:
+            raise unknown_name("KPI", name, by_name)
+        return by_name[name]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the user should know of the runs."""
+        said = [
+            f"{label}: {text}" if len(self.recordings) > 1 else text
+            for label, recording in self.recordings.items()
+            for text in str(recording.attrs.get("warnings", "")).split("; ")
+            if text
+        ]
+        return said + ([self.unestimated] if self.unestimated else [])
+
+
+# --- Runs
 
 Progress = Callable[[str, float], None]
 
