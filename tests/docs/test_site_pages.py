@@ -13,7 +13,7 @@ import pytest
 
 import bywire
 from bywire import authoring
-from bywire.bench.kpis.registry import definitions
+from bywire.bench.kpis.families import definitions
 from bywire.cli.app import program
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.parameters import leaf_fields
