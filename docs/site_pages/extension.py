@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Connect everything."""
     app.connect("builder-inited", _make_pages, priority=100)  # before the gallery
     app.connect("source-read", _follow_links)
+    app.connect("autodoc-process-signature", _own_result)
     app.connect("missing-reference", _public_name)
     app.connect("build-finished", _require_one_host)
     app.add_html_math_renderer("mathml", (_inline_math, None), (_displayed_math, None))
@@ -86,6 +88,19 @@ def arguments(gallery_conf: Any, script: dict[str, Any]) -> list[str]:
     """Return the arguments of an example of the gallery."""
     FIGURES.mkdir(parents=True, exist_ok=True)
     return ["--out", str(FIGURES)]
+
+
+def _own_result(
+    app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: str, result: str
+) -> tuple[str, str] | None:
+    """Link the result of a public function to the class that users import from the same place."""
+    face = name.rpartition(".")[0]
+    return (signature, f"{face}.{result}") if f"{face}.{result}" in _classes() else None
+
+
+@cache
+def _classes() -> frozenset[str]:
+    return frozenset(f"bywire.{name}" for name in python_names.public())
 
 
 def _public_name(
