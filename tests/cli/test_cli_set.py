@@ -35,7 +35,7 @@ import bywire as package
         ("experiment=hard-breaking", ["unknown experiment", "'hard-braking'"]),
         ("parameters=dardaneli", ["unknown parameter set", "'dardanelli2010'"]),
         ("assembly=wedge", ["assembly = 'wedge'", "motorcycle-brake"]),
-        ("stimulus.kind=step", ["brings its own stimulus"]),
+        ("stimulus.kind=step", ["has its own stimulus"]),
         ("gear.law=papr", ["gear.law", "did you mean 'paper'?"]),
     ],
 )
@@ -145,5 +145,7 @@ def test_bad_shares_and_patterns(bywire, bench, change, texts):
 
 def test_a_share_of_zero_is_refused(bywire, bench):
     path = bench(f"{BRAKING}[set]\nseal.T_pr = 0\n")
-    refused(bywire("run", path, "--set", "seal.T_pr=+50%"), "a share of 0 changes nothing")
-    refused(bywire("run", path, "--set", "motor_heat.T_a=+5%"), "share of a temperature", "in K")
+    refused(bywire("run", path, "--set", "seal.T_pr=+50%"), "a percentage of 0 changes nothing")
+    refused(
+        bywire("run", path, "--set", "motor_heat.T_a=+5%"), "percentage of a temperature", "in K"
+    )
