@@ -81,6 +81,18 @@ def test_recording_less_often_needs_less(monkeypatch):
     assert run_once(braking(record="10 ms")).status == "done"
 
 
+def test_runs_that_one_memory_holds_alone_and_not_together(monkeypatch):
+    bench = bywire.Bench("current-loop", "roberts2003", options={"duration": "4 ms"})
+    kept = sum(each.nbytes for each in run_once(bench).recordings.values())
+    monkeypatch.setattr(experiment, "_memory", lambda: 0.9 * kept)
+    with pytest.raises(StepError, match=r"9 runs of up to .* kept together, need about"):
+        run_once(bench)
+    monkeypatch.setattr(experiment, "_memory", lambda: 1.5 * kept)
+    result = bywire.run(bench)
+    assert math.isnan(result.kpis[0].error)
+    assert any("kept together, need about" in text for text in result.warnings)
+
+
 def test_infinite_duration():
     options = {"i_max": 1e308, "slope": 1e-308}
     with pytest.raises(StepError, match="inf"):

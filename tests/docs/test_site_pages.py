@@ -123,5 +123,15 @@ def test_a_command_with_an_option_that_does_not_exist_is_told() -> None:
         parsed(["run", "hard-braking", "--unheard"])
 
 
+def test_messages_of_the_page_of_troubleshooting_are_in_the_product() -> None:
+    sources = [ROOT / "tasks.py", *sorted((ROOT / "src").rglob("*.py"))]
+    product = "\n".join(path.read_text(encoding="utf-8") for path in sources)
+    product = re.sub(r'"\s*\n\s*f?"', "", product)  # literals that follow each other are one text
+    rows = re.findall(r"^\|([^|]*)\|", (DOCS / "troubleshooting.md").read_text("utf-8"), re.M)
+    parts = [part for row in rows for part in re.findall(r"`([^`]+)`", row)]
+    assert len(parts) > 30
+    assert [part for part in parts if part not in product] == []
+
+
 def test_letters_that_mean_something_in_markdown_are_escaped() -> None:
     assert markdown.plain("a_b *c* |d| <e>") == r"a\_b \*c\* \|d\| \<e\>"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -242,7 +243,8 @@ class Bench:
         texts = []
         for each in outdated_values(cited, self.par, self.overrides):
             unit = leaves[each.name].unit.symbol
-            now, then = (shown(value, unit) for value in (each.now, each.formula))
+            now = shown(each.now, unit)
+            then = shown(each.formula, unit) if math.isfinite(each.formula) else "no finite value"
             texts.append(
                 f"{each.name} = {now} is derived ({each.where}) from {', '.join(each.changed)}, "
                 f"which was changed: its formula now gives {then}; set it too, or leave it on "

@@ -324,8 +324,8 @@ def energy_doubts_of_cases(
     for k, (left, total) in enumerate(zip(error.tolist(), turned.tolist(), strict=True)):
         if abs(left) > _OPEN * total + _NOTHING:
             doubts[k].append(
-                f"the energy balance is open by {abs(left):.3g} J of a turnover of {total:.3g} J: do "
-                "not trust this run, take a smaller step, and look for an extreme parameter"
+                f"the energy balance is open by {abs(left):.3g} J of a turnover of {total:.3g} J: "
+                "do not trust this run, take a smaller step, and look for an extreme parameter"
             )
     return doubts
 

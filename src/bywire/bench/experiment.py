@@ -490,6 +490,28 @@ def check_extent(case: Case, run: Run) -> None:
     check_memory(run, len(run.model.Output._fields))
 
 
+def check_recordings(runs: Sequence[Run], held: float) -> None:
+    """Refuse runs that are all kept in memory and do not fit into this machine together.
+
+    ``held``: bytes of other recordings that stay there.
+
+    Raises
+    ------
+    StepError
+        With the memory that they would need.
+    """
+    each = [8 * run.schedule().rows * len(run.model.Output._fields) for run in runs]
+    needed, memory = held + sum(each) + (_COPIES - 1) * max(each, default=0), _memory()
+    if needed > memory:
+        longest = max(runs, key=lambda run: run.schedule().rows)
+        raise StepError(
+            f"{len(runs)} runs of up to {longest.duration:g} s, recorded every "
+            f"{longest.record:g} s and kept together, need about {needed / _GIGA:.3g} GB of "
+            f"memory, but this machine has {memory / _GIGA:.3g} GB: run shorter, or record less "
+            "often (simulation.record)"
+        )
+
+
 def check_memory(run: Run, signals: int) -> None:
     """Reject a run whose rows do not fit into the memory of this machine.
 

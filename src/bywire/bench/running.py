@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.experiment import Case, as_run, check_extent
+from bywire.bench.experiment import Case, as_run, check_extent, check_recordings
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.recording import record, rows_of, run_notes, watch
 from bywire.bench.requirements import Verdict, judge, status_of
@@ -139,7 +139,9 @@ def run(
             try:
                 other = replace(bench, step=factor * bench.step)
                 made: dict[str, xr.Dataset] = {}
-                _make_runs(other, made, progress, engine, {}, f", {factor:g} of the step", work)
+                held = _bytes_of(recordings, *others.values())
+                remark = f", {factor:g} of the step"
+                _make_runs(other, made, progress, engine, {}, remark, work, held)
                 others[factor] = made
             except NO_ESTIMATE as error:
                 failures[factor] = error
@@ -160,15 +162,18 @@ def _make_runs(
     work: dict[str, float],
     remark: str = "",
     compared: Mapping[str, float] | None = None,
+    held: float = 0.0,
 ) -> None:
     """Add all recordings of a bench, each as soon as it is finished, and the work of its runs.
 
-    ``compared``: work of the runs in the bench's own step, which limits that of these runs.
+    ``compared``: work of the runs in the bench's own step, which limits that of these runs;
+    ``held``: bytes of the recordings that are in memory already.
     """
     engine = bench.engine if engine == "auto" else engine
     recordings |= static_recordings(bench)
-    for number, case in enumerate(bench.cases()):
-        computed = run_of(bench, case, number)
+    runs = [(case, run_of(bench, case, k)) for k, case in enumerate(bench.cases())]
+    check_recordings([computed for _, computed in runs], held)
+    for case, computed in runs:
         if compared is not None:
             computed = replace(computed, most_work=MOST_WORK * compared[case.label])
         report = None if progress is None else partial(progress, case.label + remark)
@@ -182,6 +187,10 @@ def _make_runs(
             recordings[case.label] = recording_of(bench, case, computed, trajectory)
         if not is_complete:
             raise KeyboardInterrupt
+
+
+def _bytes_of(*made: Mapping[str, xr.Dataset]) -> float:
+    return float(sum(each.nbytes for recordings in made for each in recordings.values()))
 
 
 def static_recordings(bench: Bench) -> dict[str, xr.Dataset]:
