@@ -52,7 +52,7 @@ def test_one_that_is_full_before_it_begins_is_told(driver, monkeypatch):
     full, unknown = Status.CUDA_ERROR_OUT_OF_MEMORY, Status.CUDA_ERROR_INVALID_CONTEXT
     monkeypatch.setattr(driver, "cuDevicePrimaryCtxRetain", lambda _: (full, None))
     monkeypatch.setattr(driver, "cuMemGetInfo", lambda: (unknown, None, None))
-    with pytest.raises(DeviceError, match="emulated 0 has no memory left: end what else"):
+    with pytest.raises(DeviceError, match="emulated 0 has no free memory: end other programs"):
         find_device()
 
 

@@ -154,7 +154,7 @@ def test_memory_that_is_too_small_is_said(runs, driver):
 def test_memory_that_others_took_meanwhile_is_said(runs, driver, monkeypatch):
     monkeypatch.setattr(driver, "cuMemGetInfo", lambda: (OK, 10**9, 10**9))
     driver.capacity = 50_000
-    with pytest.raises(DeviceError, match=r"no room for .* MB: .* are free: end what else"):
+    with pytest.raises(DeviceError, match=r"no room for .* MB: .* are free: end other programs"):
         simulate_group(runs, engine="cuda")
     assert not driver.places
 

@@ -491,9 +491,9 @@ def check_extent(case: Case, run: Run) -> None:
 
 
 def check_recordings(runs: Sequence[Run], held: float) -> None:
-    """Refuse runs that are all kept in memory and do not fit into this machine together.
+    """Reject runs that are kept in memory together and need more than this machine has.
 
-    ``held``: bytes of other recordings that stay there.
+    ``held``: bytes of other recordings in memory.
 
     Raises
     ------
@@ -508,7 +508,9 @@ def check_recordings(runs: Sequence[Run], held: float) -> None:
             f"{len(runs)} runs of up to {longest.duration:g} s, recorded every "
             f"{longest.record:g} s and kept together, need about {needed / _GIGA:.3g} GB of "
             f"memory, but this machine has {memory / _GIGA:.3g} GB: run shorter, or record less "
-            "often (simulation.record)"
+            "often (simulation.record)",
+            name="simulation.record",
+            value=f"{longest.record:g} s",
         )
 
 

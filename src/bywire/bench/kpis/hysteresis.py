@@ -149,7 +149,7 @@ def loop_width_mid(loop: Loop) -> float | Undefined:
     mean over the crossings keeps its effect small; `smoothed` removes it.
     """
     middle = 0.5 * float(np.min(loop.response) + np.max(loop.response))
-    (width,) = widths(loop, np.array([middle]))
+    width = float(widths(loop, np.array([middle]))[0])
     if math.isnan(width):
         return Undefined("the release ends above mid-height")
     return width
