@@ -9,7 +9,7 @@ from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.api.describe import Description, described
-from bywire.api.described import fault_summaries
+from bywire.api.things import all_things
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.kpis.registry import definitions
@@ -116,7 +116,7 @@ def faults_page() -> str:
         "one.",
         "",
     ]
-    rows = ([f"`{name}`", plain(summary)] for name, summary in fault_summaries().items())
+    rows = ([f"`{name}`", plain(summary)] for name, summary in all_things()["faults"].items())
     return "\n".join([*lines, *table_lines(["fault", "what happens"], rows)])
 
 
