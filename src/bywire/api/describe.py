@@ -87,7 +87,7 @@ def mentions(words: str) -> list[Mention]:
     )
 
 
-def nearest_words(name: str) -> Sequence[str]:
+def _nearest_words(name: str) -> Sequence[str]:
     """Return the declared words that are nearest to one that nothing mentions."""
     words = {word for mention in _known() for word in _WORD.findall(mention.meaning)}
     return get_close_matches(name, [word for word in words if len(word) > 3], n=2, cutoff=0.75)
@@ -153,7 +153,7 @@ def described(name: str) -> list[Object]:
     ]
     if not objects:
         names = {n for kind in thing_kinds() if kind.describe is not None for n in kind.things()}
-        raise unknown_name("name", name, names.union(nearest_words(name)))
+        raise unknown_name("name", name, names.union(_nearest_words(name)))
     return objects
 
 

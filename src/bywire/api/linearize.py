@@ -238,7 +238,7 @@ def linearize_plant(
     side: str = "",
 ) -> LinearizedPlant:
     """Return the linear model of a plant; see `bywire.linearize`."""
-    case = plant_case(name, parameters, at, overrides, friction, speed, side)
+    case = _plant_case(name, parameters, at, overrides, friction, speed, side)
     model = case.plant.linear(case.par, case.point)
     reduced = texts.reduced(model, reduce, case.plant.band) if reduce else None
     return LinearizedPlant(case, model, reduced)
@@ -255,7 +255,7 @@ def plant_locus(
     side: str = "",
 ) -> PlantLocus:
     """Return the poles of a plant over a range; see `bywire.linearize`."""
-    case = plant_case(name, parameters, at, overrides, friction, speed, side)
+    case = _plant_case(name, parameters, at, overrides, friction, speed, side)
     quantity = case.point.quantity
     over, unit, values = range_of(range_, quantity, case.par, "locus")
 
@@ -267,7 +267,7 @@ def plant_locus(
     return PlantLocus(case, locus_of(model, over, unit, sorted(values)))
 
 
-def plant_case(
+def _plant_case(
     name: str,
     parameters: str,
     at: str,
@@ -444,7 +444,7 @@ class LinearizedLoop(Answer):
         return [Paragraph(texts.dithered_line(self.dithered)), *poles]
 
     def _figures(self) -> list[FigureBlock]:
-        name, model, width = self.case.loop.name, self.model, closed_bandwidth(self.model)
+        name, model, width = self.case.loop.name, self.model, _closed_bandwidth(self.model)
         blocks = [
             FigureBlock(
                 partial(_poles, model, width),
@@ -472,7 +472,7 @@ class LinearizedLoop(Answer):
         ends = (float(locus.values[0]), float(locus.values[-1]))
         cases = case.loop.varied(case.par, case.value, locus.name, ends)
         models = [self.model, *(case.loop.closed(*each) for each in cases)]
-        widths = [closed_bandwidth(model) for model in models if model.is_stable]
+        widths = [_closed_bandwidth(model) for model in models if model.is_stable]
         return root_locus(locus, max(widths, default=math.nan))
 
     def _attachments(self) -> list[Attachment]:
@@ -507,7 +507,7 @@ class LinearizedLoop(Answer):
         return shown
 
 
-def closed_bandwidth(model: LinearModel) -> float:
+def _closed_bandwidth(model: LinearModel) -> float:
     """Return the -3 dB bandwidth of a closed loop [Hz]; NaN for an unstable one."""
     if not model.is_stable:
         return math.nan
@@ -577,7 +577,7 @@ def linear_case(
         As `bywire.linearize`.
     """
     if name in PLANTS.all():
-        return plant_case(name, parameters, at, overrides, friction, speed, side)
+        return _plant_case(name, parameters, at, overrides, friction, speed, side)
     return linear_loop_case(name, parameters, at, overrides, friction, speed, side)
 
 

@@ -123,7 +123,7 @@ class FaultCampaign(Answer):
         text = (
             "no fault is dangerous in this maneuver"
             if math.isnan(coverage)
-            else f"diagnostic coverage {100 * coverage:.3g} % ({coverage_class(coverage)})"
+            else f"diagnostic coverage {100 * coverage:.3g} % ({_coverage_class(coverage)})"
         )
         return Banner(_sentences([*harm, text]) if harm else text, "bad" if harm else "none")
 
@@ -257,7 +257,7 @@ class FaultCampaign(Answer):
             "folder": None if self.folder is None else str(self.folder),
             "runs": plan.total,
             "coverage": findings.coverage,
-            "coverage_class": coverage_class(findings.coverage),
+            "coverage_class": _coverage_class(findings.coverage),
             "weighted": findings.is_weighted,
             "dangerous_runs": cases.cases,
             "seen_in_time": cases.count,
@@ -279,7 +279,7 @@ def _sentences(texts: Sequence[str]) -> str:
     return " ".join(f"{text[:1].upper()}{text[1:]}." for text in texts)
 
 
-def coverage_class(coverage: float) -> str:
+def _coverage_class(coverage: float) -> str:
     """Return the class of a diagnostic coverage.
 
     Examples

@@ -113,7 +113,7 @@ def _scatter(findings: Findings, name: str, cases: DrawnCases) -> Figure:
     from bywire.report.study.cases import scatter
 
     drivers = [_axis(findings, each) for each in findings.drivers(name)[:_DRIVERS]]
-    limit = bound_of(findings, name)
+    limit = _bound_of(findings, name)
     assert limit is not None
     return scatter(_axis(findings, name), drivers, limit, cases)
 
@@ -126,11 +126,11 @@ def _parallel(findings: Findings, cases: DrawnCases) -> Figure:
     varied = [v.name for v in findings.plan.varied]
     names = list(dict.fromkeys([*ranked, *varied]))[: max(_AXES - len(figures), 2)]
     axes = [_axis(findings, name) for name in (*names, *figures)]
-    limits = {name: limit for name in figures if (limit := bound_of(findings, name)) is not None}
+    limits = {name: limit for name in figures if (limit := _bound_of(findings, name)) is not None}
     return parallel_coordinates(axes, cases, limits)
 
 
-def bound_of(findings: Findings, name: str) -> float | None:
+def _bound_of(findings: Findings, name: str) -> float | None:
     """Return the limit of a key figure in its unit; None where nothing is required of it."""
     return next((each.bound for each in findings.plan.demands if each.figure == name), None)
 
@@ -140,7 +140,7 @@ def bound_of(findings: Findings, name: str) -> float | None:
 _PANELS = 4  # requirements whose convergence is drawn
 _SHARES = 100  # points of a convergence, spaced by equal ratios
 
-Recordings = Callable[[], Mapping[str, Mapping[str, "xr.Dataset"]]]
+_Recordings = Callable[[], Mapping[str, Mapping[str, "xr.Dataset"]]]
 
 
 def load_drawing() -> None:
@@ -149,7 +149,7 @@ def load_drawing() -> None:
     from bywire.report import page, time_traces  # noqa: F401
 
 
-def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
+def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
     """Return the figures of a study; none where no case has a result.
 
     Parameters
@@ -243,7 +243,7 @@ def _histograms(findings: Findings) -> Figure:
     return histograms(
         {
             each.name: Spread(
-                findings.figure(each.name), each.unit, each.nominal, bound_of(findings, each.name)
+                findings.figure(each.name), each.unit, each.nominal, _bound_of(findings, each.name)
             )
             for each in findings.spreads
             if each.largest > each.least
@@ -266,7 +266,7 @@ def _influences(findings: Findings) -> Figure:
 def _tornado(findings: Findings, effects: Mapping[str, Sequence[Effect]]) -> Figure:
     from bywire.report.study.influences import tornado
 
-    limits = {name: limit for name in effects if (limit := bound_of(findings, name)) is not None}
+    limits = {name: limit for name in effects if (limit := _bound_of(findings, name)) is not None}
     return tornado(effects, findings.units, limits)
 
 
@@ -293,7 +293,7 @@ def _on_others(findings: Findings) -> str:
     return f" Not drawn: {'; '.join(others)}." if others else ""
 
 
-def _overlays(findings: Findings, recordings: Recordings) -> list[Block]:
+def _overlays(findings: Findings, recordings: _Recordings) -> list[Block]:
     which = "most probable failing" if findings.rare else "worst"
     return [
         FigureBlock(

@@ -67,10 +67,10 @@ def _worst(findings: Findings, judgment: Judgment) -> Cell:
     if not known.size:
         return Cell("-" if judgment.worst is None else "not defined")
     value = float(figures[known[0] if judgment.worst is None else judgment.worst])
-    return figure_cell(findings, kpi, value)
+    return _figure_cell(findings, kpi, value)
 
 
-def figure_cell(
+def _figure_cell(
     findings: Findings, name: str, value: float, *, is_difference: bool = False
 ) -> Cell:
     """Return the cell of a value of a key figure; see `figure_text`."""
@@ -141,7 +141,7 @@ def spread_table(findings: Findings) -> Table:
         values = [each.nominal, *middle, each.least, each.largest]
         name = clean(each.name)
         name += f" (not defined in {each.undefined})" if each.undefined else ""
-        cells = (figure_cell(findings, each.name, v) for v in values)
+        cells = (_figure_cell(findings, each.name, v) for v in values)
         rows.append((Cell(name), *cells))
     return Table((Column("name"), *(Column(h, numeric=True) for h in heads)), tuple(rows))
 
@@ -216,8 +216,8 @@ def _effect_table(findings: Findings, name: str, effects: Sequence[Effect]) -> T
             (
                 Cell(each.quantity),
                 *map(Cell, ends),
-                *(figure_cell(findings, name, v) for v in figures),
-                figure_cell(findings, name, each.swing, is_difference=True),
+                *(_figure_cell(findings, name, v) for v in figures),
+                _figure_cell(findings, name, each.swing, is_difference=True),
             )
         )
     return Table((Column("quantity"), *(Column(h, numeric=True) for h in heads)), tuple(rows))

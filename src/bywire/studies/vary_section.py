@@ -100,7 +100,7 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
     return replace(made, low=low, high=high)
 
 
-def require_single_values(where: str, kind: str, leaf: Leaf, nominal: float) -> None:
+def _require_single_values(where: str, kind: str, leaf: Leaf, nominal: float) -> None:
     """Refuse a distribution of a whole number that has any value between its ends.
 
     Parameters
@@ -144,7 +144,9 @@ def whole(where: str, values: Sequence[float], leaf: Leaf) -> list[float]:
     return [float(round(value)) for value in values]
 
 
-def require_following(where: str, made: Distribution, leaf: Leaf, unit: Unit, ratio: float) -> None:
+def _require_following(
+    where: str, made: Distribution, leaf: Leaf, unit: Unit, ratio: float
+) -> None:
     """Refuse a distribution that takes what keeps its ratio to it out of the range of that.
 
     Parameters
@@ -229,7 +231,7 @@ def read_distribution(
     kind = entry["kind"]
     if not isinstance(kind, str) or kind not in _KINDS:
         raise unknown_name(f"kind of {title} {name}", choice_text(kind), _KINDS)
-    require_single_values(f"{title} {name}", kind, leaf, nominal)
+    _require_single_values(f"{title} {name}", kind, leaf, nominal)
     known, make = _KINDS[kind]
     for key in entry.keys() - {"kind", "together"}:
         if key not in known:
@@ -407,13 +409,13 @@ _KINDS: dict[str, tuple[tuple[str, ...], Callable[[_Entry], Distribution]]] = {
     "triangular": (("low", "mode", "high"), _triangular),
     DISCRETE: (KEYS, _discrete),
 }
-ENTRY_KEYS = frozenset({"kind", "together"}).union(*(keys for keys, _ in _KINDS.values()))
+_ENTRY_KEYS = frozenset({"kind", "together"}).union(*(keys for keys, _ in _KINDS.values()))
 """all keys that a section of a quantity may have"""
 
 
 # --- What varies
 
-ESTIMATE = "estimate.json"
+_ESTIMATE = "estimate.json"
 """file of an identification's folder that holds its estimates"""
 _LARGEST = 20_000_000  # bytes of a file that is read
 _TRUNCATE = "cut it off, with truncate = true"
@@ -466,7 +468,7 @@ class Measured:
         )
 
 
-def varied_as_measured(
+def _varied_as_measured(
     bench: Bench, section: MeasuredSection, folder: Path
 ) -> tuple[tuple[Varied, ...], dict[tuple[str, str], float]]:
     """Return parameters that vary as they were measured, and the correlations of their estimates.
@@ -488,7 +490,7 @@ def varied_as_measured(
     InputError
         For a section that does not fit, and estimates that leave the admissible range.
     """
-    measured = read_measured(folder / section.file)
+    measured = _read_measured(folder / section.file)
     leaves, values = leaf_fields(type(bench.par)), bench.par.flat()
     of = [name for name in measured.values if name in leaves] if section.of is None else section.of
     if not of:
@@ -521,7 +523,7 @@ def _text(value: float, unit: str) -> str:
     return repr(value) if unit == "1" else f"{value!r} {unit}"
 
 
-def read_measured(path: Path) -> Measured:
+def _read_measured(path: Path) -> Measured:
     """Read what an identification estimated.
 
     Parameters
@@ -534,7 +536,7 @@ def read_measured(path: Path) -> Measured:
     FileError
         When there is none, or it is damaged.
     """
-    file = path / ESTIMATE if path.is_dir() else path
+    file = path / _ESTIMATE if path.is_dir() else path
     try:
         data = file.read_bytes()
     except (OSError, ValueError) as error:
@@ -622,7 +624,7 @@ def read_all_varied(
     measured: tuple[Varied, ...] = ()
     correlations: Mapping[tuple[str, str], float] = {}
     if estimates is not None:
-        measured, correlations = varied_as_measured(bench, estimates, folder)
+        measured, correlations = _varied_as_measured(bench, estimates, folder)
     varied = tuple(read_varied(bench, section))
     places: dict[str, str] = {}
     for title, each in (("[measured]", measured), ("[vary]", varied)):
@@ -675,7 +677,7 @@ def read_varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
             bench.require_effect(name)
         law = read_distribution(name, entry, leaf, nominal)
         for each in filter(values.get, together):
-            require_following(
+            _require_following(
                 f"[vary] {name}.together {each}",
                 law,
                 varied_leaf(bench, each),
@@ -757,7 +759,7 @@ def _is_entry(name: str, value: Mapping[str, Any], known: Collection[str]) -> bo
     """Return whether a table says how a quantity varies, and is no group of quantities."""
     if name in known or any(each.startswith(f"{name}.") for each in known):
         return name in known
-    return "kind" in value or value.keys() <= ENTRY_KEYS  # of a name that nothing answers to
+    return "kind" in value or value.keys() <= _ENTRY_KEYS  # of a name that nothing answers to
 
 
 def _together(name: str, entry: Any, bench: Bench, values: Mapping[str, Any]) -> tuple[str, ...]:
