@@ -17,16 +17,15 @@ import xarray as xr
 from bywire.api.run import bench_of
 from bywire.bench import running
 from bywire.bench.bench import Bench
-from bywire.bench.bench_file import flattened
-from bywire.bench.bench_source import experiment_of, names_experiment
+from bywire.bench.bench_file import experiment_of, flattened, names_experiment
+from bywire.bench.changes import OPTION
 from bywire.bench.experiment import Experiment
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.option_names import OPTION
 from bywire.bench.requirements import Verdict
-from bywire.bench.result import Result
 from bywire.bench.result_folder import is_result_folder, read_result, verdict_record
+from bywire.bench.running import Result
 from bywire.bench.step_error import are_distinct
-from bywire.bench.stimuli.registry import STIMULI
+from bywire.bench.stimulus import STIMULI
 from bywire.core.callers import is_command_line
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError, ParameterError

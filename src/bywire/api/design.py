@@ -13,15 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.loop_curves import loop_curve
-from bywire.analysis.margins import NO_LOOP, figures_at
+from bywire.analysis.margins import NO_LOOP, figures_at, loop_curve
 from bywire.api import design_parts
 from bywire.api.design_parts import Part, figure_cell, judged_on, verdict_text
 from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase, loop_case, over_range, spread
 from bywire.api.study_tables import percent
 from bywire.bench.bench import Bench
-from bywire.bench.option_names import OPTION
+from bywire.bench.changes import OPTION
 from bywire.bench.requirements import Limit
 from bywire.core.callers import option
 from bywire.core.errors import InputError, ParameterError, quoted
@@ -46,7 +45,7 @@ from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.statistics import Outcome, Share, judged, share
 from bywire.studies.study_file import read_study
 from bywire.synthesis import designer
-from bywire.synthesis.linear_case import LinearCase, cases_of, existing_case, require_given
+from bywire.synthesis.linear_case import LinearCase, cases_of, existing_case, read, require_given
 from bywire.synthesis.outcome import (
     Across,
     Design,
@@ -56,7 +55,6 @@ from bywire.synthesis.outcome import (
     bench_text,
     judged_over,
 )
-from bywire.synthesis.requirement import read
 from bywire.synthesis.schedules import (
     design_schedule,
     frozen,

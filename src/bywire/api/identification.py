@@ -16,8 +16,8 @@ import xarray as xr
 from bywire.api.parameter_choice import set_for
 from bywire.api.replay import columns_of_bench, driven_bench
 from bywire.bench.bench import Bench
+from bywire.bench.changes import settled
 from bywire.bench.experiment import EXPERIMENTS
-from bywire.bench.relative_changes import settled
 from bywire.core.callers import is_command_line, option
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import FileError, InputError, ParameterError, unknown_name, unknown_of_few

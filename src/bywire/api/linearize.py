@@ -14,9 +14,8 @@ from bywire.analysis.crossings import bandwidth
 from bywire.analysis.linear.corners import read_sides
 from bywire.analysis.linear.linear_model import LinearModel, rates
 from bywire.analysis.linear.linearize import Friction
-from bywire.analysis.linear.plant import PLANTS, Plant, PlantPoint
 from bywire.analysis.locus import Locus, locus, locus_of
-from bywire.analysis.loop import LOOPS, Quantity
+from bywire.analysis.loop import LOOPS, PLANTS, Plant, PlantPoint, Quantity
 from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.margins import NO_LOOP
 from bywire.analysis.periodic import PeriodicModel, dithered_loop

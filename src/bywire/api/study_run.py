@@ -40,7 +40,7 @@ from bywire.bench import running
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import bench_text
 from bywire.bench.requirements import status_of
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.core.brake import loaded_files
 from bywire.core.callers import is_command_line
 from bywire.core.errors import FileError, InputError, ParameterError, unknown_name

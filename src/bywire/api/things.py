@@ -11,15 +11,13 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin
 import numpy as np
 
 from bywire.analysis.linear.corners import ABOVE, taking
-from bywire.analysis.linear.plant import PLANTS, Plant
-from bywire.analysis.loop import LOOPS, Loop
+from bywire.analysis.loop import LOOPS, PLANTS, Loop, Plant
 from bywire.bench.experiment import EXPERIMENTS, Case, Experiment
 from bywire.bench.faults.modes import Mode, modes_of
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
-from bywire.bench.kpis.registry import definitions
-from bywire.bench.stimuli.registry import STIMULI, StimulusKind
-from bywire.campaigns.declared import CAMPAIGNS, DeclaredCampaign
-from bywire.campaigns.residual import RESIDUALS, Residual
+from bywire.bench.kpis.families import definitions
+from bywire.bench.stimulus import STIMULI, StimulusKind
+from bywire.campaigns.residual import CAMPAIGNS, RESIDUALS, DeclaredCampaign, Residual
 from bywire.contracts.elements import Element, elements_by_name, every_element, parameter_classes
 from bywire.core.brake import brakes, loaded_files
 from bywire.core.catalog import PARAMETER_SETS, CitedSet, main_set

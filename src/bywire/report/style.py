@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis.samples import smoothed
 from bywire.core.quantities import display_unit
 from bywire.core.typing import Array
 from bywire.report.channel import COLUMNS, Channel, decimate

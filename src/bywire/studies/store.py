@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.bench.ensemble import changed
-from bywire.bench.side_by_side import key_figures_of
+from bywire.bench.ensemble import changed, key_figures_of
 from bywire.cases.store import PieceFolder
 from bywire.core.arguments import whole_number
 from bywire.core.brake import loaded_files

@@ -14,9 +14,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from bywire.bench.bench import Bench
+from bywire.bench.changes import OPTION, refuse_share_of_temperature, share_of
 from bywire.bench.ensemble import varied_choices, varied_leaf
-from bywire.bench.option_names import OPTION
-from bywire.bench.relative_changes import refuse_share_of_temperature, share_of
 from bywire.core.errors import FileError, InputError, ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.parameters import leaf_fields

@@ -116,7 +116,7 @@ def linearize(
     SolverError
         When the motion under dither does not repeat itself.
     """
-    from bywire.analysis.linear.plant import PLANTS
+    from bywire.analysis.loop import PLANTS
     from bywire.api.linearize import linear_loop_case, linearize_plant, linearized_loop, plant_locus
 
     if name in PLANTS.all():

@@ -35,13 +35,12 @@ from bywire.export.exported import (
 from bywire.export.model_header import braced, number
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.compiler import KERNEL_MATH, TIMEOUT, bundled_compiler
-from bywire.simulation.emission import leaf_count, unread
 from bywire.simulation.emit_rare import CUT, PROJECTION, rare_header, rare_results
 from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph, Node, Operation
-from bywire.simulation.layout import COUNTERS
 from bywire.simulation.run import sampled_stimulus
-from bywire.simulation.stages import STATE, Stages
+from bywire.simulation.schedule import COUNTERS
+from bywire.simulation.stages import STATE, Stages, leaf_count, unread
 
 OPERATIONS = (
     "add",
