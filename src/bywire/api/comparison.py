@@ -17,9 +17,10 @@ import xarray as xr
 from bywire.api.run import bench_of
 from bywire.bench import running
 from bywire.bench.bench import Bench
-from bywire.bench.bench_file import experiment_of, flattened, names_experiment
+from bywire.bench.bench_file import flattened, names_experiment
 from bywire.bench.changes import OPTION
 from bywire.bench.experiment import Experiment
+from bywire.bench.generic_experiment import experiment_of
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import is_result_folder, read_result, verdict_record
