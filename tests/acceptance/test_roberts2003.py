@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from bywire.brakes.wedge.paper.roberts2003 import PARTS, reproduce
-from bywire.brakes.wedge.paper.runs import parameters
+from bywire.brakes.wedge.paper.statements import parameters
 from bywire.reproduction.reproduction import Reproduction
 from undrawn import drawn_once, undrawn
 

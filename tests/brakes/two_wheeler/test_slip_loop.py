@@ -5,7 +5,7 @@ import pytest
 
 import bywire
 from bywire.analysis.linear.linearize import linearize
-from bywire.brakes.two_wheeler.loops.slip import point
+from bywire.brakes.two_wheeler.loops import point
 from bywire.control import slip_pi
 from bywire.plant import brake_disc
 

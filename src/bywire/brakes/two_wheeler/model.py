@@ -11,9 +11,8 @@ from bywire.core.model import Task
 from bywire.core.parts import Part
 from bywire.core.signals import zeros
 from bywire.plant import brake_disc, pressure_loop, road, road_wheel, wheel_encoder
-from bywire.vehicle.hot_brakes import HotBrakes, cold_start
 from bywire.vehicle.slip_remarks import far_from_peak
-from bywire.vehicle.two_wheeler import VehicleParameters, rolling_start
+from bywire.vehicle.two_wheeler import HotBrakes, VehicleParameters, cold_start, rolling_start
 
 Par = TwoWheelerParameters
 

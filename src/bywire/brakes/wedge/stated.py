@@ -5,6 +5,6 @@ Moments that are held, reached or followed have the tolerance by which they are 
 
 from __future__ import annotations
 
-from bywire.brakes.wedge.paper.facts import FILE
+from bywire.brakes.wedge.paper.statements import FILE
 
 LEVELS, FIGURES = FILE.levels(), FILE.figures()

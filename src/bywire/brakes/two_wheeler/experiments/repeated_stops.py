@@ -34,7 +34,7 @@ from bywire.core.typing import Array
 from bywire.plant import brake_disc, disc_heat
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import simulate
-from bywire.vehicle.hot_brakes import cold_start
+from bywire.vehicle.two_wheeler import cold_start
 
 # Stops of brakes that warm up, one after the other, and the ways between them.
 

@@ -19,8 +19,7 @@ from bywire.core.model import Task
 from bywire.core.parts import Part, Wire
 from bywire.core.subassembly import Sub
 from bywire.plant import brake_disc, pressure_loop, wheel_encoder
-from bywire.vehicle.hot_brakes import HotBrakes, cold_start
-from bywire.vehicle.two_wheeler import rolling_start
+from bywire.vehicle.two_wheeler import HotBrakes, cold_start, rolling_start
 
 Par = WholeRearParameters
 

@@ -17,11 +17,18 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi, Undefined
 from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.kpis.step_response import Setting
-from bywire.brakes.wedge.case import case_from_parked, mean, steps
+from bywire.brakes.wedge.case import (
+    FRICTIONLESS,
+    Coefficients,
+    case_from_parked,
+    mean,
+    steps,
+    tag,
+    with_friction,
+)
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.panels import COMPARED
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.series import FRICTIONLESS, Coefficients, tag, with_friction
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 

@@ -12,10 +12,9 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import case_from_parked, first, steps
+from bywire.brakes.wedge.case import along_disc, case_from_parked, first, steps
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rows import along_disc
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Unit
 

@@ -14,12 +14,18 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import case_from_parked, parameters_of
+from bywire.brakes.wedge.case import (
+    FRICTIONLESS,
+    Coefficients,
+    case_from_parked,
+    parameters_of,
+    tag,
+    with_friction,
+)
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.panels import COMPARED
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.series import FRICTIONLESS, Coefficients, tag, with_friction
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.core.typing import Array

@@ -16,8 +16,8 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.brakes.wedge.experiments import slow_rotation
-from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.rigs.rig_case import turned
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit

@@ -16,9 +16,9 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.brakes.wedge.experiments import run_down
-from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
+from bywire.brakes.wedge.rigs.rig_case import turned
+from bywire.brakes.wedge.rigs.shaft_rig import DrivenShaft
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit

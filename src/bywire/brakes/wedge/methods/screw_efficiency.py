@@ -12,16 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from bywire.brakes.wedge.experiments import load_sweep
-from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
+from bywire.brakes.wedge.experiments.screw_efficiency import LOAD_SWEEP
+from bywire.brakes.wedge.methods.force_calibration import (
     SIGNALS,
     SIMULATED,
     RigOptions,
     drive_sensors,
 )
-from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
+from bywire.brakes.wedge.rigs.rig_case import turned
+from bywire.brakes.wedge.rigs.shaft_rig import DrivenShaft
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.core.units import shown
@@ -263,8 +263,7 @@ def _curve(strokes_read: list[Stroke]) -> Curve:
 
 def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
     """Return the load sweep, simulated, with the sensors' noise."""
-    experiment = load_sweep.EXPERIMENT
-    case = experiment.cases(par, experiment.defaults, None)[0]
+    case = LOAD_SWEEP.cases(par, LOAD_SWEEP.defaults, None)[0]
     random = np.random.default_rng(seed)
     begun = turned(case, random.uniform(0.0, 2.0 * np.pi))
     return sensed(begun, drive_sensors(options), random)

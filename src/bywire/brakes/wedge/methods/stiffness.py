@@ -16,24 +16,21 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.brakes.wedge.experiments import force_cycle
-from bywire.brakes.wedge.methods.drive_train import cogging_waves, force_current
-from bywire.brakes.wedge.methods.drive_train.force_current import (
+from bywire.brakes.wedge.experiments.stiffness import FORCE_CYCLE, LABELS
+from bywire.brakes.wedge.methods import force_calibration
+from bywire.brakes.wedge.methods.force_calibration import (
+    SIGNALS,
+    SIMULATED,
     Reading,
+    RigOptions,
     Squeeze,
     branches,
+    drive_sensors,
     law,
     squeeze,
 )
-from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
-    SIGNALS,
-    SIMULATED,
-    RigOptions,
-    drive_sensors,
-)
-from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import slope_of
+from bywire.brakes.wedge.rigs.rig_case import slope_of, turned
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.data.labeled import over
@@ -57,9 +54,9 @@ MEANINGS: Mapping[str, tuple[str, str]] = {
     "zero_of_travel": ("m", "travel without force on the sensor, d_0"),
     "tips_touch": ("m", "travel at which the tips touch, d_c"),
     "free_play": ("m", "from there to where the wedge is pulled, d_c - d_t"),
-    **force_current.MEANINGS,
-    **cogging_waves.meanings("sensor"),
-    **cogging_waves.meanings("heart"),
+    **force_calibration.LAW_MEANINGS,
+    **force_calibration.cogging_meanings("sensor"),
+    **force_calibration.cogging_meanings("heart"),
     "travel_loop": ("m", "by how much the encoders stay behind the motion, h"),
 }
 """unknowns beside the stiffnesses -> SI unit and meaning"""
@@ -83,7 +80,7 @@ def started(par: WedgeParameters, sensor: Squeeze, heart: Squeeze, advice: str) 
     ParameterError
         When one of them is not reached.
     """
-    values = np.array([u.start for u in force_current.unknowns(par)])
+    values = np.array([u.start for u in force_calibration.law_unknowns(par)])
     friction = values[2]
     unknowns = []
     for way, what in ((1.0, "tip to tip"), (-1.0, "through the wedge")):
@@ -137,9 +134,9 @@ class TwoStages:
             Unknown("zero_of_travel", float(np.mean(self.sensor.d)), scale=play, unit="m"),
             Unknown("tips_touch", self.contacts.closed, scale=play, unit="m"),
             Unknown("free_play", play, low=0.0, scale=play, unit="m"),
-            *force_current.unknowns(self.par),
-            *cogging_waves.unknowns(self.par, "sensor"),
-            *cogging_waves.unknowns(self.par, "heart"),
+            *force_calibration.law_unknowns(self.par),
+            *force_calibration.cogging_unknowns(self.par, "sensor"),
+            *force_calibration.cogging_unknowns(self.par, "heart"),
             Unknown("travel_loop", 0.0, scale=1e-3 * play, unit="m"),
         )
 
@@ -272,7 +269,7 @@ def identify(
     Roberts et al. (2003), section "Drive train stiffnesses".
     """
     records = split(data)
-    for label in force_cycle.LABELS:
+    for label in LABELS:
         if label not in records:
             raise ParameterError(
                 f"the measurement has no record {label} (it has {_named(records)}): "
@@ -347,8 +344,7 @@ def _curve(stages: TwoStages, values: Array) -> Curve:
 
 def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Dataset:
     """Return both stages, simulated, with the sensors' noise; there is no force in the heart."""
-    experiment = force_cycle.EXPERIMENT
-    on_sensor, in_heart = experiment.cases(par, experiment.defaults, None)
+    on_sensor, in_heart = FORCE_CYCLE.cases(par, FORCE_CYCLE.defaults, None)
     random = np.random.default_rng(seed)
     sensors = drive_sensors(options)
     first = sensed(turned(on_sensor, random.uniform(0.0, 2.0 * np.pi)), sensors, random)
@@ -366,7 +362,7 @@ def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Datase
 
 def truth(par: WedgeParameters, options: RigOptions) -> dict[str, float]:
     """Return free-play and calibration that ``synthetic`` puts in."""
-    known = {u.label: u.start for u in force_current.unknowns(par)}
+    known = {u.label: u.start for u in force_calibration.law_unknowns(par)}
     heart = par.heart
     return {
         "free_play": heart.g_1 + heart.g_2 + heart.g_12,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import xarray as xr
 
-from bywire.brakes.wedge.case import parameters_of
-from bywire.brakes.wedge.paper.facts import FACTS
-from bywire.brakes.wedge.paper.runs import (
+from bywire.brakes.wedge.case import parameters_of, with_friction
+from bywire.brakes.wedge.paper.statements import (
+    FACTS,
     MAIN,
     WITHOUT_RUNOUT,
     parameters,
@@ -15,7 +15,6 @@ from bywire.brakes.wedge.paper.runs import (
     standby,
     tan_alpha,
 )
-from bywire.brakes.wedge.series import with_friction
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs, kpis

@@ -8,13 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bywire.analysis.linear.linearize import linearize
-from bywire.brakes.wedge.case import swing
-from bywire.brakes.wedge.figures.brake_factor import WedgeForces, brake_factor
-from bywire.brakes.wedge.model import WedgeBrake, state_at
-from bywire.brakes.wedge.paper.facts import ALLOWANCES, FACTS
-from bywire.brakes.wedge.paper.runs import IDEAL, MAIN, parameters, stacked, tan_alpha
-from bywire.brakes.wedge.series import tag, with_friction
-from bywire.brakes.wedge.start import memory_at, travel_for
+from bywire.brakes.wedge.case import swing, tag, with_friction
+from bywire.brakes.wedge.figures import WedgeForces, brake_factor
+from bywire.brakes.wedge.model import WedgeBrake, memory_at, state_at, travel_for
+from bywire.brakes.wedge.paper.statements import (
+    ALLOWANCES,
+    FACTS,
+    IDEAL,
+    MAIN,
+    parameters,
+    stacked,
+    tan_alpha,
+)
 from bywire.reproduction.item import Fact, Item, compared, found, reading
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs, kpis

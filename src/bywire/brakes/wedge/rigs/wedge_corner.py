@@ -11,17 +11,21 @@ from typing import Any, ClassVar, Self
 from bywire.brakes.wedge import control
 from bywire.brakes.wedge.elements import wedge_caliper
 from bywire.brakes.wedge.laws import moment_control
-from bywire.brakes.wedge.model import WedgeBrake, readings, state_at
+from bywire.brakes.wedge.model import WedgeBrake, memory_at, readings, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.start import memory_at
 from bywire.core import ops
 from bywire.core.model import Task
 from bywire.core.parts import Shown
 from bywire.core.signals import Role, joined
 from bywire.plant import flywheel, road, wheel_encoder
 from bywire.vehicle import corner_slip
-from bywire.vehicle.corner import WheelSpeed, rolling_states
-from bywire.vehicle.hot_corner import HotCorner, HotCornerParameters, warm_disc
+from bywire.vehicle.corner import (
+    HotCorner,
+    HotCornerParameters,
+    WheelSpeed,
+    rolling_states,
+    warm_disc,
+)
 from bywire.vehicle.slip_remarks import far_from_peak
 from bywire.vehicle.two_wheeler import BOOK
 

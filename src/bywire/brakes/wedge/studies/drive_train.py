@@ -13,9 +13,18 @@ import xarray as xr
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.sizing.design import Answer, Demand, answer
-from bywire.brakes.wedge.sizing.map import HELD, LATE, LEFT, mapped
-from bywire.brakes.wedge.sizing.options import ASSUMPTIONS, DEFAULTS, Options
+from bywire.brakes.wedge.sizing import (
+    ASSUMPTIONS,
+    DEFAULTS,
+    HELD,
+    LATE,
+    LEFT,
+    Answer,
+    Demand,
+    Options,
+    answer,
+    mapped,
+)
 from bywire.core.typing import Array, Progress
 from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, edge_warnings
 

@@ -14,11 +14,10 @@ from bywire.analysis.loop_figures import LoopFigures
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
-from bywire.brakes.wedge.linear import full, mechanical, rigid_rate
-from bywire.brakes.wedge.loops.moment import LOOP
+from bywire.brakes.wedge.loops import MOMENT_LOOP
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.sizing.design import redesigned
-from bywire.brakes.wedge.sizing.options import Count, Slope
+from bywire.brakes.wedge.plants import full, mechanical, rigid_rate
+from bywire.brakes.wedge.sizing import Count, Slope, redesigned
 from bywire.core.errors import InputError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
@@ -149,7 +148,7 @@ def controlled(par: WedgeParameters, moment: float) -> Controlled:
     All NaN where the brake cannot be held at the moment.
     """
     try:
-        gain, closed = LOOP.gain_and_closed(par, moment)
+        gain, closed = MOMENT_LOOP.gain_and_closed(par, moment)
     except InputError:
         return Controlled(math.nan, math.nan)
     if not closed.is_stable:
@@ -178,7 +177,7 @@ def moment_borders(
         When an operating point does not exist.
     """
     values = [float(value) for value in np.geomspace(*between, count)]
-    return locus(LOOP, par, moment, "wedge.mu_B", "1", values).borders
+    return locus(MOMENT_LOOP, par, moment, "wedge.mu_B", "1", values).borders
 
 
 Coefficient = Annotated[float, Unit("1", 0.4), Field(gt=0, le=5, allow_inf_nan=False)]

@@ -1,23 +1,33 @@
-"""What the figures of Roberts et al. (2003) share: the parameter set, and means over a turn."""
+"""What Roberts et al. (2003) state, and what all comparisons with it share."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import xarray as xr
 
+from bywire.brakes.wedge.case import FRICTIONLESS
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.panels import BRAKING
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.series import FRICTIONLESS
+from bywire.brakes.wedge.sets import roberts2003
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.report.time_traces import time_traces
+from bywire.reproduction.source_file import SourceFile
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+CITATION = roberts2003.FILE.citation
+FILE = SourceFile(Path(__file__).with_name("roberts2003.toml"))
+FACTS, ALLOWANCES = FILE.facts, FILE.allowances
+
+
+# --- What the figures share: the parameter set, and means over a turn
 
 MAIN = "roberts2003"
 

@@ -1,4 +1,4 @@
-"""One drive train of the wedge brake: what is demanded, how it answers, case by case of mu_B.
+"""Drive trains of the wedge brake: what each must do, how it answers, and many compared.
 
 A design is a slope of the wedge and a lead of the screws. Everything that follows from them is
 derived here, and the speeds of the reference are set so that every design answers equally fast.
@@ -7,22 +7,30 @@ derived here, and the speeds of the reference are set so that every design answe
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
 from bywire.bench.experiment import as_run
-from bywire.brakes.wedge.case import case_from_parked, steps
+from bywire.brakes.wedge.case import Coefficients, case_from_parked, steps
 from bywire.brakes.wedge.elements import wedge
+from bywire.brakes.wedge.laws.moment_control import SomeMoment, SpeedLimit
+from bywire.brakes.wedge.model import force_for, travel_for
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.start import force_for, travel_for
+from bywire.core.interrupts import thread_pool
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Length, Unit
 from bywire.core.typing import Array
+from bywire.data.labeled import Labeled, labeled
 from bywire.plant import roller_screw
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run
+from bywire.synthesis.study import require_ranges, variable
 
 Efficiency = Literal["friction-angle", "as-given"]
 """what stays of the screw over the lead: the friction angle, or the efficiency"""
@@ -308,3 +316,186 @@ class Answer:
     left: Array
     stop: Array
     unsettled: int
+
+
+# --- Many drive trains as a dataset
+
+LATE = 1.02
+"""share of the demanded time up to which a design answers equally fast"""
+HELD = 0.95
+"""share of the demand that counts as held"""
+LEFT = 0.05
+"""share of the demand below which the brake counts as released"""
+_NEVER = 10.0  # what stands for the lateness of a moment that is never reached
+
+_PER_CASE = {
+    "t_90": ("s", "time to 90 % of the demand"),
+    "filtered": ("W", "largest power, filtered"),
+    "instantaneous": ("W", "largest power"),
+    "release": ("W", "largest power of the release, filtered"),
+    "current": ("A", "largest current demand"),
+    "speed": ("rad/s", "largest motor speed"),
+    "copper": ("J", "copper loss"),
+    "friction": ("J", "friction of bearings and screws"),
+    "held": ("N*m", "mean moment at the end of the stop"),
+    "left": ("N*m", "moment left at the end"),
+    "stop": ("N", "force on the end stops"),
+}
+
+
+def mapped(
+    par: WedgeParameters,
+    demand: Demand,
+    slopes: Array,
+    leads: Array,
+    progress: Callable[[float], None] = lambda share: None,
+    efficiency: Efficiency = "friction-angle",
+) -> xr.Dataset:
+    """Return what all designs on a grid do; on all cores, stopped by an interrupt.
+
+    ``slopes``, ``leads``: slopes of the wedge, shape (n,), and leads of the screws [m], shape (m,);
+    ``progress``: called with the finished share, 0 to 1; ``efficiency``: see `redesigned`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``tan_alpha``, ``lead`` and ``mu_B``. Per case the fields of `Answer`; per
+        design ``closing_speed``, ``lateness`` (slowest time over the demanded one), ``infeasible``
+        (0 or 1), and ``worst_filtered`` and ``worst_instantaneous``, NaN where infeasible, with
+        ``mu_B_filtered`` and ``mu_B_instantaneous``, where each occurs.
+    """
+    designs = [(float(a), float(b)) for a in slopes for b in leads]
+    answers: list[Answer] = []
+    with thread_pool() as pool:
+        every = pool.map(
+            lambda design: answer(redesigned(par, design[0], design[1], efficiency), demand),
+            designs,
+        )
+        for k, judged in enumerate(every):
+            answers.append(judged)
+            progress((k + 1) / len(designs))
+    axes = {
+        "tan_alpha": (slopes, "1", "slope of the wedge"),
+        "lead": (leads, "m", "lead of the screws"),
+        "mu_B": (np.asarray(demand.mu_B), "1", "friction coefficient of the pads"),
+    }
+    return _dataset(answers, demand, axes)
+
+
+def _dataset(answers: Sequence[Answer], demand: Demand, axes: Mapping[str, Labeled]) -> xr.Dataset:
+    plane, shape = ("tan_alpha", "lead"), [len(each[0]) for each in axes.values()]
+    cases = {
+        name: np.array([getattr(each, name) for each in answers]).reshape(shape)
+        for name in _PER_CASE
+    }
+    data = labeled(axes, {name: (cases[name], *_PER_CASE[name]) for name in _PER_CASE})
+    slowest = cases["t_90"].max(axis=2)  # NaN where one case never gets there
+    lateness = np.where(np.isnan(slowest), _NEVER, slowest / demand.t_90)
+    in_time = (lateness <= LATE) if demand.enforced else (lateness < _NEVER)
+    holds = cases["held"].min(axis=2) >= HELD * demand.moment
+    released = cases["left"].max(axis=2) <= LEFT * demand.moment
+    feasible = in_time & holds & released & (cases["stop"].max(axis=2) == 0.0)
+    speeds = np.array([each.closing_speed for each in answers]).reshape(shape[:2])
+    data["closing_speed"] = variable(speeds, plane, "m/s", "closing speed of the pads")
+    data["lateness"] = variable(lateness, plane, "1", "slowest time over the demanded time")
+    data["infeasible"] = variable(1.0 - feasible, plane, "1", "late, not held, or at a stop")
+    for name in ("filtered", "instantaneous"):
+        worst = np.where(feasible, cases[name].max(axis=2), np.nan)
+        mu_B = np.asarray(demand.mu_B)[cases[name].argmax(axis=2)]
+        label = f"largest {name} power, worst mu_B"
+        data[f"worst_{name}"] = variable(worst, plane, "W", label)
+        data[f"mu_B_{name}"] = variable(mu_B, plane, "1", "worst friction coefficient")
+    data.attrs["unsettled_substeps"] = sum(each.unsettled for each in answers)
+    return data
+
+
+# --- Options
+
+Slope = Annotated[float, Unit("1", 0.3), Field(gt=0, le=2, allow_inf_nan=False)]
+Count = Annotated[int, Unit("1", 11.0), Field(ge=3, le=101)]
+
+ASSUMPTIONS = (
+    "The wedge's slope and the screws' lead vary; motors, drives, bearings, stiffnesses, clearance "
+    "and the travel that preloads the screws stay.",
+    "The screws' friction angle stays, so that their efficiency grows with the lead and a small "
+    "lead locks itself; with efficiency 'as-given' the efficiency stays.",
+    "The controllers know the design: travel per shaft angle and moment per angle follow it.",
+    "Equal response: all speeds and accelerations of the reference are scaled so that the pads "
+    "close equally fast; with response 'enforced' they get a common factor, the smallest at which "
+    "the sensor shows 90 % of the demand in time at every friction coefficient.",
+    "Bandwidths stay: those of the position loops on the shaft, the crossover of the moment loop.",
+    "The end stops of the wedge stand where the pads have traveled as far as before.",
+    "Infeasible are designs that at any coefficient are more than 2 % late (where the response is "
+    "enforced), do not hold 95 % of the demand, do not release, or press on an end stop.",
+    "Power counts at the drives' input, standby included, in build-up and hold, and in the release "
+    "where that is asked for.",
+    "Each case runs with the disc at four angles, a quarter turn apart, and the worst counts: "
+    "where the run-out meets the stop is chance, and holding the moment against it takes power.",
+)
+
+
+class Options(ParameterSet):
+    """The stop, the friction coefficients, and the designs to compare."""
+
+    moment: SomeMoment
+    """moment demanded in one step"""
+    t_90: Duration
+    """time in which the sensor must show 90 % of it"""
+    t_hold: Duration
+    """length of the demand"""
+    t_release: Duration
+    """time in which the brake must release after it"""
+    counted: Literal["build-up-and-hold", "whole-pulse"]
+    """whether the power of the release counts too"""
+    omega_gap: SpeedLimit
+    """largest speed of the given drive train while crossing the gap, scaled with all others"""
+    mu_B: Coefficients
+    """friction coefficients of the pads; the worst counts"""
+    believed: Literal["known", "as-given"]
+    """whether the moment controller knows them, or believes in that of the parameter set"""
+    response: Literal["enforced", "as-scaled"]
+    """whether the time is enforced, or the pads close as fast as with the given drive train"""
+    efficiency: Efficiency
+    """what stays of the screw over the lead: its friction angle, or its efficiency"""
+    power: Literal["filtered", "instantaneous"]
+    """which power is minimized: as the rig measures it, or as it is"""
+    tan_alpha_min: Slope
+    """smallest slope of the wedge"""
+    tan_alpha_max: Slope
+    """largest slope of the wedge"""
+    slopes: Count
+    """number of slopes"""
+    lead_min: Length
+    """smallest lead of the screws"""
+    lead_max: Length
+    """largest lead of the screws"""
+    leads: Count
+    """number of leads"""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Options:
+        slopes, leads = ("tan_alpha_min", "tan_alpha_max", "1"), ("lead_min", "lead_max", "m")
+        require_ranges(self, (slopes, leads, ("t_90", "t_hold", "s")))
+        return self
+
+
+DEFAULTS = Options(
+    moment=950.0,
+    t_90=0.1,
+    t_hold=0.2,
+    t_release=0.2,
+    counted="build-up-and-hold",
+    omega_gap=60.0,
+    mu_B=(0.25, 0.3, 0.35, 0.4, 0.45),
+    believed="known",
+    response="enforced",
+    efficiency="friction-angle",
+    power="filtered",
+    tan_alpha_min=0.2,
+    tan_alpha_max=0.45,
+    slopes=11,
+    lead_min=1e-3,
+    lead_max=8e-3,
+    leads=15,
+)
+"""the pulse of Fig. 9 in Roberts et al. (2003), around the catalog's design"""
