@@ -15,7 +15,7 @@ from bywire.core.parts import Integral, Part, Shown, Wire
 from bywire.core.quantities import Length
 from bywire.core.signals import Role
 from bywire.plant import corner_body, disc_heat, road, tyre
-from bywire.vehicle.two_wheeler import BOOK, shown_slip
+from bywire.vehicle.two_wheeler import BOOK, HEAT_BOOK, heat_sink, shown_slip
 
 
 class CornerParameters(ParameterSet):
@@ -33,10 +33,6 @@ class WheelSpeed(NamedTuple):
 
     x: float
     xe: float
-
-
-def _sink(label: str) -> Role:
-    return Role("sink", label, book=BOOK)
 
 
 class Corner(Assembly[ParT, MemoryT]):
@@ -109,17 +105,11 @@ def rolling_states(v: float) -> dict[str, Any]:
 # friction of its pads follow `pads_friction`, and says in ``brake_torque`` what its brake can
 # hold.
 
-_HEAT = "heat"
-
 
 class HotCornerParameters(CornerParameters):
     """A corner whose brake may warm up."""
 
     heat: disc_heat.Parameters
-
-
-def _heat_sink(label: str) -> Role:
-    return Role("sink", label, book=_HEAT, returns="any")
 
 
 class HotCorner(Corner[ParT, MemoryT]):
@@ -130,11 +120,11 @@ class HotCorner(Corner[ParT, MemoryT]):
     )
 
     E_friction = Shown(
-        "J", "friction of the brake that warms up", role=Role("source", "brake", book=_HEAT)
+        "J", "friction of the brake that warms up", role=Role("source", "brake", book=HEAT_BOOK)
     )
-    E_discs = Shown("J", "heat in the disc", role=_heat_sink("disc"))
-    E_pads = Shown("J", "heat in the pads", role=_heat_sink("pads"))
-    E_fluid = Shown("J", "heat in the caliper", role=_heat_sink("caliper"))
+    E_discs = Shown("J", "heat in the disc", role=heat_sink("disc"))
+    E_pads = Shown("J", "heat in the pads", role=heat_sink("pads"))
+    E_fluid = Shown("J", "heat in the caliper", role=heat_sink("caliper"))
     E_brake = Shown(
         "J",
         "energy that the brake takes from the wheel",

@@ -225,12 +225,13 @@ def _resistances(w: Any) -> tuple[tuple[float, float], tuple[float, float]]:
 # ``rear.heat``, and says in ``cold_torques`` what its brakes hold when cold. Each wheel's brake
 # may stay cold (``front.heat.law = "off"``): nothing is then computed of its heat.
 
-_HEAT = "heat"
+HEAT_BOOK = "heat"
 _SLOW = disc_heat.State._fields
 
 
-def _heat_sink(label: str) -> Role:
-    return Role("sink", label, book=_HEAT, returns="any")
+def heat_sink(label: str) -> Role:
+    """Return the role of a body that holds heat."""
+    return Role("sink", label, book=HEAT_BOOK, returns="any")
 
 
 class HotBrakes(TwoWheeler[ParT, MemoryT]):
@@ -244,11 +245,11 @@ class HotBrakes(TwoWheeler[ParT, MemoryT]):
     )
 
     E_friction = Shown(
-        "J", "friction of the brakes that warm up", role=Role("source", "brakes", book=_HEAT)
+        "J", "friction of the brakes that warm up", role=Role("source", "brakes", book=HEAT_BOOK)
     )
-    E_discs = Shown("J", "heat in the discs", role=_heat_sink("discs"))
-    E_pads = Shown("J", "heat in the pads", role=_heat_sink("pads"))
-    E_fluid = Shown("J", "heat in calipers and fluid", role=_heat_sink("calipers and fluid"))
+    E_discs = Shown("J", "heat in the discs", role=heat_sink("discs"))
+    E_pads = Shown("J", "heat in the pads", role=heat_sink("pads"))
+    E_fluid = Shown("J", "heat in calipers and fluid", role=heat_sink("calipers and fluid"))
 
     def cold_torques(self, w: Self) -> tuple[float, float]:
         """Return what the front and the rear brake can hold when cold [N m], >= 0."""

@@ -1,4 +1,4 @@
-"""What the wedge brake's experiments share: parked starts, readings, key figures of braking."""
+"""Shared parts of the wedge brake's experiments: parked starts, readings, figures of braking."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ BRAKING = Figures(
     peak_power_filtered=("W", "Largest power at the drives' input, as the rig measures it."),
     peak_normal_force=("N", "Largest normal force."),
     caliper_energy=("J", "Largest energy of the caliper before the demand changes."),
-    disc_share=("%", "Work of the disc on the wedge until then, over that energy."),
-    rate_limited=("%", "Share of the time until the demand changes on the software rate limit."),
+    disc_share=("%", "Share of that energy supplied by the disc (self-reinforcement)."),
+    rate_limited=("%", "Share of the time on the software rate limit, until the demand changes."),
     peak_speed=("rad/s", "Largest speed of motor 1."),
     energy_in=("J", "Energy at the drives' input, standby included."),
     energy_braked=("J", "Energy taken from the disc."),
-    energy_left=("J", "Largest residual of the energy balance: the step's error."),
-    undefined="the level is never reached in time",
+    energy_left=("J", "Largest residual of the energy balance: the numerical error."),
+    undefined="the signal does not reach the level in this time",
 )
 """key figures of :func:`braking`"""
 
@@ -117,9 +117,9 @@ def _contact(held: xr.Dataset) -> float:
 
 def parameters_of(run: xr.Dataset) -> WedgeParameters:
     """Return the parameters with which a recording was made."""
-    known = getattr(run, "par", None)  # of plain rows
-    if isinstance(known, WedgeParameters):
-        return known
+    par = getattr(run, "par", None)  # plain rows carry them
+    if isinstance(par, WedgeParameters):
+        return par
     return WedgeParameters.model_validate_json(run.attrs["parameters"])
 
 
@@ -129,7 +129,7 @@ def clearance(x: float, par: WedgeParameters) -> float:
 
 
 def release_time(run: xr.Dataset, begin: float, name: str = "release_time") -> Kpi:
-    """Return the time from the end of the demand [s] until the pads leave the disc for good."""
+    """Return the time from the end of the demand [s] until the pads finally leave the disc."""
     after = run.sel(time=slice(begin - 1e-9, None))
     pressing = np.flatnonzero(after["F_N"].values > 0)
     value, note = math.nan, ""
@@ -149,7 +149,7 @@ def parking_time(run: xr.Dataset, begin: float, name: str = "parking_time") -> K
     """Return the time from the end of the demand [s] until the brake is parked."""
     after = run.sel(time=slice(begin - 1e-9, None))
     parked = np.flatnonzero(after["mode"].values == PARKED)
-    value, note = math.nan, "not parked until the end of the recording"
+    value, note = math.nan, "the brake is not parked when the recording ends"
     if parked.size:
         value, note = float(after["time"].values[parked[0]]) - begin, ""
     return Kpi(name, value, "s", "Time from the end of the demand until the brake is parked.", note)
@@ -183,7 +183,7 @@ def _gained(run: xr.Dataset, name: str) -> float:
     return float(run[name].values[-1] - run[name].values[0])
 
 
-# --- How recordings are read: the disc's direction, its revolutions, their rows
+# --- Reading recordings: the disc's direction, its revolutions, their rows
 
 
 def along_disc(run: xr.Dataset) -> xr.Dataset:
@@ -209,20 +209,20 @@ def too_coarse(run: xr.Dataset, begin: float, end: float, rows: int = 1) -> str:
     Parameters
     ----------
     rows
-        Least number of rows in that time; a revolution of the disc takes five, or the run-out's
-        oscillation would be taken for something else.
+        Least number of rows in that time. A revolution of the disc takes five: fewer would
+        alias the run-out's oscillation.
     """
     t = run["time"].values
     apart = float(np.diff(t).max()) if t.size > 1 else math.inf
     speed = float(np.abs(run["Omega"].values).max())
     fifth = 0.4 * math.pi / speed if speed > 0 else math.inf
     inside = np.count_nonzero((t >= begin - 1e-9) & (t <= end + 1e-9))
-    if inside >= rows and apart <= 1.05 * fifth:  # what the message says is rounded
+    if inside >= rows and apart <= 1.05 * fifth:  # the message rounds the interval
         return ""
-    wanted = min((end - begin) / rows, fifth)
+    interval = min((end - begin) / rows, fifth)
     return (
         f"rows {apart:.3g} s apart are too few between t = {begin:.4g} s and {end:.4g} s: "
-        f"record every {wanted:.2g} s or more often"
+        f"record every {interval:.2g} s or more often"
     )
 
 
@@ -248,7 +248,7 @@ def _distinct(values: tuple[float, ...]) -> tuple[float, ...]:
     tags = [tag(value) for value in values]
     for k, value in enumerate(values):
         if tags[k] in tags[:k]:
-            raise ValueError(f"{value:g} stands there twice: leave one out")
+            raise ValueError(f"{value:g} is given twice: leave one out")
     return values
 
 
@@ -263,7 +263,7 @@ Coefficients = Annotated[
 
 
 def tag(mu_B: float) -> str:
-    """Return what labels and names of key figures call a friction coefficient.
+    """Return the name of a friction coefficient in labels and key figures.
 
     Examples
     --------
@@ -279,8 +279,8 @@ def with_friction(par: WedgeParameters, mu_B: float, known: bool) -> dict[str, A
     Parameters
     ----------
     known
-        Whether the moment controller believes in the slope that goes with it; else it keeps its
-        own. Its slope keeps its ratio to the brake's, so that a mismatch stays one.
+        Whether the moment controller knows the coefficient and assumes the slope that belongs to
+        it. That slope keeps its ratio to the brake's, so that a mismatch remains.
     """
     slope = par.control.moment.slope_hat
     if known and par.wedge.mu_B > 0:

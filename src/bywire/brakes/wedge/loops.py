@@ -14,12 +14,13 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.screw_rig import ScrewRig, screws_compliance
 from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
 from bywire.core import ops
-from bywire.core.errors import ParameterError
+from bywire.core.errors import InputError, not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 from bywire.plant import current_drive, force_sensor, roller_screw, servo_motor
 
 Causes = Mapping[str, Mapping[str, Any]]
+"""causes of nonlinearity: name -> parameters without it"""
 
 _SCREWS: Causes = {
     "bearing friction": {
@@ -36,7 +37,7 @@ _MOTORS: Causes = {
 }
 
 DRIVE_TRAIN: Causes = {**_SCREWS, **_MOTORS}
-"""cause -> parameters without it: motors and screws on a rig"""
+"""causes in motors and screws on a rig"""
 
 CAUSES: Causes = {
     **_SCREWS,
@@ -44,7 +45,7 @@ CAUSES: Causes = {
     **_MOTORS,
     "run-out, disc slowing": {"flywheel.runout": 0.0, "flywheel.law": "driven"},
 }
-"""the same of the whole brake"""
+"""causes in the whole brake"""
 
 DRIVE_LIMITS = (
     Saturation("sat_current", ("i_1_ref", "i_2_ref"), ("control.position.i_max", "drive.i_max")),
@@ -52,9 +53,24 @@ DRIVE_LIMITS = (
 """current demand of a drive at the controller's or at its own limit"""
 
 
+def beyond(name: str, value: str, need: str, limit: str) -> InputError:
+    """Build the error of an operating point that needs more than a limit gives.
+
+    Parameters
+    ----------
+    name, value
+        Quantity that gives the operating point, and its value with its unit.
+    need
+        What the brake would need, with its unit.
+    limit
+        Parameter that limits it, with its value.
+    """
+    return not_valid(name, value, f"small enough for {limit}", f"and needs {need}")
+
+
 # --- Current loop of the drives, the shaft clamped
 
-_SAMPLE = 20e-6  # of the demand [s], which an analog drive takes as it comes
+_SAMPLE = 20e-6  # sample time of the demand [s]; an analog drive takes it without sampling
 _STEP = 5e-6  # substep [s]
 
 
@@ -104,10 +120,8 @@ def _require_current(value: float, par: WedgeParameters) -> None:
     )
     for name, need, most, unit in limits:
         if not need < most:
-            raise ParameterError(
-                f"current = {value:g} A needs {need:.4g} {unit}: it must be below {name} = "
-                f"{most:g} {unit}; ask for less"
-            )
+            needed, limit = f"{need:.4g} {unit}", f"{name} = {most:g} {unit}"
+            raise beyond("current", f"{value:g} A", needed, limit)
 
 
 DRIVE_CURRENT_LOOP = Loop(
@@ -134,14 +148,14 @@ DRIVE_CURRENT_LOOP = Loop(
 
 MOMENT = Quantity("moment", "N*m", 200.0)
 COUNTED = ", counted against the disc's rotation whatever its direction"
-"""what is said of a moment that is not positive"""
+"""remark on a moment that is not positive"""
 
 
 def moment_point(par: ParameterSet, value: float) -> Point:
     """Return the brake that holds a moment [N m].
 
     Screws and references stand where the wedge is in balance: the actuation force presses both
-    contacts of the heart, and the currents carry it.
+    contacts of the heart, and the currents hold it.
 
     Raises
     ------
@@ -169,27 +183,22 @@ def moment_point(par: ParameterSet, value: float) -> Point:
 def _require_braking(value: float, par: WedgeParameters) -> None:
     MOMENT.require_positive(value, COUNTED)
     if not ops.is_symbol(par.flywheel.Omega_0) and par.flywheel.Omega_0 == 0.0:
-        raise ParameterError(
-            "flywheel.Omega_0 = 0 rad/s: a standing disc has no braking moment to control; set it "
-            "to the speed at which the loop works"
-        )
+        speed, advice = "the speed at which the loop works", "as a standing disc gives no moment"
+        raise not_valid("flywheel.Omega_0", "0 rad/s", speed, advice)
 
 
 def _require_travel_and_current(value: float, x: float, par: WedgeParameters) -> None:
     if ops.is_symbol(x):
         return
+    moment = f"{value:g} N*m"
     if not x < par.wedge.x_stop:
-        raise ParameterError(
-            f"moment = {value:g} N*m needs {x * 1e3:.3g} mm of wedge travel: it must be below "
-            f"wedge.x_stop = {par.wedge.x_stop * 1e3:g} mm; ask for less"
-        )
+        limit = f"wedge.x_stop = {par.wedge.x_stop * 1e3:g} mm"
+        raise beyond("moment", moment, f"{x * 1e3:.3g} mm of wedge travel", limit)
     force = abs(wedge.slope(par.wedge) - par.wedge.mu_B) * force_for(value, par)
     i = 0.5 * force * roller_screw.slope(par.screw) / par.motor_1.K_ref
     if i > par.drive.i_max:
-        raise ParameterError(
-            f"moment = {value:g} N*m needs {i:.3g} A in each motor even without friction: "
-            f"drive.i_max = {par.drive.i_max:g} A"
-        )
+        needed = f"{i:.3g} A in each motor even without friction"
+        raise beyond("moment", moment, needed, f"drive.i_max = {par.drive.i_max:g} A")
 
 
 MOMENT_LOOP = Loop(
@@ -204,7 +213,7 @@ MOMENT_LOOP = Loop(
     causes=CAUSES,
     band=(0.5, 100.0),
     amplitudes=(0.5, 20.0),
-    # The law knows f_c over slope_hat alone: one of them is enough.
+    # The law depends on f_c over slope_hat alone: one of them is enough.
     tunables={"control.moment.f_c": (0.3, 60.0)},
     sustained=CAUSES["run-out, disc slowing"],
     proof="moment-pulses",
@@ -222,7 +231,7 @@ TUNABLES: Mapping[str, tuple[float, float]] = {
     "control.position.zeta": (0.2, 4.0),
     "control.position.c": (0.0, 1.0),
 }
-"""gains of the law -> lowest and highest worth a try"""
+"""gains of the law -> lowest and highest values worth trying"""
 
 
 def two_motor_loop(
@@ -267,10 +276,8 @@ def position_point(par: ParameterSet, value: float) -> Point:
     closed = cast(WedgeParameters, par.replace({"command.mode": "position"}))
     free = min(travel_for(0.0, closed), closed.wedge.x_stop)
     if not abs(value) < free:
-        raise ParameterError(
-            f"wedge travel = {value * 1e3:g} mm is out of the clearance: it must be between "
-            f"{-free * 1e3:.3g} and {free * 1e3:.3g} mm"
-        )
+        valid = f"between {-free * 1e3:.3g} and {free * 1e3:.3g} mm"
+        raise not_valid("wedge travel", f"{value * 1e3:g} mm", valid, "within the clearance")
     memory = memory_at(value, closed)
     stimulus = zeros(WedgeBrake.Stimulus)._replace(
         theta_1_set=memory.theta_1_ref, theta_2_set=memory.theta_2_ref
@@ -328,8 +335,8 @@ SCREW_POSITION_LOOP = Loop(
 def force_point(par: ParameterSet, value: float) -> Point:
     """Return both motors in position control, at rest with a force [N] between their screws.
 
-    Both stand half the compression off the middle. The controllers have no integral part: the
-    references lie further off, by what the holding currents need.
+    Each stands half the compression away from the middle. The controllers have no integral part:
+    the references lie further away, by the angle errors that give the holding currents.
 
     Raises
     ------
@@ -378,10 +385,8 @@ def _require_force(value: float, demand: float, par: WedgeParameters) -> None:
     limits = {"control.position.i_max": par.control.position.i_max, "drive.i_max": par.drive.i_max}
     name, most = min(limits.items(), key=lambda limit: limit[1])
     if not demand < most:
-        raise ParameterError(
-            f"force = {value:g} N needs {demand:.3g} A even without friction: it must be below "
-            f"{name} = {most:g} A; ask for less"
-        )
+        needed = f"{demand:.3g} A even without friction"
+        raise beyond("force", f"{value:g} N", needed, f"{name} = {most:g} A")
 
 
 _FORCE = Quantity("force", "N", 0.0)
@@ -398,7 +403,7 @@ FORCE_FIGHT = two_motor_loop(
 FORCE_AGAINST = Loop(
     name="force-against",
     assembly="wedge-brake",
-    summary="force between two motors, one shaken against the other that holds, 5 kHz",
+    summary="force between two motors, one excited against the other that holds, 5 kHz",
     at=_FORCE,
     inputs=("theta_1_set",),
     output="F",
@@ -409,5 +414,5 @@ FORCE_AGAINST = Loop(
     amplitudes=(1e-3, 0.05, 0.1, 0.2),
     tunables=TUNABLES,
     saturations=DRIVE_LIMITS,
-    single=False,  # the force answers, the angle is controlled
+    single=False,  # the output is the force, but the angle is controlled
 )

@@ -1,4 +1,4 @@
-"""Parameters of the wedge brake and its rigs: one group per element, the controllers' apart."""
+"""Parameters of the wedge brake and its rigs: one group per element, and the controllers'."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ class RigParameters(ParameterSet):
     """Fixtures and operating modes of the rigs; the assembled brake does not have them."""
 
     mode_1: Literal["position", "current"]
-    """what the operator commands of motor 1"""
+    """quantity that the operator commands of motor 1"""
     mode_2: Literal["position", "current"]
-    """what the operator commands of motor 2"""
+    """quantity that the operator commands of motor 2"""
     load: Literal["dummy", "screw"]
-    """what hangs on a single motor: a solid dummy shaft, or a preloaded screw"""
+    """load of a single motor: a solid dummy shaft, or a preloaded screw"""
     clamp: Literal["open", "closed"]
     """whether a single motor's shaft is clamped"""
     J_dummy: Inertia
@@ -56,14 +56,14 @@ def dummy_inertia(par: RigParameters) -> float:
 
 
 class CommandParameters(ParameterSet):
-    """What the stimulus commands.
+    """Quantity that the stimulus commands.
 
     ``moment`` closes moment and position loops; ``position`` gives each motor's position loop its
     reference; ``current`` gives each drive its current demand.
     """
 
     mode: Literal["moment", "position", "current"]
-    """what the stimulus commands"""
+    """quantity that the stimulus commands"""
 
 
 class ControlParameters(ParameterSet):
@@ -109,6 +109,6 @@ class WedgeParameters(ParameterSet):
         if self.adjuster.law != "none" and abs(T / slow - round(T / slow)) > 1e-6:
             raise ValueError(
                 f"control.adjuster.T_adjust = {T:g} s must be a whole number of "
-                f"control.T_slow = {slow:g} s: the moment control follows what turns in a sample"
+                f"control.T_slow = {slow:g} s: the moment control follows the adjuster's turns"
             )
         return self

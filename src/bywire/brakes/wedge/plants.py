@@ -15,10 +15,10 @@ from bywire.analysis.loop import Point, Quantity
 from bywire.analysis.reduction import residualized
 from bywire.brakes.wedge.control import Stimulus
 from bywire.brakes.wedge.elements import wedge
-from bywire.brakes.wedge.loops import COUNTED, MOMENT
+from bywire.brakes.wedge.loops import COUNTED, MOMENT, beyond
 from bywire.brakes.wedge.model import WedgeBrake, force_for, memory_at, state_at, travel_for
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.core.errors import ParameterError
+from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 from bywire.plant import roller_screw, servo_motor
@@ -35,7 +35,8 @@ SMOOTH: dict[str, Any] = {
     "flywheel.runout": 0.0,
     "flywheel.law": "driven",
 }
-"""what a linear model leaves out: torques and travels that alternate within small motions"""
+"""parameters without the torques and travels that alternate within small motions, which a linear
+model leaves out"""
 _FREE = 1e3
 _RECORDING = ("phi", "y_P")  # states that are only shown
 
@@ -61,14 +62,12 @@ def point(par: Par, F_N: float, speed: float = 0.0) -> Point:
     smooth = par.replace({**SMOOTH, "command.mode": "current"})
     x = travel_for(F_N, smooth)
     if not F_N > 0.0:
-        raise ParameterError(f"normal force = {F_N:g} N is no operating point: it must be > 0 N")
+        raise not_valid("normal force", f"{F_N:g} N", "> 0 N")
     if not x < smooth.wedge.x_stop:
-        raise ParameterError(
-            f"normal force = {F_N:g} N needs {x * 1e3:.3g} mm of wedge travel: it must be below "
-            f"wedge.x_stop = {smooth.wedge.x_stop * 1e3:g} mm; ask for less"
-        )
+        limit = f"wedge.x_stop = {smooth.wedge.x_stop * 1e3:g} mm"
+        raise beyond("normal force", f"{F_N:g} N", f"{x * 1e3:.3g} mm of wedge travel", limit)
     turning = -1.0 if smooth.flywheel.Omega_0 < 0.0 else 1.0
-    # Beyond the limit the drives do not answer: the search is for what would be needed.
+    # Beyond the limit the drives do not respond: the search finds the currents that it would take.
     free = smooth.replace({"drive.i_max": _FREE * smooth.drive.i_max})
     state, memory = equilibrium(
         WedgeBrake(),
@@ -82,10 +81,9 @@ def point(par: Par, F_N: float, speed: float = 0.0) -> Point:
     )
     most = max(abs(getattr(memory, name)) for name in INPUTS)
     if most > smooth.drive.i_max:
-        raise ParameterError(
-            f"normal force = {F_N:g} N needs {most:.3g} A in a motor even without friction: "
-            f"drive.i_max = {smooth.drive.i_max:g} A; ask for less"
-        )
+        needed = f"{most:.3g} A in a motor even without friction"
+        limit = f"drive.i_max = {smooth.drive.i_max:g} A"
+        raise beyond("normal force", f"{F_N:g} N", needed, limit)
     moving = turning * speed
     state = state._replace(
         omega_1=moving, omega_2=moving, v=moving * roller_screw.slope(smooth.screw)
@@ -105,12 +103,9 @@ def force_for_current(i: float, par: Par) -> float:
     need = tan - mu_B if par.flywheel.Omega_0 else tan
     per = 2.0 * par.motor_1.K_ref / roller_screw.slope(par.screw)
     if need == 0.0 or not i / need > 0.0:
-        raise ParameterError(
-            f"current = {i:g} A is no operating point: tan(alpha) - mu_B = {need:.3g}, so that "
-            "the holding current is "
-            + ("zero at every force" if need == 0.0 else f"{'>' if need > 0 else '<'} 0 A")
-            + "; give the normal force or the moment"
-        )
+        valid = "0 A at every force" if need == 0.0 else f"{'>' if need > 0 else '<'} 0 A"
+        advice = f"as tan(alpha) - mu_B = {need:.3g}; give the normal force or the moment"
+        raise not_valid("current", f"{i:g} A", valid, advice)
     return per * i / need
 
 
@@ -230,7 +225,7 @@ _AT = (MOMENT, _FORCE, _CURRENT)
 
 
 def whole(par: ParameterSet, at: PlantPoint) -> LinearModel:
-    """Return the whole plant at an operating point, see `bywire.brakes.wedge.plants.full`.
+    """Return the whole plant at an operating point, see `full`.
 
     Raises
     ------
@@ -240,10 +235,8 @@ def whole(par: ParameterSet, at: PlantPoint) -> LinearModel:
     brake = cast(WedgeParameters, par)
     if at.quantity is _CURRENT:
         if not abs(at.value) < brake.drive.i_max:
-            raise ParameterError(
-                f"current = {at.value:g} A is not valid: its size must be < drive.i_max = "
-                f"{brake.drive.i_max:g} A"
-            )
+            valid = f"smaller in magnitude than drive.i_max = {brake.drive.i_max:g} A"
+            raise not_valid("current", f"{at.value:g} A", valid)
         F_N = force_for_current(at.value, brake)
     elif at.quantity is MOMENT:
         at.quantity.require_positive(at.value, COUNTED)
@@ -255,7 +248,7 @@ def whole(par: ParameterSet, at: PlantPoint) -> LinearModel:
 
 
 def mechanical_model(par: ParameterSet, at: PlantPoint) -> LinearModel:
-    """Return six states, with what the drives add to the rotors' inertia."""
+    """Return six states, with the inertia that the drives seem to add to the rotors."""
     return mechanical(whole(par, at), corrected=True)
 
 

@@ -14,23 +14,114 @@ from typing import Annotated, Literal
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from bywire.bench.experiment import as_run
-from bywire.brakes.wedge.case import Coefficients, case_from_parked, steps
+from bywire.brakes.wedge.case import case_from_parked, steps
 from bywire.brakes.wedge.elements import wedge
-from bywire.brakes.wedge.laws.moment_control import SomeMoment, SpeedLimit
 from bywire.brakes.wedge.model import force_for, travel_for
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.interrupts import thread_pool
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Length, Unit
+from bywire.core.quantities import Unit
 from bywire.core.typing import Array
 from bywire.data.labeled import Labeled, labeled
 from bywire.plant import roller_screw
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run
-from bywire.synthesis.study import require_ranges, variable
+from bywire.synthesis.study import variable
+
+Slope = Annotated[float, Unit("1", 0.3), Field(gt=0, le=2, allow_inf_nan=False)]
+Count = Annotated[int, Unit("1", 11.0), Field(ge=3, le=101)]
+
+
+PHASES = tuple(0.5 * math.pi * k for k in range(4))
+"""angles of the disc [rad] at which a run begins"""
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What every design must do.
+
+    Parameters
+    ----------
+    moment
+        Step of the demand [N m].
+    t_90
+        Time [s] in which the sensor must show 90 % of it, at every friction coefficient.
+    t_hold, t_release
+        Lengths [s] of the demand and of the release after it.
+    mu_B
+        Friction coefficients of the pads.
+    known
+        Whether the moment control knows the coefficient, so that its crossover stays.
+    enforced
+        Whether the time is enforced by the speed of the reference; else the pads' closing speed
+        is that of the given brake.
+    whole
+        Whether the power of the release counts too, else that of build-up and hold alone.
+    phases
+        Angles of the disc [rad] at which the runs begin.
+    """
+
+    moment: float
+    t_90: float
+    t_hold: float
+    t_release: float
+    mu_B: Sequence[float]
+    known: bool
+    enforced: bool
+    whole: bool = False
+    phases: Sequence[float] = PHASES
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a design does, per friction coefficient, shape (cases,); the worst of all phases.
+
+    Where on a revolution the disc's run-out meets the stop is chance: several phases are tried.
+
+    Parameters
+    ----------
+    closing_speed
+        Largest speed at which the reference closes the pads [m/s], the same for all cases.
+    t_90
+        Time to 90 % of the demand [s]; NaN where it is not reached.
+    filtered, instantaneous
+        Largest power at the drives' input [W], as the rig shows it and as it is, where it counts.
+    release
+        Largest power during the release [W], as the rig shows it.
+    current
+        Largest current demand of either motor [A].
+    speed
+        Largest speed of either motor [rad/s].
+    copper, friction
+        Energies lost in copper, bearings and screws [J].
+    held
+        Mean moment in the last fifth of the stop [N m].
+    left
+        Moment at the end of the release [N m].
+    stop
+        Largest force on the wedge's end stops [N].
+    unsettled
+        Substeps of all cases that hit the cap of the contact iteration.
+    """
+
+    closing_speed: float
+    t_90: Array
+    filtered: Array
+    instantaneous: Array
+    release: Array
+    current: Array
+    speed: Array
+    copper: Array
+    friction: Array
+    held: Array
+    left: Array
+    stop: Array
+    unsettled: int
+
+
+# --- One design
 
 Efficiency = Literal["friction-angle", "as-given"]
 """what stays of the screw over the lead: the friction angle, or the efficiency"""
@@ -229,95 +320,6 @@ def _times(time: Array, y: Array, level: float) -> Array:
     return times
 
 
-# --- What is demanded of a drive train of the wedge brake, and how it answers
-
-PHASES = tuple(0.5 * math.pi * k for k in range(4))
-"""angles of the disc [rad] at which a run begins"""
-
-
-@dataclass(frozen=True)
-class Demand:
-    """What every design must do.
-
-    Parameters
-    ----------
-    moment
-        Step of the demand [N m].
-    t_90
-        Time [s] in which the sensor must show 90 % of it, at every friction coefficient.
-    t_hold, t_release
-        Lengths [s] of the demand and of the release after it.
-    mu_B
-        Friction coefficients of the pads.
-    known
-        Whether the moment control knows the coefficient, so that its crossover stays.
-    enforced
-        Whether the time is enforced by the speed of the reference; else the pads' closing speed
-        is that of the given brake.
-    whole
-        Whether the power of the release counts too, else that of build-up and hold alone.
-    phases
-        Angles of the disc [rad] at which the runs begin.
-    """
-
-    moment: float
-    t_90: float
-    t_hold: float
-    t_release: float
-    mu_B: Sequence[float]
-    known: bool
-    enforced: bool
-    whole: bool = False
-    phases: Sequence[float] = PHASES
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What a design does, per friction coefficient, shape (cases,); the worst of all phases.
-
-    Where on a revolution the disc's run-out meets the stop is chance: several phases are tried.
-
-    Parameters
-    ----------
-    closing_speed
-        Largest speed at which the reference closes the pads [m/s], the same for all cases.
-    t_90
-        Time to 90 % of the demand [s]; NaN where it is not reached.
-    filtered, instantaneous
-        Largest power at the drives' input [W], as the rig shows it and as it is, where it counts.
-    release
-        Largest power during the release [W], as the rig shows it.
-    current
-        Largest current demand of either motor [A].
-    speed
-        Largest speed of either motor [rad/s].
-    copper, friction
-        Energies lost in copper, bearings and screws [J].
-    held
-        Mean moment in the last fifth of the stop [N m].
-    left
-        Moment at the end of the release [N m].
-    stop
-        Largest force on the wedge's end stops [N].
-    unsettled
-        Substeps of all cases that hit the cap of the contact iteration.
-    """
-
-    closing_speed: float
-    t_90: Array
-    filtered: Array
-    instantaneous: Array
-    release: Array
-    current: Array
-    speed: Array
-    copper: Array
-    friction: Array
-    held: Array
-    left: Array
-    stop: Array
-    unsettled: int
-
-
 # --- Many drive trains as a dataset
 
 LATE = 1.02
@@ -407,95 +409,3 @@ def _dataset(answers: Sequence[Answer], demand: Demand, axes: Mapping[str, Label
         data[f"mu_B_{name}"] = variable(mu_B, plane, "1", "worst friction coefficient")
     data.attrs["unsettled_substeps"] = sum(each.unsettled for each in answers)
     return data
-
-
-# --- Options
-
-Slope = Annotated[float, Unit("1", 0.3), Field(gt=0, le=2, allow_inf_nan=False)]
-Count = Annotated[int, Unit("1", 11.0), Field(ge=3, le=101)]
-
-ASSUMPTIONS = (
-    "The wedge's slope and the screws' lead vary; motors, drives, bearings, stiffnesses, clearance "
-    "and the travel that preloads the screws stay.",
-    "The screws' friction angle stays, so that their efficiency grows with the lead and a small "
-    "lead locks itself; with efficiency 'as-given' the efficiency stays.",
-    "The controllers know the design: travel per shaft angle and moment per angle follow it.",
-    "Equal response: all speeds and accelerations of the reference are scaled so that the pads "
-    "close equally fast; with response 'enforced' they get a common factor, the smallest at which "
-    "the sensor shows 90 % of the demand in time at every friction coefficient.",
-    "Bandwidths stay: those of the position loops on the shaft, the crossover of the moment loop.",
-    "The end stops of the wedge stand where the pads have traveled as far as before.",
-    "Infeasible are designs that at any coefficient are more than 2 % late (where the response is "
-    "enforced), do not hold 95 % of the demand, do not release, or press on an end stop.",
-    "Power counts at the drives' input, standby included, in build-up and hold, and in the release "
-    "where that is asked for.",
-    "Each case runs with the disc at four angles, a quarter turn apart, and the worst counts: "
-    "where the run-out meets the stop is chance, and holding the moment against it takes power.",
-)
-
-
-class Options(ParameterSet):
-    """The stop, the friction coefficients, and the designs to compare."""
-
-    moment: SomeMoment
-    """moment demanded in one step"""
-    t_90: Duration
-    """time in which the sensor must show 90 % of it"""
-    t_hold: Duration
-    """length of the demand"""
-    t_release: Duration
-    """time in which the brake must release after it"""
-    counted: Literal["build-up-and-hold", "whole-pulse"]
-    """whether the power of the release counts too"""
-    omega_gap: SpeedLimit
-    """largest speed of the given drive train while crossing the gap, scaled with all others"""
-    mu_B: Coefficients
-    """friction coefficients of the pads; the worst counts"""
-    believed: Literal["known", "as-given"]
-    """whether the moment controller knows them, or believes in that of the parameter set"""
-    response: Literal["enforced", "as-scaled"]
-    """whether the time is enforced, or the pads close as fast as with the given drive train"""
-    efficiency: Efficiency
-    """what stays of the screw over the lead: its friction angle, or its efficiency"""
-    power: Literal["filtered", "instantaneous"]
-    """which power is minimized: as the rig measures it, or as it is"""
-    tan_alpha_min: Slope
-    """smallest slope of the wedge"""
-    tan_alpha_max: Slope
-    """largest slope of the wedge"""
-    slopes: Count
-    """number of slopes"""
-    lead_min: Length
-    """smallest lead of the screws"""
-    lead_max: Length
-    """largest lead of the screws"""
-    leads: Count
-    """number of leads"""
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Options:
-        slopes, leads = ("tan_alpha_min", "tan_alpha_max", "1"), ("lead_min", "lead_max", "m")
-        require_ranges(self, (slopes, leads, ("t_90", "t_hold", "s")))
-        return self
-
-
-DEFAULTS = Options(
-    moment=950.0,
-    t_90=0.1,
-    t_hold=0.2,
-    t_release=0.2,
-    counted="build-up-and-hold",
-    omega_gap=60.0,
-    mu_B=(0.25, 0.3, 0.35, 0.4, 0.45),
-    believed="known",
-    response="enforced",
-    efficiency="friction-angle",
-    power="filtered",
-    tan_alpha_min=0.2,
-    tan_alpha_max=0.45,
-    slopes=11,
-    lead_min=1e-3,
-    lead_max=8e-3,
-    leads=15,
-)
-"""the pulse of Fig. 9 in Roberts et al. (2003), around the catalog's design"""

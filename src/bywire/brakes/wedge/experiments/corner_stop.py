@@ -23,14 +23,14 @@ from bywire.vehicle.surfaces import laid
 
 
 class StopOptions(ParameterSet):
-    """What both stops start with."""
+    """Start, demand and road of both stops."""
 
     v_0: RidingSpeed
     """speed at the start"""
     M_brake: SomeMoment
     """moment demanded from time zero on"""
     surface: SurfaceName
-    """what the road is made of"""
+    """surface of the road"""
     T_disc: Temperature
     """temperature of the disc at the start, where heat counts (corner.heat.law)"""
 
@@ -69,13 +69,13 @@ STOP_FIGURES = Figures(
     moment_before_stop=("N*m", "Mean moment of the sensor in the last half second of braking."),
     peak_slip=("1", "Largest slip above a tenth of the speed at the start."),
     rebound_speed=("m/s", "Largest speed backward after the stop."),
-    wheel_reversal=("rad", "How far the wheel turns back after the stop."),
+    wheel_reversal=("rad", "Angle by which the wheel turns back after the stop."),
     force_held=("N", f"Mean normal force from {_CALM:g} s after the stop to the release."),
     force_change=("N", "Normal force peak to peak in that time."),
     creep_speed=("m/s", "Largest speed of the vehicle in that time."),
     energy_braked=("J", "Energy taken from the wheel until the stop."),
     disc_temperature=("K", "Temperature of the disc at the stop."),
-    contact_angle=("rad", "Where the moment control believes the pads to touch, from parking."),
+    contact_angle=("rad", "Estimated motor angle at which the pads touch, from parking."),
 )
 
 
@@ -91,13 +91,13 @@ class CornerStopOptions(StopOptions):
 def corner_stop(
     par: WedgeCornerParameters, options: CornerStopOptions, _: object = None
 ) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     levels = {0.0: options.M_brake, options.t_hold: 0.0}
     return (_stop_case(par, options, {"ecu.abs": "off"}, levels, options.t_hold + options.t_end),)
 
 
 def judge_stop(recordings: Recordings, options: CornerStopOptions) -> tuple[Kpi, ...]:
-    """Return how the corner stops, and what is held then."""
+    """Return the key figures of the stop and of the hold after it."""
     run = recordings["run"]
     held = run.sel(time=slice(None, options.t_hold - 1e-9))
     end = standstill(held["time"].values, held["v_x"].values)
@@ -113,7 +113,7 @@ def _stop(
     begin, last = end + _CALM, options.t_hold
     late = t >= begin
     fast = v > 0.1 * options.v_0
-    short = (math.nan, f"less than {_CALM:g} s are held after the stop")
+    short = (math.nan, f"the brake holds for less than {_CALM:g} s after the stop")
     return {
         "stopping_distance": float(np.interp(end, t, held["s"].values)),
         "stopping_time": end,
@@ -172,7 +172,7 @@ class CornerPanicOptions(StopOptions):
 def corner_panic(
     par: WedgeCornerParameters, options: CornerPanicOptions, _: object = None
 ) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     return (_stop_case(par, options, {}, {0.0: options.M_brake}, options.duration),)
 
 

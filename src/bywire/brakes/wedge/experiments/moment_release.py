@@ -40,16 +40,16 @@ def _braked_case(
     return case_from_parked(par, stimulus, duration, settle=settle, keep=min(settle, 0.1))
 
 
-# --- Release: how fast the brake lets go, and how freely it stands
+# --- Release: how fast the brake lets go, and how freely the pads stand
 
 _LOW = 0.05  # of the moment at the release
 
 FALL = Figures(
     moment_start=("N*m", "Moment when the demand falls."),
-    time_to_5=("s", "Time until the moment has fallen to 5 % of its start for good."),
+    time_to_5=("s", "Time until the moment has fallen permanently below 5 % of its start."),
 )
 FREEDOM = Figures(
-    drag_moment=("N*m", "Largest moment from parking on: residual drag."),
+    drag_moment=("N*m", "Residual drag: largest moment from parking on."),
     travel_left=("m", "Distance of the wedge from its middle at the end."),
     clearance_regained=(
         "m",
@@ -74,7 +74,7 @@ class ReleaseOptions(ParameterSet):
 
 
 def release(par: WedgeParameters, options: ReleaseOptions, _: object = None) -> tuple[Case, ...]:
-    """Return the one run: braking from the start of the settling time, no demand from zero on."""
+    """Return the single run: braking during the settling time, no demand from zero on."""
     levels = {-options.settle: options.M_hold, 0.0: 0.0}
     return (
         _braked_case(par, lambda t: {"M_set": steps(t, levels)}, options.settle, options.duration),
@@ -82,7 +82,7 @@ def release(par: WedgeParameters, options: ReleaseOptions, _: object = None) -> 
 
 
 def judge_release(recordings: Recordings, options: ReleaseOptions) -> tuple[Kpi, ...]:
-    """Return how fast the moment falls, what drags afterwards, and what the release costs."""
+    """Return fall time of the moment, residual drag, and energy of the release."""
     run = along_disc(recordings["run"]).sel(time=slice(-1e-9, None))
     par = parameters_of(run)
     home = parking_time(run, 0.0)
@@ -91,7 +91,7 @@ def judge_release(recordings: Recordings, options: ReleaseOptions) -> tuple[Kpi,
     end = float(run["x"].values[-1])
     until = run.sel(time=slice(None, home.value)) if parked is not None else run
     energy = float(until["W_supply"].values[-1] - until["W_supply"].values[0])
-    counted = "" if parked is not None else "not parked: counted until the end of the recording"
+    counted = "" if parked is not None else "not parked: energy until the end of the recording"
     return (
         *FALL(moment_start=run["M_B"].values[0], time_to_5=_fall(run)),
         release_time(run, 0.0),
@@ -114,7 +114,7 @@ def _toward(run: xr.Dataset) -> xr.DataArray:
 
 
 def _fall(run: xr.Dataset) -> tuple[float, str]:
-    """Return the time until the moment has fallen to a twentieth for good."""
+    """Return the time until the moment has fallen permanently to a twentieth."""
     t, M = run["time"].values, np.abs(run["M_B"].values)
     level = _LOW * M[0]
     above = np.flatnonzero(level < M)
@@ -122,7 +122,7 @@ def _fall(run: xr.Dataset) -> tuple[float, str]:
         return math.nan, "there is no moment at the release"
     k = int(above[-1])
     if k + 1 == t.size:
-        return math.nan, "the moment does not fall that far in time"
+        return math.nan, "the moment does not fall to 5 % in the recorded time"
     return float(t[k] + (t[k + 1] - t[k]) * (M[k] - level) / (M[k] - M[k + 1])), ""
 
 
@@ -142,11 +142,11 @@ MOMENT_RELEASE = Experiment(
 # --- Power off: what dry friction holds, for how long
 
 POWER_OFF_FIGURES = Figures(
-    time_to_rest=("s", "Time from power off until all stick for good."),
+    time_to_rest=("s", "Time from power off until shafts and wedge stick permanently."),
     drift=("m", "Largest change of the wedge's travel after that."),
-    relaxation=("m", "Change of the wedge's travel until that."),
+    relaxation=("m", "Change of the wedge's travel before that."),
     moment_start=("N*m", "Moment at power off."),
-    moment_end=("N*m", "Moment at the end; the run-out is in it."),
+    moment_end=("N*m", "Moment at the end, run-out included."),
     preload_end=("N", "Preload of the wedge at the end."),
     end_stop_force=("N", "Largest force of an end stop."),
     undefined="the brake does not come to rest in the recorded time",
@@ -165,7 +165,7 @@ class PowerOffOptions(ParameterSet):
 
 
 def power_off(par: WedgeParameters, options: PowerOffOptions, _: object = None) -> tuple[Case, ...]:
-    """Return the one run: braking from the start of the settling time, power off at zero."""
+    """Return the single run: braking during the settling time, power off at zero."""
     levels, off = {-options.settle: options.M_hold}, {0.0: 1.0}
     return (
         _braked_case(
@@ -178,7 +178,7 @@ def power_off(par: WedgeParameters, options: PowerOffOptions, _: object = None) 
 
 
 def judge_power_off(recordings: Recordings, options: PowerOffOptions) -> tuple[Kpi, ...]:
-    """Return how far the brake relaxes, when it rests, and whether it creeps afterwards."""
+    """Return relaxation, time to rest, and creep afterwards."""
     after = along_disc(recordings["run"]).sel(time=slice(-1e-9, None))
     t, x, stuck = (after[name].values for name in ("time", "x", "stuck"))
     moving = np.flatnonzero(stuck == 0)

@@ -42,8 +42,8 @@ PULSES_FIGURES = Figures(
     hold_moment=("N*m", f"Mean moment {_OVER}."),
     hold_error=(
         "%",
-        "That moment less the demand, over the demand: far below 0 where the demand is beyond "
-        "the brake.",
+        "Relative error of that moment: far below 0 where the demand exceeds the brake's "
+        "capability.",
     ),
     hold_ripple=("N*m", f"Moment peak to peak {_OVER}: the disc's run-out."),
     hold_power=("W", f"Mean input power {_OVER}, standby included."),
@@ -57,7 +57,7 @@ PULSES_FIGURES = Figures(
 
 
 class PulsesOptions(ParameterSet):
-    """The braking maneuver; its times are ours, the figure's text gives none."""
+    """The braking maneuver."""
 
     M_high: SomeMoment
     """moment demanded"""
@@ -76,7 +76,7 @@ class PulsesOptions(ParameterSet):
 
 
 def pulses(par: WedgeParameters, options: PulsesOptions, _: object = None) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     levels = {0.0: options.M_high}
     period = options.t_low + options.t_high
     for k in range(options.pulses):
@@ -113,10 +113,10 @@ def judge_pulses(recordings: Recordings, options: PulsesOptions) -> tuple[Kpi, .
 
 
 def _turn(run: xr.Dataset, begin: float, end: float, last: float) -> tuple[float, float]:
-    """Return begin and end of what counts of a time [s], the rows at its ends left out.
+    """Return the part of a time [s] that counts, without the rows at its ends.
 
-    The disc's last revolution in it, over which the run-out averages out; where there is none,
-    the ``last`` share of it.
+    It is the disc's last revolution, over which the run-out averages out. Without a whole
+    revolution it is the ``last`` share of the time.
     """
     turn = last_turn(run, begin, end)
     start = end - last * (end - begin) if turn is None else turn
@@ -150,17 +150,17 @@ MOMENT_PULSES = Experiment(
 _ROWS = 10  # fewest on the ramp
 
 RAMP_FIGURES = Figures(
-    ramp_error_mean=("N*m", "Mean of demand less moment, ramp."),
+    ramp_error_mean=("N*m", "Mean of demand minus moment on the ramp."),
     ramp_error_rms=(
         "N*m",
-        "Root mean square of demand less moment on the ramp; the run-out is in it.",
+        "Root mean square of demand minus moment on the ramp, run-out included.",
     ),
     ramp_slope=("N*m/s", "Slope of a line through the moment on the ramp."),
 )
 
 
 class RampOptions(ParameterSet):
-    """The braking maneuver; its times are ours, the figure's text gives none."""
+    """The braking maneuver."""
 
     M_high: SomeMoment
     """moment demanded at first, and at the end of the ramp"""
@@ -196,7 +196,7 @@ def _ramp_demand(t: Array, options: RampOptions) -> Array:
 
 
 def ramp(par: WedgeParameters, options: RampOptions, _: object = None) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     duration = options.t_hold + options.t_low + options.t_ramp + options.t_end
     return (
         case_from_parked(
@@ -210,7 +210,7 @@ def ramp(par: WedgeParameters, options: RampOptions, _: object = None) -> tuple[
 
 
 def judge_ramp(recordings: Recordings, options: RampOptions) -> tuple[Kpi, ...]:
-    """Return the figures of the braking, and how well the ramp is followed."""
+    """Return the figures of the braking, and the tracking errors on the ramp."""
     run = along_disc(recordings["run"])
     begin = options.t_hold + options.t_low
     end = begin + options.t_ramp
@@ -256,7 +256,7 @@ LARGE_PULSE_FIGURES = Figures(
 
 
 class LargePulseOptions(ParameterSet):
-    """The braking maneuver; its times are ours, the figure's text gives none."""
+    """The braking maneuver."""
 
     M_high: SomeMoment
     """moment demanded"""
@@ -273,7 +273,7 @@ class LargePulseOptions(ParameterSet):
 def large_pulse(
     par: WedgeParameters, options: LargePulseOptions, _: object = None
 ) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     levels = {0.0: options.M_high, options.t_pulse: 0.0}
     return (
         case_from_parked(

@@ -35,25 +35,28 @@ from bywire.core.typing import Array
 SlowSpeed = Annotated[float, Unit("rad/s", 10.0), Field(gt=0, allow_inf_nan=False)]
 
 _SETTLED = 0.3  # of the time in motion: what comes before is left out of the means
-_LESS = 0.5  # of the currents, in the motions under less force
+_LESS = 0.5  # share of the currents in the motions under less force
 _SPEED = 0.05  # by which mean speeds may differ from what is demanded
 EFFICIENCY_FIGURES = Figures(
-    eta_f=("1", "Torque by the force over motor torque less the bearings', motor 1 driving."),
-    eta_f_no_load=("1", "The same with the bearing torque without load alone taken off."),
+    eta_f=("1", "Torque by the force over motor torque minus the bearings', motor 1 driving."),
+    eta_f_no_load=("1", "The same, with only the bearing torque without load subtracted."),
     eta_f_raw=("1", "Torque by the force over motor torque, motor 1 driving."),
     eta_f_reverse=("1", "As eta_f, motor 2 driving."),
-    eta_f_true=("1", "What was put in."),
+    eta_f_true=("1", "True value."),
     eta_b=("1", "Holding torque and the bearings' over torque by the force, motor 2 driven."),
-    eta_b_no_load=("1", "The same with the bearing torque without load alone added."),
+    eta_b_no_load=("1", "The same, with only the bearing torque without load added."),
     eta_b_raw=("1", "Holding torque over torque by the force, motor 2 driven."),
     eta_b_reverse=("1", "As eta_b, motor 1 driven."),
-    eta_b_true=("1", "What was put in."),
+    eta_b_true=("1", "True value."),
     force=("N", "Mean force while motor 1 drives."),
     force_reverse=("N", "Mean force while motor 1 is driven back."),
     bearing_torque=("N*m", "Motor torque without load at the same speed."),
-    bearing_growth=("N*m/N**2", "Growth of it with the square of the force, motor 1 driving."),
-    bearing_growth_true=("N*m/N**2", "What was put in."),
-    undefined="no steady motion under compression: a motor cannot do its part",
+    bearing_growth=(
+        "N*m/N**2",
+        "Growth of that torque with the square of the force, motor 1 driving.",
+    ),
+    bearing_growth_true=("N*m/N**2", "True value."),
+    undefined="no steady motion under compression: a motor cannot hold its speed or force",
 )
 
 
@@ -63,7 +66,7 @@ class EfficiencyOptions(ParameterSet):
     i_drive: Current
     """current of motor 1 while it drives and motor 2 gives way"""
     i_back: Current
-    """current of motor 1 while motor 2 pushes it back; small, see the experiment's text"""
+    """current of motor 1 while motor 2 pushes it back; small, so that motor 2 can"""
     omega_slow: SlowSpeed
     """speed of the motion"""
     settle: Duration
@@ -73,7 +76,7 @@ class EfficiencyOptions(ParameterSet):
 
 
 class Reading(NamedTuple):
-    """What a run in motion reads, friction counted against the motion."""
+    """Mean readings of a run in motion, friction counted against the motion."""
 
     F: Annotated[float, Signal("N", "force", 1000.0)]
     T_1: Annotated[float, Signal("N*m", "torque of motor 1 by its current", 1.0)]
@@ -121,7 +124,7 @@ def efficiency(
 
 
 def judge_efficiency(recordings: Recordings, options: EfficiencyOptions) -> tuple[Kpi, ...]:
-    """Return the efficiencies in both directions, with and without what the bearings take."""
+    """Return the efficiencies in both directions, with and without the bearings' friction."""
     no_load = recordings["no_load"]
     par = parameters_of(no_load)
     k = slope_of(par)
@@ -186,7 +189,7 @@ def _mean(run: xr.Dataset, name: str, options: EfficiencyOptions) -> float:
 
 
 def _without_force(full: tuple[Reading, float], less: tuple[Reading, float]) -> tuple[float, float]:
-    """Return a torque per force as it is without force, and its growth; NaN where not steady."""
+    """Return a torque per force, extrapolated to zero force, and its growth; NaN if not steady."""
     (there, T), (below, T_less) = full, less
     steady = there.steady * below.steady
     if not steady > 0 or there.F == below.F:
@@ -223,10 +226,10 @@ LOAD_SWEEP_FIGURES = Figures(
     force_max=("N", "Largest mean force of a stroke."),
     force_min=("N", "Smallest mean force of a stroke."),
     eta_f_slope=("1", "Torque by the force over motor torque, by their growth; motor 1 driving."),
-    eta_f_true=("1", "What was put in."),
+    eta_f_true=("1", "True value."),
     eta_b_slope=("1", "The same, inverse, motor 1 driven back."),
-    eta_b_true=("1", "What was put in."),
-    undefined="the force does not grow with the current: more levels",
+    eta_b_true=("1", "True value."),
+    undefined="the force does not grow with the current: take more levels",
 )
 
 
@@ -236,9 +239,9 @@ class LoadSweepOptions(ParameterSet):
     i_drive: Current
     """largest current of motor 1 while it drives"""
     i_back: Current
-    """largest current while motor 2 pushes it back; small, see the screw-efficiency test"""
+    """largest current while motor 2 pushes it back; small, so that motor 2 can"""
     levels: Levels
-    """how many currents, evenly spaced up to the largest"""
+    """number of currents, evenly spaced up to the largest"""
     omega_slow: SlowSpeed
     """speed of the motion"""
     t_stroke: Duration
@@ -267,7 +270,7 @@ def strokes(options: LoadSweepOptions) -> tuple[Stroke, ...]:
 def load_sweep(
     par: WedgeParameters, options: LoadSweepOptions, _: object = None
 ) -> tuple[Case, ...]:
-    """Return the one run; motor 1 in current, motor 2 in position control."""
+    """Return the single run; motor 1 in current, motor 2 in position control."""
     for name in ("i_drive", "i_back"):
         check_current(name, getattr(options, name), par)
     moves = strokes(options)
@@ -291,7 +294,7 @@ def load_sweep(
 
 
 def _moved(t: Array, T: float) -> Array:
-    """Return the way of a stroke at speed one, whose speed rises and falls gently."""
+    """Return the travel of a stroke of speed one, which rises and falls gently."""
     ramp = _RAMP * T
     rising, falling = np.clip(t, 0.0, ramp), np.clip(t - (T - ramp), 0.0, ramp)
     steady = np.clip(t - ramp, 0.0, T - 2.0 * ramp)

@@ -74,7 +74,7 @@ def _step_cases(
 ) -> tuple[Case, ...]:
     """Return one run per bandwidth and amplitude.
 
-    ``rig``: what the experiment sets of the rig, beside position control.
+    ``rig``: parameters of the rig that the experiment sets in addition to position control.
     """
     return tuple(
         shaft_case(
@@ -93,7 +93,7 @@ def _step_cases(
 
 
 def judge_steps(recordings: Recordings, options: StepsOptions) -> tuple[Kpi, ...]:
-    """Return the figures of all steps, their names with the case's label behind."""
+    """Return the figures of all steps, each name followed by the label of its case."""
     kpis: list[Kpi] = []
     for label in _CASES:
         run, end = recordings[label], options.value(f"a_{label.partition('_')[2]}")

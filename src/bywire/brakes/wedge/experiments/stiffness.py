@@ -35,14 +35,14 @@ STIFFNESS_FIGURES = Figures(
     K_line_compression=("N/m", "Force over travel, sensor between, compression."),
     K_line_tension=("N/m", "Force over travel, sensor between, tension."),
     force_per_current=("N/A", "Force over rising current, mean of compression and tension."),
-    K_S=("N/m", "Stiffness of one screw: the line's, the sensor allowed for."),
-    K_S_true=("N/m", "What was put in."),
+    K_S=("N/m", "Stiffness of one screw: that of the line, corrected for the sensor."),
+    K_S_true=("N/m", "True value."),
     K_heart_compression=("N/m", "Force by current over travel, tip to tip."),
     K_heart_tension=("N/m", "Force by current over travel, through the wedge."),
-    K_W=("N/m", "Stiffness of one interface to the wedge: tension, less the screws."),
-    K_W_true=("N/m", "What was put in."),
+    K_W=("N/m", "Stiffness of one interface to the wedge: tension, corrected for the screws."),
+    K_W_true=("N/m", "True value."),
     free_play=("m", "Travel between the lines of compression and tension at no force."),
-    free_play_true=("m", "What was put in."),
+    free_play_true=("m", "True value."),
     undefined="no travel under load: take a larger current",
 )
 
@@ -93,7 +93,7 @@ def stiffness(
 
 
 def judge_stiffness(recordings: Recordings, options: StiffnessOptions) -> tuple[Kpi, ...]:
-    """Return the stiffnesses of screws and wedge, and the free-play, beside what was put in."""
+    """Return stiffnesses of screws and wedge and the free-play, with their true values."""
     sensor, heart = recordings["sensor"], recordings["heart"]
     par = parameters_of(sensor)
     lines, calibrations, loaded = [], [], []
@@ -149,7 +149,7 @@ def _rising(run: xr.Dataset, sign: float, options: StiffnessOptions) -> Any:
 
 
 def _closer(run: xr.Dataset) -> Array:
-    """Return how much closer the encoders say the nuts are [m]."""
+    """Return by how much the nuts have come closer, by the encoders [m]."""
     par = parameters_of(run)
     angles: list[Any] = [run["theta_1"].values, run["theta_2"].values]
     q_1, q_2 = (shaft_encoder.reading(angle, par.encoder) for angle in angles)
@@ -186,7 +186,7 @@ FORCE_CYCLE_FIGURES = Figures(
     peak_current_sensor=("A", "Largest mean current of both motors, on the sensor."),
     peak_current_heart=("A", "The same in the brake heart."),
     hysteresis=("N*m", "Friction torque, half the loop's width, mean over the cycle."),
-    undefined="no travel: ask for more",
+    undefined="no travel: give larger options",
 )
 
 
@@ -236,7 +236,7 @@ def _cycle(
 
 
 def judge_force_cycle(recordings: Recordings, options: ForceCycleOptions) -> tuple[Kpi, ...]:
-    """Return the forces reached, the line's stiffness, and what friction makes of a cycle."""
+    """Return the forces reached, the line's stiffness, and the hysteresis of a cycle."""
     run = recordings["sensor"]
     par = parameters_of(run)
     F, i = run["y_F"].values, squeezing_current(run)

@@ -175,34 +175,28 @@ class Squeeze:
         return replace(self, i=self.i + self.way * (before - after), F=F)
 
 
-@dataclass(frozen=True)
-class Reading:
-    """How a record is read.
+def squeeze(
+    data: xr.Dataset,
+    par: WedgeParameters,
+    options: RigOptions,
+    where: str,
+    speed_stated: float | None = None,
+) -> Squeeze:
+    """Return the steady motions of a record.
 
     Parameters
     ----------
-    cutoff
-        Low-pass of the speed [Hz].
-    slowest, margin, length
-        Of the closing speed [rad/s], and times [s]; see
-        :func:`bywire.identification.equation.windows`.
-    speed
-        Of one motor, that the current is stated at [rad/s]; the record's mean by default.
-    """
-
-    cutoff: float
-    slowest: float
-    margin: float
-    length: float
-    speed: float | None = None
-
-
-def squeeze(data: xr.Dataset, par: WedgeParameters, reading: Reading, where: str) -> Squeeze:
-    """Return the steady motions of a record.
-
-    ``data``: ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N]; ``par``: lead of the screw,
-    order of the cogging, corner of the force sensor, and how the friction of bearings and motors
-    changes with speed; ``reading``: how it is read; ``where``: what the record is, for messages.
+    data
+        ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N].
+    par
+        Lead of the screw, order of the cogging, corner of the force sensor, and how the friction
+        of bearings and motors changes with speed.
+    options
+        How the record is filtered and cut into windows.
+    where
+        Name of the record in messages.
+    speed_stated
+        Speed of one motor [rad/s] at which the current is stated; the record's mean by default.
 
     Raises
     ------
@@ -211,16 +205,16 @@ def squeeze(data: xr.Dataset, par: WedgeParameters, reading: Reading, where: str
     """
     interval = even_interval(data["time"].values)
     q_1, q_2 = data["q_1"].values, data["q_2"].values
-    speed = np.gradient(low_passed(q_1 - q_2, interval, reading.cutoff), interval)
-    steady = windows(speed, interval, reading.slowest, reading.margin, reading.length)
-    side = np.sign(low_passed(data["y_F"].values, interval, reading.cutoff))
+    speed = np.gradient(low_passed(q_1 - q_2, interval, options.cutoff), interval)
+    steady = windows(speed, interval, options.slowest, options.margin, options.window)
+    side = np.sign(low_passed(data["y_F"].values, interval, options.cutoff))
     # Where the force changes its sign, friction has a kink, and a mean over it is none of the law.
     steady = [w for w in steady if abs(float(side[w.rows].mean())) in (0.0, 1.0)]
     ways = np.array([np.sign(speed[w.rows].mean()) for w in steady])
     if not (np.any(ways > 0) and np.any(ways < 0)):
         raise ParameterError(
             f"{where}: the screws do not move both toward each other and apart at more than "
-            f"{reading.slowest:g} rad/s: the friction cannot be told from the force; squeeze and "
+            f"{options.slowest:g} rad/s: the friction cannot be told from the force; squeeze and "
             "let go slowly, as 'bywire run force-cycle' does"
         )
 
@@ -229,15 +223,15 @@ def squeeze(data: xr.Dataset, par: WedgeParameters, reading: Reading, where: str
 
     # The sensor's amplifier lags, one way while the force rises, the other while it falls.
     lag = 1.0 / (2.0 * np.pi * par.rig.sensor.f_F)
-    rate = np.gradient(low_passed(data["y_F"].values, interval, reading.cutoff), interval)
+    rate = np.gradient(low_passed(data["y_F"].values, interval, options.cutoff), interval)
     F = means(data["y_F"].values + lag * rate)
     i = means(0.5 * (data["i_1"].values - data["i_2"].values))
     _require_along(i, F, where)
     each = 0.5 * np.abs(means(speed))
-    stated = float(each.mean()) if reading.speed is None else reading.speed
+    stated = float(each.mean()) if speed_stated is None else speed_stated
     beyond = _speed_effect(F, each, stated, par)
     d = roller_screw.slope(par.screw) * (q_1 - q_2)
-    skip = round(reading.margin / interval)
+    skip = round(options.margin / interval)
     return Squeeze(
         i=i - ways * beyond,
         F=F,
@@ -352,8 +346,7 @@ def identify(
     ----------
     Roberts et al. (2003), section "Rollerscrew and bearings": loss of the screw, bearing friction.
     """
-    reading = Reading(options.cutoff, options.slowest, options.margin, options.window)
-    cycle = squeeze(data, par, reading, "the record")
+    cycle = squeeze(data, par, options, "the record")
     unknowns = law_unknowns(par) + cogging_unknowns(par, "sensor")
     scatter = _scatter(cycle)
 

@@ -52,25 +52,6 @@ _SCALE = 0.02  # of the torque that decelerates: what a known one has to be to s
 
 
 @dataclass(frozen=True)
-class Reading:
-    """How a record is read.
-
-    Parameters
-    ----------
-    cutoff
-        Low-pass before the angle is differentiated [Hz].
-    slowest, margin, length
-        Of the motion [rad/s], and times [s]; see
-        :func:`bywire.identification.equation.windows`.
-    """
-
-    cutoff: float
-    slowest: float
-    margin: float
-    length: float
-
-
-@dataclass(frozen=True)
 class RunDown:
     """One record: its motion, what was on the shaft, and the equation's error over it."""
 
@@ -86,16 +67,16 @@ class RunDown:
         return window_residuals(self.equation, self.par, unknowns, self.motion)
 
 
-def read_run(label: str, data: xr.Dataset, par: WedgeParameters, reading: Reading) -> RunDown:
+def read_run(label: str, data: xr.Dataset, par: WedgeParameters, options: Options) -> RunDown:
     """Return a record's motion; what is added to the shaft counts as part of the dummy."""
     seen = data.rename({"q_1": "theta", "i_1": "i"})
-    moved = differentiated(seen[["theta", "i"]], "theta", ("omega", "alpha"), reading.cutoff)
+    moved = differentiated(seen[["theta", "i"]], "theta", ("omega", "alpha"), options.cutoff)
     moved["F"] = ("time", np.zeros(moved.sizes["time"]), {"units": "N"})
-    motion = motions(moved, "omega", reading.slowest, reading.margin, reading.length)
+    motion = motions(moved, "omega", options.slowest, options.margin, options.window)
     if len(motion.windows) < len(NAMES):
         raise ParameterError(
-            f"record {label} keeps above {reading.slowest:g} rad/s for {len(motion.windows)} "
-            f"windows of {1e3 * reading.length:g} ms: too few; {_ADVICE}"
+            f"record {label} keeps above {options.slowest:g} rad/s for {len(motion.windows)} "
+            f"windows of {1e3 * options.window:g} ms: too few; {_ADVICE}"
         )
     added = float(data["J_added"].values[0])
     run_par = par.replace(
@@ -103,7 +84,7 @@ def read_run(label: str, data: xr.Dataset, par: WedgeParameters, reading: Readin
     )
     K_T = servo_motor.torque_constant(par.motor_1)
     torque = K_T * float(np.mean(motion.means(moved["i"].values)))
-    equation = Equation(DrivenShaft(), "omega", "alpha", reading.slowest)
+    equation = Equation(DrivenShaft(), "omega", "alpha", options.slowest)
     return RunDown(label, run_par, motion, added, torque, equation)
 
 
@@ -206,8 +187,7 @@ def identify(
     ----------
     Roberts et al. (2003), sections "Motor", "Rollerscrew and bearings".
     """
-    reading = Reading(options.cutoff, options.slowest, options.margin, options.window)
-    runs = [read_run(label or "run", record, par, reading) for label, record in split(data).items()]
+    runs = [read_run(label or "run", record, par, options) for label, record in split(data).items()]
     names = NAMES if scale_is_told(runs) else NAMES[1:]
     best = fitted(runs, names)
     is_scaled = INERTIA in best.names

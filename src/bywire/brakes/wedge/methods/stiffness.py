@@ -21,7 +21,6 @@ from bywire.brakes.wedge.methods import force_calibration
 from bywire.brakes.wedge.methods.force_calibration import (
     SIGNALS,
     SIMULATED,
-    Reading,
     RigOptions,
     Squeeze,
     branches,
@@ -275,8 +274,8 @@ def identify(
                 f"the measurement has no record {label} (it has {_named(records)}): "
                 f"give one file each, sensor and heart; {_ADVICE}"
             )
-    sensor = squeeze(records["sensor"], par, _reading(options, None), "record sensor")
-    heart = squeeze(records["heart"], par, _reading(options, sensor.speed), "record heart")
+    sensor = squeeze(records["sensor"], par, options, "record sensor")
+    heart = squeeze(records["heart"], par, options, "record heart", sensor.speed)
     stages, best, values, heart = _fitted(par, sensor, heart)
     F = stages.heart_force(values, stages.heart)[0]
     return Identified(
@@ -319,10 +318,6 @@ def _fitted(
 
 def _named(records: dict[str, xr.Dataset]) -> str:
     return ", ".join(name for name in records if name) or "one without a name"
-
-
-def _reading(options: RigOptions, speed: float | None) -> Reading:
-    return Reading(options.cutoff, options.slowest, options.margin, options.window, speed)
 
 
 def _curve(stages: TwoStages, values: Array) -> Curve:

@@ -20,6 +20,7 @@ from bywire.brakes.wedge.paper.statements import (
     stacked,
     tan_alpha,
 )
+from bywire.brakes.wedge.plants import MECHANICAL_STATES
 from bywire.reproduction.item import Fact, Item, compared, found, reading
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs, kpis
@@ -48,7 +49,6 @@ BELOW, ABOVE = 0.2, 0.5
 """friction coefficients on both sides of the neutral point"""
 DEPTH = 5e-5
 """wedge travel [m] beyond contact at which the brake is linearized; the model is linear there"""
-MECHANICAL = ("theta_1", "omega_1", "theta_2", "omega_2", "x", "v")
 
 
 def part(runs: Runs) -> Part:
@@ -289,6 +289,6 @@ def slow_pole(mu_B: float) -> complex:
         WedgeBrake(), par, state, memory_at(state.x, par), inputs=("i_1_ref",), outputs=("x",)
     )
     # Held: the current loops, and the disc with its sensors, which do not feed back.
-    every = model.reduced(MECHANICAL, held=True).poles()
+    every = model.reduced(MECHANICAL_STATES, held=True).poles()
     slow = every[np.argsort(np.abs(every))][:2]
     return complex(max(slow, key=lambda s: (round(s.real, 6), s.imag)))

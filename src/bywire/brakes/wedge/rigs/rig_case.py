@@ -1,4 +1,4 @@
-"""What the rigs' experiments share: runs from rest, data sheets, readings of a recording."""
+"""Shared parts of the rigs' experiments: runs from rest, data sheets, readings of a recording."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bywire.brakes.wedge.case import case_from_parked
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
 from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
-from bywire.core.errors import ParameterError
+from bywire.core.errors import not_valid
 from bywire.core.signals import zeros
 from bywire.core.typing import Array
 from bywire.plant import roller_screw
@@ -87,30 +87,28 @@ def squeezing_current(run: xr.Dataset) -> Array:
 
 
 def check_current(name: str, i: float, par: WedgeParameters) -> None:
-    """Refuse a current that the drives do not give.
+    """Require a current that the drives can give.
 
-    ``name``: the option that asks for it; ``i``: its value [A].
+    ``name``: option with the current; ``i``: its value [A].
 
     Raises
     ------
     ParameterError
-        Where it is above the drives' limit.
+        When it is above the drives' limit.
     """
     limit = par.drive.i_max
     if i > limit:
-        raise ParameterError(
-            f"options.{name} = {i:g} A is not valid: the drives give {limit:g} A at most "
-            "(drive.i_max); ask for less"
-        )
+        valid, advice = f"<= {limit:g} A", "the largest current of the drives (drive.i_max)"
+        raise not_valid(f"options.{name}", f"{i:g} A", valid, advice)
 
 
 def slope_of(par: WedgeParameters) -> float:
-    """Return the travel per angle [m/rad], which the screw's lead tells."""
+    """Return the travel per angle [m/rad] by the screw's lead."""
     return roller_screw.slope(par.screw)
 
 
 def torque_constant_of(par: WedgeParameters) -> float:
-    """Return the torque constant [N m/A] that the rig's control believes."""
+    """Return the torque constant [N m/A] assumed by the rig's control."""
     return par.control.position.K_hat
 
 
@@ -131,7 +129,7 @@ _ANGLES = ("theta_", "last_")
 
 
 def turned(case: Case, angle: float) -> Case:
-    """Return a rig's run that begins at another angle of the shafts, everything else alike.
+    """Return a rig's run that begins at another angle of the shafts and is otherwise equal.
 
     Encoder counts and cogging then fall elsewhere, as they do on a bench from day to day.
 
