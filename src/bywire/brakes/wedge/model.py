@@ -197,7 +197,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     )
 
     def wire(self, w: Self) -> None:
-        """Say what every part feels: forces of the contacts, shafts, wedge, disc, measurements."""
+        """Connect all parts: forces of the contacts, shafts, wedge, disc, measurements."""
         par, forces = w.par, brake_heart.output(w.heart.f)
         w.F_1, w.F_2, w.squeeze = forces.F_1, forces.F_2, forces.squeeze
         w.turning = flywheel.turning(w.disc.xe, par.flywheel)
@@ -238,7 +238,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         )
 
     def disc_torque(self, w: Self) -> float:
-        """Return what turns the disc beside its own drive [N m]: nothing on the test stand."""
+        """Return the torque on the disc other than its drive's [N m]: none on the test stand."""
         return 0.0
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
@@ -255,7 +255,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         return (*shafts, (-sliding, sliding), (-moment, moment))
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return what crosses the border, and what the dry frictions take."""
+        """Return the powers across the system boundary, and those of the dry frictions."""
         friction_1, friction_2, friction, moment = w.reaction
         motors = drive_train.power(w.motor_1) + drive_train.power(w.motor_2)
         return {
@@ -271,11 +271,11 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         }
 
     def record(self, w: Self) -> dict[str, float]:
-        """Return what is recorded beside states, wires and losses."""
+        """Return the recorded signals other than states, wires and losses."""
         motors = drive_train.power(w.motor_1) + drive_train.power(w.motor_2)
         heat_1 = motor_heat.stored(w.heat_1.x, w.heat_1.par)
         heat_2 = motor_heat.stored(w.heat_2.x, w.heat_2.par)
-        # What is off costs no operation: motors that stay cold keep what they give to the air.
+        # Heat that is off costs no operation: cold motors show the zero heat to the air.
         cold, none = w.par.motor_heat.law == "off", w.flow.E_motor_air
         given = w.flow.W_electric + w.flow.W_disc + w.flow.W_runout
         adjusts = w.par.adjuster.law != "none"
@@ -329,7 +329,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         return state_at(0.0, par), memory_at(0.0, par)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
-        """Return what the user should know of a recording."""
+        """Return the warnings about a recording."""
         return warnings_of(recording, par) + super().watch(recording, par)
 
 
@@ -349,7 +349,7 @@ def state_at(x: float, par: Par) -> Any:
 
 
 def readings(x: Any, par: Par) -> control.Readings:
-    """Return what the controllers see at a tick."""
+    """Return the controllers' readings at a tick."""
     return control.Readings(
         theta_1=shaft_encoder.reading(x.theta_1, par.encoder),
         theta_2=shaft_encoder.reading(x.theta_2, par.encoder),
@@ -389,7 +389,7 @@ def contact_angle(par: Par) -> float:
 
 
 def memory_at(x: float, par: Par) -> Memory:
-    """Return the controllers' memory in which the references stand at that state."""
+    """Return the controllers' memory with the references at this travel [m]."""
     k = roller_screw.slope(par.screw)
     delta = par.control.offset.delta_preload
     both = screw_offset.output(x / k, delta, par.control.offset)
@@ -408,7 +408,7 @@ def memory_at(x: float, par: Par) -> Memory:
     )
 
 
-# --- What the user should know of a recording
+# --- Warnings about a recording: stops, limits, screws that hold
 
 Rows = NDArray[np.bool_]
 
@@ -418,18 +418,15 @@ _SWINGS = 10  # reversals on the current limit, each within _LONG of the last, t
 
 
 def warnings_of(recording: xr.Dataset, par: ParameterSet) -> list[str]:
-    """Return the warnings of a wedge brake; none where the recording lacks its signals.
-
-    ``recording``: at least one row.
-    """
-    known = par.flat()
+    """Return the warnings of a recording of at least one row; none without the brake's signals."""
+    values = par.flat()
     if not {"F_end", "M_set", "i_1_ref", "i_2_ref"} <= set(recording):
         return []
     warnings = _end_stop(recording)
-    if known["command.mode"] == "moment":  # elsewhere the demanded currents are the test's own
-        warnings += _out_of_reach(recording, known) or _not_reached(recording, known)
-        warnings += _limits(recording, known)
-    return warnings + _holding_screw(known)
+    if values["command.mode"] == "moment":  # elsewhere the demanded currents are the test's own
+        warnings += _out_of_reach(recording, values) or _not_reached(recording, values)
+        warnings += _limits(recording, values)
+    return warnings + _holding_screw(values)
 
 
 def _end_stop(recording: xr.Dataset) -> list[str]:
@@ -445,59 +442,59 @@ def _end_stop(recording: xr.Dataset) -> list[str]:
 
 
 def _when(recording: xr.Dataset, k: int) -> str:
-    """Return when something first shows; in the first row it has begun before."""
+    """Return the time of row ``k`` in words; an event in the first row began earlier."""
     t = float(recording["time"].values[k])
     return "before the recording starts" if k == 0 else f"at t = {t:.4g} s"
 
 
-def _limit(known: Mapping[str, Any]) -> float:
-    return float(min(known["control.position.i_max"], known["drive.i_max"]))
+def _limit(values: Mapping[str, Any]) -> float:
+    return float(min(values["control.position.i_max"], values["drive.i_max"]))
 
 
-def _limited(recording: xr.Dataset, known: Mapping[str, Any]) -> Rows:
-    """Return where a motor's demanded current is at its limit."""
+def _limited(recording: xr.Dataset, values: Mapping[str, Any]) -> Rows:
+    """Return the rows in which a motor's demanded current is at its limit."""
     refs = [np.abs(recording[name].values) for name in ("i_1_ref", "i_2_ref")]
-    return np.asarray(np.maximum(*refs) >= _limit(known) * (1.0 - 1e-9))
+    return np.asarray(np.maximum(*refs) >= _limit(values) * (1.0 - 1e-9))
 
 
-def _out_of_reach(recording: xr.Dataset, known: Mapping[str, Any]) -> list[str]:
-    """Return whether the current limit keeps a moment out of reach as long as it is demanded."""
-    begin, end = _longest(_short_of(recording, known) & _limited(recording, known))
+def _out_of_reach(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
+    """Warn that the current limit keeps a moment out of reach as long as it is demanded."""
+    begin, end = _longest(_short_of(recording, values) & _limited(recording, values))
     t, demand = recording["time"].values, recording["M_set"].values
-    wanted = float(demand[begin : end + 1].max())
+    demanded = float(demand[begin : end + 1].max())
     moment = np.abs(recording["M_B"].values)
-    most = float(moment[demand >= _REACHED * wanted].max())
-    if t[end] - t[begin] < _LONG or most >= _REACHED * wanted or _swings(recording, known):
+    most = float(moment[demand >= _REACHED * demanded].max())
+    if t[end] - t[begin] < _LONG or most >= _REACHED * demanded or _swings(recording, values):
         return []
     return [
-        f"the motors cannot reach the demanded {wanted:.4g} N*m: on the current limit of "
-        f"{_limit(known):.4g} A from t = {t[begin]:.4g} s to {t[end]:.4g} s, the moment stays at "
+        f"the motors cannot reach the demanded {demanded:.4g} N*m: on the current limit of "
+        f"{_limit(values):.4g} A from t = {t[begin]:.4g} s to {t[end]:.4g} s, the moment stays at "
         f"{most:.4g} N*m at most"
     ]
 
 
-def _not_reached(recording: xr.Dataset, known: Mapping[str, Any]) -> list[str]:
-    """Return whether the largest demand was never met, whatever the cause."""
-    wanted = float(recording["M_set"].values.max())
+def _not_reached(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
+    """Warn that the moment never reached the largest demand, whatever the cause."""
+    demanded = float(recording["M_set"].values.max())
     most = float(np.abs(recording["M_B"].values).max())
     sparse = np.diff(recording["time"].values).max(initial=0.0) > _LONG  # may miss the peak
-    if sparse or most >= _REACHED * wanted:
+    if sparse or most >= _REACHED * demanded:
         return []
-    text = f"the demand of {wanted:.4g} N*m was not reached: the moment is {most:.4g} N*m at most"
-    M_on, speed = known["control.moment.M_on"], np.abs(recording["Omega"].values).max()
-    if wanted <= M_on:
+    text = f"the demand of {demanded:.4g} N*m was not reached: the moment is {most:.4g} N*m at most"
+    M_on, speed = values["control.moment.M_on"], np.abs(recording["Omega"].values).max()
+    if demanded <= M_on:
         text += f", as the brake stays parked up to control.moment.M_on = {M_on:.4g} N*m"
-    elif speed < known["control.moment.Omega_still"]:
+    elif speed < values["control.moment.Omega_still"]:
         text += ", as the disc stands"
     return [text]
 
 
-def _limits(recording: xr.Dataset, known: Mapping[str, Any]) -> list[str]:
-    """Return whether the current limit was reached in passing, or is swung between."""
-    limited, limit = _limited(recording, known), _limit(known)
-    if not limited.any() or _out_of_reach(recording, known):
+def _limits(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
+    """Warn that the current limit was reached in passing, or that currents swing between limits."""
+    limited, limit = _limited(recording, values), _limit(values)
+    if not limited.any() or _out_of_reach(recording, values):
         return []
-    swings = _swings(recording, known)
+    swings = _swings(recording, values)
     if swings:
         begin, end, number = swings
         return [
@@ -509,9 +506,9 @@ def _limits(recording: xr.Dataset, known: Mapping[str, Any]) -> list[str]:
     return [f"the current limit of {limit:.4g} A was reached {_when(recording, k)}"]
 
 
-def _swings(recording: xr.Dataset, known: Mapping[str, Any]) -> tuple[float, float, int] | None:
+def _swings(recording: xr.Dataset, values: Mapping[str, Any]) -> tuple[float, float, int] | None:
     """Return begin and end [s] of the longest swing between both limits, and its reversals."""
-    t, limit, begin = recording["time"].values, _limit(known) * (1.0 - 1e-9), None
+    t, limit, begin = recording["time"].values, _limit(values) * (1.0 - 1e-9), None
     for name in ("i_1_ref", "i_2_ref"):
         current = recording[name].values
         rows = np.flatnonzero(np.abs(current) >= limit)
@@ -522,11 +519,11 @@ def _swings(recording: xr.Dataset, known: Mapping[str, Any]) -> tuple[float, flo
     return begin
 
 
-def _short_of(recording: xr.Dataset, known: Mapping[str, Any]) -> Rows:
-    """Return where a moment is controlled on a turning disc and stays below its demand."""
-    turning = np.abs(recording["Omega"].values) > known["control.moment.Omega_still"]
-    wanted = _REACHED * recording["M_set"].values
-    below = np.abs(recording["y_M"].values) < wanted
+def _short_of(recording: xr.Dataset, values: Mapping[str, Any]) -> Rows:
+    """Return the rows in which a moment is controlled on a turning disc, below its demand."""
+    turning = np.abs(recording["Omega"].values) > values["control.moment.Omega_still"]
+    demanded = _REACHED * recording["M_set"].values
+    below = np.abs(recording["y_M"].values) < demanded
     return np.asarray((recording["mode"].values == MOMENT) & turning & below)
 
 
@@ -540,8 +537,8 @@ def _longest(rows: Rows) -> tuple[int, int]:
     return int(begins[k]), int(ends[k])
 
 
-def _holding_screw(known: Mapping[str, Any]) -> list[str]:
-    if known["screw.law"] != "load" or known["screw.eta_b"] != 0.0:
+def _holding_screw(values: Mapping[str, Any]) -> list[str]:
+    if values["screw.law"] != "load" or values["screw.eta_b"] != 0.0:
         return []
     return [
         "screw.eta_b = 0: no load drives these screws back, so that the brake keeps its moment "

@@ -10,8 +10,7 @@ import numpy as np
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import Friction, equilibrium, linearize
-from bywire.analysis.linear.plant import Plant, PlantPoint
-from bywire.analysis.loop import Point, Quantity
+from bywire.analysis.loop import Plant, PlantPoint, Point, Quantity
 from bywire.analysis.reduction import residualized
 from bywire.brakes.wedge.control import Stimulus
 from bywire.brakes.wedge.elements import wedge

@@ -1,6 +1,6 @@
-"""What Roberts et al. (2003) state of the moments and powers of their Figs. 7 to 9.
+"""Moments and powers that Roberts et al. (2003) state for their Figs. 7 to 9.
 
-Moments that are held, reached or followed have the tolerance by which they are judged, as a band.
+Moments that are held, reached or followed have a band: the tolerance of the comparison.
 """
 
 from __future__ import annotations

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from bywire.analysis.crossings import bandwidth
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.frequency_response import frequency_response
-from bywire.analysis.response.harmonics import amplitudes
-from bywire.analysis.response.sweep import Sweep
+from bywire.analysis.response.sweep import Sweep, amplitudes
 from bywire.brakes.wedge.paper.statements import FACTS, parameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
