@@ -321,7 +321,7 @@ def test_report_opens_with_causes_and_shows_every_figure(
         paths = reproduction.write(tmp_path)
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert html.count("<figcaption>Figure") == len(reproduction.figures)
-    assert html.index("leaves friction out") < html.index("<figcaption>Figure")
+    assert html.index("neglects friction") < html.index("<figcaption>Figure")
     results = json.loads((tmp_path / "results.json").read_text())
     assert results.pop("files") == [str(path) for path in paths]
     assert results == reproduction.as_object()

@@ -174,7 +174,7 @@ class Kind(Generic[T]):
         if self.declared and not files and "did you mean" not in str(error):
             loading = "--system PATH, or " * is_command_line() + "bywire.load_system"
             hints.append(f"that of a brake of your own takes {loading}")
-        return UnknownNameError("; ".join([str(error), *hints]).replace("?; ", "? "))
+        return error.reworded("; ".join([str(error), *hints]).replace("?; ", "? "))
 
     def guess(self, name: str) -> T | None:
         """Return the thing of a name if a file that is called so, or that quotes it, declares it.

@@ -1,4 +1,4 @@
-"""Vehicles around any brake: what they share, and what is said of their stops."""
+"""Vehicles around any brake: bodies, slip control, ideal stops, and animations."""
 
 from bywire.vehicle.corner import (
     Corner,

@@ -1,7 +1,7 @@
 """A car's corner around any brake with a disc: body, tyre, road, and the heat of the disc.
 
 A corner inherits from `Corner` and from the assembly of its brake, whose disc turns with the wheel.
-It says in ``wheel`` how fast that turns, and lets `tyre_torque` turn it.
+Its method ``wheel`` returns the speed of the disc, on which it applies `tyre_torque`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class WheelSpeed(NamedTuple):
 
 
 class Corner(Assembly[ParT, MemoryT]):
-    """Body and tyre of a corner; parameters stand in ``corner``."""
+    """Body and tyre of a corner; their parameters are in ``corner``."""
 
     corner = Part(corner_body, par="corner.body", outside=True, state={"v": "v_x"})
     tyre = Part(tyre, par="corner.tyre")
@@ -56,7 +56,7 @@ class Corner(Assembly[ParT, MemoryT]):
     E_body = Shown("J", "energy of the body", role=Role("sink", "body", book=BOOK, returns="any"))
 
     def wheel(self, w: Self) -> WheelSpeed:
-        """Return how fast the wheel turns."""
+        """Return the speed of the wheel."""
         raise NotImplementedError
 
     def tyre_torque(self, w: Self) -> float:
@@ -74,7 +74,7 @@ class Corner(Assembly[ParT, MemoryT]):
         return par.r * w.F_x
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return where the vehicle's energy goes."""
+        """Return the powers of the vehicle's energy balance."""
         body = w.corner.par
         return {
             **super().power(w),
@@ -84,7 +84,7 @@ class Corner(Assembly[ParT, MemoryT]):
         }
 
     def record(self, w: Self) -> dict[str, float]:
-        """Return what is recorded beside states, wires and losses."""
+        """Return the recorded signals other than states, wires and losses."""
         return {
             **super().record(w),
             "v_tread": w.tyre.u.v_wheel,
@@ -101,9 +101,6 @@ def rolling_states(v: float) -> dict[str, Any]:
 
 
 # --- A corner whose brake warms up and fades
-# A corner inherits from `HotCorner` in place of `Corner`, has parameters ``corner.heat``, lets the
-# friction of its pads follow `pads_friction`, and says in ``brake_torque`` what its brake can
-# hold.
 
 
 class HotCornerParameters(CornerParameters):
@@ -113,7 +110,12 @@ class HotCornerParameters(CornerParameters):
 
 
 class HotCorner(Corner[ParT, MemoryT]):
-    """Friction heats the disc, and the pads rub as they can at that heat."""
+    """A corner whose friction heats the disc, so that its pads may fade.
+
+    A corner inherits from it instead of `Corner`, has parameters ``corner.heat``, and multiplies
+    the friction of its pads by `pads_friction`. Its method ``brake_torque`` returns the torque that
+    its brake can hold.
+    """
 
     disc_heat = Part(
         disc_heat, par="corner.heat", fixed=disc_heat.State._fields, outside=True, loss="E_air"
@@ -132,11 +134,11 @@ class HotCorner(Corner[ParT, MemoryT]):
     )
 
     def braked(self, w: Self) -> float:
-        """Return what the brake has taken from the wheel [J]."""
+        """Return the energy that the brake has taken from the wheel [J]."""
         raise NotImplementedError
 
     def brake_torque(self, w: Self) -> float:
-        """Return what the brake can hold at the wheel [N m], >= 0."""
+        """Return the torque that the brake can hold at the wheel [N m], >= 0."""
         raise NotImplementedError
 
     def pads_friction(self, w: Self) -> float:
@@ -144,7 +146,7 @@ class HotCorner(Corner[ParT, MemoryT]):
         return disc_heat.friction(w.disc_heat.xe.T_disc, w.disc_heat.par)
 
     def wire(self, w: Self) -> None:
-        """Say what warms the brake: limit of the friction times speed, 0 where the wheel stands."""
+        """Connect the brake's heat: limit of the friction times speed, 0 where the wheel stands."""
         super().wire(w)
         torque = self.brake_torque(w)
         w.disc_heat.u = disc_heat.Input(
@@ -154,7 +156,7 @@ class HotCorner(Corner[ParT, MemoryT]):
         )
 
     def record(self, w: Self) -> dict[str, float]:
-        """Return the heat that the bodies hold, and where it came from."""
+        """Return the heat in the bodies, and its source."""
         heat = disc_heat.stored(w.disc_heat.x, w.disc_heat.par)
         return {
             **super().record(w),

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bywire.simulation.run_group import simulate_group
 
 import bywire
 from bywire.bench.experiment import as_run
 from bywire.bench.kpis.vehicle_stop import standstill
 from bywire.brakes.two_wheeler.experiments.straight_stop import STRAIGHT_STOP
+from bywire.simulation.ensemble import simulate_group
 
 OFF = {"ecu.abs": "off", "ecu.lift": "off", "ecu.p_rate": "1e7 bar/s"}
 KNOWN = {"ecu.sees": "known", "sensors.encoder.law": "ideal"}

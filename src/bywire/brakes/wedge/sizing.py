@@ -1,7 +1,7 @@
-"""Drive trains of the wedge brake: what each must do, how it answers, and many compared.
+"""Drive trains of the wedge brake: demand, response, and comparison of many designs.
 
-A design is a slope of the wedge and a lead of the screws. Everything that follows from them is
-derived here, and the speeds of the reference are set so that every design answers equally fast.
+A design is a slope of the wedge and a lead of the screws. All other
+parameters follow from them. The speeds of the reference make every design respond equally fast.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ PHASES = tuple(0.5 * math.pi * k for k in range(4))
 
 @dataclass(frozen=True)
 class Demand:
-    """What every design must do.
+    """Demand on every design.
 
     Parameters
     ----------
@@ -53,12 +53,12 @@ class Demand:
     mu_B
         Friction coefficients of the pads.
     known
-        Whether the moment control knows the coefficient, so that its crossover stays.
+        Whether the moment control knows the coefficient, so that its crossover is unchanged.
     enforced
-        Whether the time is enforced by the speed of the reference; else the pads' closing speed
-        is that of the given brake.
+        Whether the speed of the reference enforces the time; otherwise the pads' closing speed is
+        that of the given brake.
     whole
-        Whether the power of the release counts too, else that of build-up and hold alone.
+        Whether the power of the release counts too, or that of build-up and hold alone.
     phases
         Angles of the disc [rad] at which the runs begin.
     """
@@ -76,9 +76,9 @@ class Demand:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a design does, per friction coefficient, shape (cases,); the worst of all phases.
+    """Response of a design, per friction coefficient, shape (cases,); the worst of all phases.
 
-    Where on a revolution the disc's run-out meets the stop is chance: several phases are tried.
+    The phase of the disc's run-out at the stop is chance: the study tries several.
 
     Parameters
     ----------
@@ -87,9 +87,9 @@ class Answer:
     t_90
         Time to 90 % of the demand [s]; NaN where it is not reached.
     filtered, instantaneous
-        Largest power at the drives' input [W], as the rig shows it and as it is, where it counts.
+        Largest power at the drives' input [W], with and without the rig's filter, where it counts.
     release
-        Largest power during the release [W], as the rig shows it.
+        Largest power during the release [W], with the rig's filter.
     current
         Largest current demand of either motor [A].
     speed
@@ -124,7 +124,7 @@ class Answer:
 # --- One design
 
 Efficiency = Literal["friction-angle", "as-given"]
-"""what stays of the screw over the lead: the friction angle, or the efficiency"""
+"""constant property of the screw over the lead: the friction angle, or the efficiency"""
 SPEEDS = ("omega_gap", "a_gap", "omega_creep", "rate_max")
 """parameters of the moment control that set how fast the reference moves"""
 SIGNALS = (
@@ -139,10 +139,10 @@ SIGNALS = (
     "E_copper",
     "E_shaft",
 )
-_FASTEST = 8.0  # closing speeds are looked for up to so many times the least
+_FASTEST = 8.0  # largest closing speed of the search, over the least
 _ROUNDS, _TRIED = 2, 8  # rounds, and speeds tried in each between too slow and fast enough
 _SETTLE, _RECORD, _STEP = 0.05, 2e-4, 20e-6
-_LAST = 0.8  # of the demand: what follows is its end
+_LAST = 0.8  # share of the demand's time after which its end begins
 _TINY = 1e-9
 
 
@@ -184,15 +184,15 @@ def redesigned(
 def efficiencies(par: WedgeParameters, lead: float) -> dict[str, float]:
     r"""Return the efficiencies of a screw of another lead [m] with the same friction angle.
 
-    With the lead angle :math:`\lambda` and the friction angle :math:`\rho`, small both, as they are
-    in a screw that can be driven back:
+    With the lead angle :math:`\lambda` and the friction angle :math:`\rho`, both small, as in a
+    screw that can be driven back:
 
     .. math::
         1/\eta_f - 1 = \tan(\lambda + \rho) / \tan\lambda - 1 \approx \rho / \lambda, \quad
         1 - \eta_b = 1 - \tan(\lambda - \rho) / \tan\lambda \approx \rho / \lambda
 
-    so that both fall with 1/lead: the friction torque by the axial force stays. A screw of so
-    small a lead that it locks itself has :math:`\eta_b = 0`.
+    so that both losses fall with 1/lead: the friction torque by the axial force is constant. A
+    self-locking screw, of a small lead, has :math:`\eta_b = 0`.
     """
     ratio = par.screw.lead / lead
     eta_f = 1.0 / (1.0 + (1.0 / par.screw.eta_f - 1.0) * ratio)
@@ -201,20 +201,20 @@ def efficiencies(par: WedgeParameters, lead: float) -> dict[str, float]:
 
 
 def answer(par: WedgeParameters, demand: Demand) -> Answer:
-    """Return what a brake does at the smallest closing speed that is fast enough.
+    """Return a brake's response at the smallest closing speed that is fast enough.
 
     The speeds of the reference have a common factor. With ``demand.enforced`` it is the smallest
-    one at which the slowest case meets the demanded time, within 1 %; where none does, the one
-    that comes closest. Else it is 1.
+    factor with which the slowest case meets the demanded time, within 1 %. If no factor does, it
+    is the one that comes closest. Otherwise it is 1.
     """
     controlled = par.replace({"command.mode": "moment"})
     if not demand.enforced:
         return _judged(controlled, demand, 1.0)
-    # The pads cannot be slower than their travel in the time demanded.
+    # The pads must at least cover their travel in the demanded time.
     pads = [controlled.replace({"wedge.mu_B": mu_B}) for mu_B in demand.mu_B]
     F_N = 0.9 * max(force_for(demand.moment, brake) for brake in pads)
     least = travel_for(F_N, controlled) * wedge.slope(controlled.wedge) / demand.t_90
-    # All speeds of a round run side by side: a round of eight costs little more than one.
+    # All speeds of a round run in parallel lanes: eight cost little more than one.
     factors = least / closing_speed(controlled) * np.geomspace(1.0, _FASTEST, _TRIED)
     low = high = slow_time = fast_time = math.nan
     for _ in range(_ROUNDS):
@@ -255,9 +255,9 @@ def _variations(par: WedgeParameters, demand: Demand, factors: Array) -> Mapping
 
 
 def _slowest(par: WedgeParameters, demand: Demand, factors: Array) -> Array:
-    """Return the time to 90 % of the slowest case [s] for every factor; infinite for none.
+    """Return the time to 90 % of the slowest case [s] for every factor; infinite if not reached.
 
-    Only the smallest and the largest friction coefficient are looked at here.
+    Only the smallest and the largest friction coefficient are simulated.
     """
     demand = replace(demand, mu_B=(min(demand.mu_B), max(demand.mu_B)))
     cases, slowest = _variations(par, demand, factors), np.zeros(factors.size)
@@ -328,7 +328,7 @@ HELD = 0.95
 """share of the demand that counts as held"""
 LEFT = 0.05
 """share of the demand below which the brake counts as released"""
-_NEVER = 10.0  # what stands for the lateness of a moment that is never reached
+_NEVER = 10.0  # lateness of a moment that is never reached
 
 _PER_CASE = {
     "t_90": ("s", "time to 90 % of the demand"),
@@ -353,7 +353,7 @@ def mapped(
     progress: Callable[[float], None] = lambda share: None,
     efficiency: Efficiency = "friction-angle",
 ) -> xr.Dataset:
-    """Return what all designs on a grid do; on all cores, stopped by an interrupt.
+    """Return the responses of all designs on a grid, computed on all cores; can be interrupted.
 
     ``slopes``, ``leads``: slopes of the wedge, shape (n,), and leads of the screws [m], shape (m,);
     ``progress``: called with the finished share, 0 to 1; ``efficiency``: see `redesigned`.
@@ -391,7 +391,7 @@ def _dataset(answers: Sequence[Answer], demand: Demand, axes: Mapping[str, Label
         for name in _PER_CASE
     }
     data = labeled(axes, {name: (cases[name], *_PER_CASE[name]) for name in _PER_CASE})
-    slowest = cases["t_90"].max(axis=2)  # NaN where one case never gets there
+    slowest = cases["t_90"].max(axis=2)  # NaN where one case does not reach it
     lateness = np.where(np.isnan(slowest), _NEVER, slowest / demand.t_90)
     in_time = (lateness <= LATE) if demand.enforced else (lateness < _NEVER)
     holds = cases["held"].min(axis=2) >= HELD * demand.moment

@@ -1,4 +1,4 @@
-"""Stops from walking pace: held until the end of the run, or held on a slope and let go."""
+"""Stops from walking pace: held until the end of the run, or held on a slope and released."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.two_wheeler.case import Course, Demand, RidingSpeed, rolling_case, vehicle_of
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
-from bywire.core.errors import ParameterError
+from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.core.typing import Array
@@ -24,7 +24,7 @@ _CALM = 2.0  # s after the stop
 
 
 class WalkingPaceOptions(ParameterSet):
-    """What both stops start with."""
+    """Speed, demands and slope of both stops."""
 
     v_0: RidingSpeed
     """speed at the start"""
@@ -37,7 +37,7 @@ class WalkingPaceOptions(ParameterSet):
 
 
 def _uncontrolled(gradient: float) -> dict[str, float | str]:
-    """Return the parameters of a road of a slope, and of an ECU that leaves all to the rider."""
+    """Return the parameters of a road of a slope, and of an ECU without slip and lift control."""
     return {
         "vehicle.road.gradient": gradient,
         "vehicle.road.gradient_further": gradient,
@@ -55,8 +55,11 @@ SLOW_FIGURES = Figures(
     undefined="the vehicle does not stop in the recorded time",
     stopping_distance=("m", "Distance from time zero to the first standstill."),
     stopping_time=("s", "Time from zero to the first standstill."),
-    rebound_speed=("m/s", "Largest speed backward after it: the tyres' give, the final jerk."),
-    rollback=("m", "Distance from the farthest place to that at the end."),
+    rebound_speed=(
+        "m/s",
+        "Largest speed backward after it: the final jerk, by the tyres' elasticity.",
+    ),
+    rollback=("m", "Distance from the farthest place to the place at the end."),
     ringing_time=("s", f"Time from the standstill until the speed stays below {_QUIET:g} m/s."),
     creep_speed=("m/s", f"Largest speed from {_CALM:g} s after the first standstill on."),
     creep=("m", "Distance in that time."),
@@ -64,7 +67,7 @@ SLOW_FIGURES = Figures(
 
 
 class SlowStopOptions(WalkingPaceOptions):
-    """The stop, and the slope; slip and lift control stay off."""
+    """The stop, and the slope; slip and lift control are off."""
 
     duration: Duration
     """time recorded"""
@@ -73,14 +76,14 @@ class SlowStopOptions(WalkingPaceOptions):
 def slow_stop(
     par: TwoWheelerParameters, options: SlowStopOptions, _: object = None
 ) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     demands = {"p_f_set": options.p_front, "p_r_set": options.p_rear}
     changes = _uncontrolled(options.gradient)
     return (rolling_case(par, options.v_0, demands, options.duration, changes),)
 
 
 def judge_slow_stop(recordings: Recordings, _: SlowStopOptions) -> tuple[Kpi, ...]:
-    """Return how the vehicle comes to rest, and how it stays there."""
+    """Return rebound, ringing and creep of the vehicle."""
     run = recordings["run"]
     end = vehicle_stop.standstill(run["time"].values, run["v"].values)
     if math.isnan(end):
@@ -119,32 +122,32 @@ SLOW_STOP = Experiment(
 )
 
 
-# --- Held on a slope, then let go
+# --- Held on a slope, then released
 
-_OPENED, _ROLLS = 0.5, 1.5  # s after letting go: from when on it rolls freely, and how long at most
+_OPENED, _ROLLS = 0.5, 1.5  # s from the release to free rolling, and its longest time
 
 HOLD_FIGURES = Figures(
-    undefined="the vehicle does not stop before it is let go",
+    undefined="the vehicle does not stop before the release",
     stopping_time=("s", "Time from zero to the first standstill."),
-    creep_speed=("m/s", f"Largest speed from {_CALM:g} s after it until the brakes are let go."),
+    creep_speed=("m/s", f"Largest speed from {_CALM:g} s after it until the release."),
     creep=("m", "Distance in that time."),
     held_time=("s", "That time."),
     roll_off=(
         "m/s**2",
-        f"Mean acceleration downhill, from {_OPENED:g} s after letting go on.",
+        f"Mean acceleration downhill, from {_OPENED:g} s after the release on.",
     ),
     free_roll_off=(
         "m/s**2",
-        "The same in closed form: slope less rolling resistance, wheels turning along.",
+        "The same in closed form: slope minus rolling resistance, with the inertia of the wheels.",
     ),
 )
 
 
 class SlopeHoldOptions(WalkingPaceOptions):
-    """Stop, slope, and how long it is held; slip and lift control stay off."""
+    """Stop, slope, and time of the hold; slip and lift control are off."""
 
     t_release: Duration
-    """time at which the rider lets go"""
+    """time of the release"""
     duration: Duration
     """time recorded"""
 
@@ -152,11 +155,11 @@ class SlopeHoldOptions(WalkingPaceOptions):
 def slope_hold(
     par: TwoWheelerParameters, options: SlopeHoldOptions, _: object = None
 ) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     if not options.t_release < options.duration:
-        raise ParameterError(
-            f"options.t_release = {options.t_release:g} s is not within options.duration = "
-            f"{options.duration:g} s: what follows the release would not be recorded"
+        release, end = f"{options.t_release:g} s", f"< options.duration = {options.duration:g} s"
+        raise not_valid(
+            "options.t_release", release, end, "or nothing is recorded after the release"
         )
 
     def held(p: float) -> Course:
@@ -172,8 +175,8 @@ def free_roll_off(par: VehicleParameters) -> float:
 
     .. math:: a = g (|\sin\gamma| - C_{rr} \cos\gamma) \frac{m}{m + \sum J/r^2},
 
-    at least zero: below the slope of the rolling resistance it stays. Both wheels have their
-    share of the weight, and air drag is left out.
+    at least zero: below the slope of the rolling resistance the vehicle stays. Both wheels carry
+    their share of the weight, and air drag is neglected.
     """
     body, front, rear = par.body, par.front_wheel, par.rear_wheel
     slope = road.slope(0.0, par.road)
@@ -185,14 +188,17 @@ def free_roll_off(par: VehicleParameters) -> float:
 
 
 def judge_slope_hold(recordings: Recordings, options: SlopeHoldOptions) -> tuple[Kpi, ...]:
-    """Return how the vehicle stays, and how it rolls off."""
+    """Return creep and roll-off of the vehicle."""
     run = recordings["run"]
     t, x, v = (run[name].values for name in ("time", "x", "v"))
     end = vehicle_stop.standstill(t, v)
     held = (t >= end + _CALM) & (t < options.t_release)
     rolls = (t >= options.t_release + _OPENED) & (t <= options.t_release + _OPENED + _ROLLS)
     stays = math.isfinite(end) and end < options.t_release
-    short = (math.nan, f"it is held for less than {_CALM:g} s" if stays else "it does not stop")
+    short = (
+        math.nan,
+        f"the brakes hold for less than {_CALM:g} s" if stays else "the vehicle does not stop",
+    )
     brief = (math.nan, f"less than {_OPENED:g} s are recorded after the release")
     return HOLD_FIGURES(
         stopping_time=end if stays else math.nan,
@@ -205,14 +211,14 @@ def judge_slope_hold(recordings: Recordings, options: SlopeHoldOptions) -> tuple
 
 
 def _slope(t: Array, v: Array, gradient: float) -> float:
-    """Return how much faster it gets downhill, on average."""
+    """Return the mean acceleration downhill."""
     return float((v[-1] - v[0]) / (t[-1] - t[0])) * (-1.0 if gradient > 0.0 else 1.0)
 
 
 SLOPE_HOLD = Experiment(
     name="slope-hold",
     assembly="two-wheeler-by-wire",
-    summary="stop from {v_0} on a slope of {gradient:%}, held until {t_release}, then let go",
+    summary="stop from {v_0} on a slope of {gradient:%}, held until {t_release}, then released",
     options=SlopeHoldOptions,
     defaults=SlopeHoldOptions(
         v_0=3.0, p_front=40e5, p_rear=40e5, gradient=0.05, t_release=23.0, duration=25.0

@@ -57,15 +57,15 @@ class StraightStopOptions(PanicOptions):
     """The stop, and the surface; slope and controllers are parameters."""
 
     surface: SurfaceName
-    """what the road is made of"""
+    """surface of the road"""
     duration: TimeConstant
-    """time recorded; 0 for as long as locked wheels take on this surface, and a little more"""
+    """time recorded; 0 for the stopping time of locked wheels on this surface, with a margin"""
 
 
 def straight_stop(
     par: TwoWheelerParameters, options: StraightStopOptions, _: object = None
 ) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     changes = on_surface(options.surface)
     duration = options.duration or locked_stop(options.v_0, par.replace(changes).vehicle)
     return (rolling_case(par, options.v_0, _demands(options), duration, changes),)
@@ -93,7 +93,7 @@ ACTUATOR_FIGURES = Figures(
     rear_current=("A", "Largest magnitude of the current of its motor until then."),
     rear_pressure_error=(
         "Pa",
-        "Root mean square of what the rear brake is asked for less the pressure at its pads.",
+        "Root mean square of the demand on the rear brake minus the pressure at its pads.",
     ),
 )
 _ACTUATOR_SIGNALS = ("v", "E_rear_source", "rear_i", "p_r_ref", "p_r")
@@ -102,7 +102,7 @@ _ACTUATOR_SIGNALS = ("v", "E_rear_source", "rear_i", "p_r_ref", "p_r")
 def whole_rear_stop(
     par: WholeRearParameters, options: StraightStopOptions, _: object = None
 ) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     changes = {**on_surface(options.surface), "rear.actuator.drive.mode": "pressure"}
     duration = options.duration or locked_stop(options.v_0, par.replace(changes).vehicle)
     vehicle = (TwoWheelerWholeRear, at_speed)
@@ -110,7 +110,7 @@ def whole_rear_stop(
 
 
 def actuator_effort(run: xr.Dataset, _: StraightStopOptions) -> tuple[Kpi, ...]:
-    """Return what the rear actuator takes until the vehicle stands, or to the end."""
+    """Return energy, current and pressure error of the rear actuator until the vehicle stands."""
     t, *signals = (run[name].values for name in ("time", *_ACTUATOR_SIGNALS))
     end = vehicle_stop.standstill(t, signals[0])
     braked = (t >= 0.0) & (t <= (end if math.isfinite(end) else math.inf))
@@ -137,7 +137,7 @@ WHOLE_REAR_STOP = Experiment(
 )
 
 
-# --- Over the bandwidth of the brakes: what speed of the actuator buys
+# --- Over the bandwidth of the brakes: the benefit of faster actuators
 
 _COMPARED = {
     "stopping_distance": "m",
@@ -152,7 +152,7 @@ class BandwidthsOptions(PanicOptions):
     """The stop, and the natural frequencies of both pressure loops."""
 
     surface: SurfaceName
-    """what the road is made of"""
+    """surface of the road"""
     f_n: Annotated[Nodes, Unit("Hz", 10.0), Field(min_length=1)]
     """natural frequencies of the pressure loops, one run each"""
     duration: Duration
@@ -250,7 +250,7 @@ class SurfaceJumpOptions(PanicOptions):
     further: SurfaceName
     """surface from x_change on"""
     x_change: Distance
-    """where that begins"""
+    """place where that surface begins"""
     duration: Duration
     """time recorded"""
 
@@ -258,7 +258,7 @@ class SurfaceJumpOptions(PanicOptions):
 def surface_jump(
     par: TwoWheelerParameters, options: SurfaceJumpOptions, _: object = None
 ) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     changes = {
         **on_surface(options.first, options.further),
         "vehicle.road.x_change": options.x_change,
@@ -268,7 +268,7 @@ def surface_jump(
 
 
 def recovery(run: xr.Dataset, options: SurfaceJumpOptions) -> tuple[Kpi, ...]:
-    """Return how the front wheel takes the further surface."""
+    """Return the front wheel's recovery on the further surface."""
     t, x, v = (run[name].values for name in ("time", "x", "v"))
     if not np.any(x > options.x_change):
         undefined = (math.nan, "the vehicle stops before the further surface")

@@ -39,7 +39,7 @@ SIMULATED = ("sigma_i", "sigma_F")
 
 
 class RigOptions(ParameterSet):
-    """Which part of the motion counts, and the synthetic noise."""
+    """Part of the motion that counts, and the synthetic noise."""
 
     cutoff: Frequency
     """low-pass of the speed"""
@@ -67,7 +67,7 @@ def drive_sensors(options: RigOptions) -> dict[str, Sensor]:
 _WAVES = {
     "cos": "cogging of known order over the motors' angle against each other, cosine",
     "sin": "the same, sine",
-    "cos_drift": "what a drift of both motors the same way adds, cosine",
+    "cos_drift": "effect of a drift of both motors in the same direction, cosine",
     "sin_drift": "the same, sine",
 }
 
@@ -79,12 +79,12 @@ def cogging_waves(q_1: Array, q_2: Array, order: float) -> Array:
         \{\cos\psi, \sin\psi\} \times \{\cos\delta, \sin\delta\}, \qquad
         \psi = N \frac{q_1 - q_2}{2}, \quad \delta = N \frac{q_1 + q_2}{2}
 
-    with :math:`\delta` less its mean: every :math:`a \cos(N q_1 + \varphi_1) + b \cos(N q_2 +
-    \varphi_2)` is a sum of them. The motors turn against each other, and :math:`\delta` is only by
-    how much cogging itself moves both the same way; its waves vanish with it.
+    with :math:`\delta` minus its mean: every :math:`a \cos(N q_1 + \varphi_1) + b \cos(N q_2 +
+    \varphi_2)` is a sum of them. The motors turn against each other, and :math:`\delta` is only
+    the common motion that cogging causes; its waves vanish with it.
 
-    Where one motor stands, its cogging is no wave, but part of the offset: what is returned then
-    are the waves of the other, and zeros.
+    Where one motor stands, its cogging is a part of the offset and not a wave: the result is then
+    the waves of the other, and zeros.
 
     ``q_1``, ``q_2``: angles [rad], shape (n,); ``order``: periods per revolution, N.
     """
@@ -99,7 +99,7 @@ def cogging_waves(q_1: Array, q_2: Array, order: float) -> Array:
 
 
 def cogging_unknowns(par: WedgeParameters, stage: str) -> tuple[Unknown, ...]:
-    """Return the waves' amplitudes in a stage, in terms of the current."""
+    """Return the unknown amplitudes of the waves in the current of a stage."""
     K = servo_motor.torque_constant(par.motor_1)
     size = max(par.motor_1.T_cog, par.motor_2.T_cog, 1e-4) / K
     return tuple(
@@ -126,7 +126,7 @@ LAW_MEANINGS: Mapping[str, tuple[str, str]] = {
 """unknowns of the law -> SI unit and meaning"""
 
 LAW_NAMES = tuple(LAW_MEANINGS)
-_AGAINST = -0.5  # correlation of current and force: beyond chance
+_AGAINST = -0.5  # correlation of current and force that is not by chance
 
 
 @dataclass(frozen=True)
@@ -136,22 +136,22 @@ class Squeeze:
     Parameters
     ----------
     i
-        Current that squeezes, mean of both motors, at the stated speed [A].
+        Current that squeezes, mean of both motors, at the reference speed [A].
     F
-        Force by the sensor, the lag of its amplifier allowed for, compression positive [N].
+        Force by the sensor, corrected for the lag of its amplifier, compression positive [N].
     d
-        How much closer the encoders say the nuts are [m].
+        Approach of the nuts by the encoders [m].
     way
         1 closing, -1 opening.
     waves
         Of the cogging, shape (n, 4).
     reach
-        The travel one margin before a window begins, and at its end [m], shape (n, 2): what
-        happens in between shows in the window.
+        Travel one margin before a window begins, and at its end [m], shape (n, 2): events in
+        between affect the window.
     each
         Speed of one motor in each window [rad/s].
     speed
-        Of one motor, that the current is stated at [rad/s].
+        Reference speed of one motor, to which the current is corrected [rad/s].
     """
 
     i: Array
@@ -169,7 +169,7 @@ class Squeeze:
         return replace(self, **columns)
 
     def under(self, F: Array, par: WedgeParameters) -> Squeeze:
-        """Return the same with forces that no sensor told, and the current stated anew for them."""
+        """Return the same with other forces, and the current corrected for them."""
         before = _speed_effect(self.F, self.each, self.speed, par)
         after = _speed_effect(F, self.each, self.speed, par)
         return replace(self, i=self.i + self.way * (before - after), F=F)
@@ -180,7 +180,7 @@ def squeeze(
     par: WedgeParameters,
     options: RigOptions,
     where: str,
-    speed_stated: float | None = None,
+    reference_speed: float | None = None,
 ) -> Squeeze:
     """Return the steady motions of a record.
 
@@ -195,8 +195,8 @@ def squeeze(
         How the record is filtered and cut into windows.
     where
         Name of the record in messages.
-    speed_stated
-        Speed of one motor [rad/s] at which the current is stated; the record's mean by default.
+    reference_speed
+        Speed of one motor [rad/s] to which the current is corrected; the record's mean by default.
 
     Raises
     ------
@@ -208,14 +208,15 @@ def squeeze(
     speed = np.gradient(low_passed(q_1 - q_2, interval, options.cutoff), interval)
     steady = windows(speed, interval, options.slowest, options.margin, options.window)
     side = np.sign(low_passed(data["y_F"].values, interval, options.cutoff))
-    # Where the force changes its sign, friction has a kink, and a mean over it is none of the law.
+    # Where the force changes its sign, friction has a kink, and a mean over it violates the law.
     steady = [w for w in steady if abs(float(side[w.rows].mean())) in (0.0, 1.0)]
     ways = np.array([np.sign(speed[w.rows].mean()) for w in steady])
     if not (np.any(ways > 0) and np.any(ways < 0)):
         raise ParameterError(
             f"{where}: the screws do not move both toward each other and apart at more than "
-            f"{options.slowest:g} rad/s: the friction cannot be told from the force; squeeze and "
-            "let go slowly, as 'bywire run force-cycle' does"
+            f"{options.slowest:g} rad/s, so that friction and force cannot be separated: squeeze "
+            "and let go slowly, as 'bywire run force-cycle' does",
+            name=where,
         )
 
     def means(values: Array) -> Array:
@@ -228,7 +229,7 @@ def squeeze(
     i = means(0.5 * (data["i_1"].values - data["i_2"].values))
     _require_along(i, F, where)
     each = 0.5 * np.abs(means(speed))
-    stated = float(each.mean()) if speed_stated is None else speed_stated
+    stated = float(each.mean()) if reference_speed is None else reference_speed
     beyond = _speed_effect(F, each, stated, par)
     d = roller_screw.slope(par.screw) * (q_1 - q_2)
     skip = round(options.margin / interval)
@@ -245,7 +246,7 @@ def squeeze(
 
 
 def _require_along(i: Array, F: Array, where: str) -> None:
-    """Refuse currents that pull apart where the sensor shows compression."""
+    """Require currents that squeeze where the sensor shows compression."""
     together = float(np.corrcoef(i, F)[0, 1]) if np.ptp(F) > 0.0 and np.ptp(i) > 0.0 else 0.0
     if together < _AGAINST:
         raise wrong_sign(
@@ -254,10 +255,10 @@ def _require_along(i: Array, F: Array, where: str) -> None:
 
 
 def _speed_effect(F: Array, speed: Array, stated: float, par: WedgeParameters) -> Array:
-    """Return the current by which friction at each speed exceeds that at the stated one [A].
+    """Return the current by which friction at each speed exceeds that at the reference speed [A].
 
-    A position loop gives way under load, so that the screws close slower than they open; the
-    friction of bearings and motors changes with the speed, and the line would turn by it.
+    A position loop yields under load, so that the screws close slower than they open. The friction
+    of bearings and motors changes with the speed, which would turn the line.
     """
     motor = par.motor_1
     bearing = np.array(
@@ -271,7 +272,7 @@ def _speed_effect(F: Array, speed: Array, stated: float, par: WedgeParameters) -
 
 
 def law_unknowns(par: WedgeParameters) -> tuple[Unknown, ...]:
-    r"""Return the unknowns of the law, started where the parameter set says.
+    r"""Return the unknowns of the law, with starting values of the parameter set.
 
     .. math::
         i = i_0 + F/c \pm (w_0 + w_1 |F| + w_2 F^2), \quad
@@ -306,7 +307,7 @@ def law(F: Array, way: Array, values: Array) -> tuple[Array, Array, Array]:
 
 
 def branches(squeezed: Squeeze, power: int, x: Array) -> Array:
-    """Return polynomials over x of their own for closing and opening, below, at and above zero."""
+    """Return separate polynomials over x for closing and opening, below, at and above zero."""
     scaled = x / max(float(np.abs(x).max()), 1e-300)
     groups = [
         (squeezed.way == way) & (np.sign(x) == side) for way in (1, -1) for side in (1, 0, -1)
@@ -329,7 +330,7 @@ def identify(
 
     .. math:: i = i_0 + F/c \pm (w_0 + w_1 |F| + w_2 F^2)
 
-    with the upper sign while the screws close; cogging of known order is fitted beside it.
+    with the upper sign while the screws close. Cogging of known order is fitted at the same time.
 
     Parameters
     ----------
@@ -340,7 +341,7 @@ def identify(
     Raises
     ------
     ParameterError
-        When they move one way only.
+        When the motors move in one direction only.
 
     References
     ----------
@@ -356,8 +357,10 @@ def identify(
         return e / scatter, np.hstack((columns, cycle.waves)) / scatter
 
     best = estimate(Problem(unknowns, evaluate))
-    known = {u.label: u.start for u in unknowns} | dict(zip(best.names, best.values, strict=True))
-    values = np.array([known[u.label] for u in unknowns])
+    estimates = {u.label: u.start for u in unknowns} | dict(
+        zip(best.names, best.values, strict=True)
+    )
+    values = np.array([estimates[u.label] for u in unknowns])
     return Identified(
         estimates={"force over current": best},
         parameters={},
@@ -369,14 +372,14 @@ def identify(
                 np.ones(cycle.i.size),
                 np.hstack((branches(cycle, 3, cycle.F), cycle.waves)),
                 len(best.values),
-                "whether current over force bends in a way that the law does not",
+                "whether current over force deviates from the law",
             ),
         ),
         curves=(_curve(cycle, values),),
         notes=(
             "half widths hold at the mean speed of the test; at rest the force may be anywhere "
-            "between",
-            "how the bearings' friction changes with speed is taken from the parameter set",
+            "within them",
+            "the change of the bearings' friction with speed is that of the parameter set",
         ),
     )
 
@@ -405,7 +408,7 @@ def _curve(cycle: Squeeze, values: Array) -> Curve:
     places, rows = [], []
     for sign in (1.0, -1.0):
         F, i = cycle.F[cycle.way == sign], measured[cycle.way == sign]
-        # A gap at zero force: nothing was read right at the kink there.
+        # A gap at zero force: no window lies at the kink there.
         places.append(np.append(F, 0.0))
         branch = np.array((i, law(F, np.full(F.size, sign), values)[0]))
         rows.append(np.append(branch, _GAP, axis=1))
@@ -415,12 +418,12 @@ def _curve(cycle: Squeeze, values: Array) -> Curve:
     F, table = at_own_places(places, rows)
     return Curve(
         "current-over-force",
-        "Current over force, closing and opening, with the calibration line between.",
+        "Current over force, closing and opening, with the calibration line in the middle.",
         over(
             ("F", F, "N", "force"),
             {"measured": table[0], "modeled": table[1]},
             "A",
-            "current, cogging taken off",
+            "current without cogging",
             ("direction", ("closing", "opening", "mean line")),
         ),
         "F",
@@ -428,7 +431,7 @@ def _curve(cycle: Squeeze, values: Array) -> Curve:
 
 
 def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Dataset:
-    """Return the force cycle on the sensor, simulated, with the sensors' noise."""
+    """Return the simulated force cycle on the sensor, with sensor noise."""
     case = FORCE_CYCLE.cases(par, FORCE_CYCLE.defaults, None)[0]
     random = np.random.default_rng(seed)
     begun = turned(case, random.uniform(0.0, 2.0 * np.pi))
@@ -436,7 +439,7 @@ def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Datase
 
 
 def truth(par: WedgeParameters, options: RigOptions) -> dict[str, float]:
-    """Return the line and the growth of the friction that the laws of screw and bearing mean."""
+    """Return the true line and growth of the friction by the laws of screw and bearing."""
     known = {u.label: u.start for u in law_unknowns(par)}
     return {name: known[name] for name in ("offset", "force_per_current", "half_width_slope")}
 

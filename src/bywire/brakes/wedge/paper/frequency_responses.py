@@ -31,7 +31,7 @@ _LOW = "low"
 
 
 def fig5(runs: Runs) -> Part:
-    """Return the responses by amplitude, and what friction takes off them."""
+    """Return the responses by amplitude, and the loss by friction."""
     runs.report("Fig. 5: sweep", 0.0)
     shares = [
         float(of(screw(), _LOW, size)["share_sat_current"].max()) for size in AMPLITUDES[_LOW]
@@ -90,7 +90,7 @@ def fig5(runs: Runs) -> Part:
 
 
 def friction(controller: str, figure: str) -> list[Item]:
-    """Return what friction takes off the response at the lowest frequency."""
+    """Return the loss by friction at the lowest frequency."""
     items: list[Item] = []
     sweep = screw()
     f = sweep["frequency"].values
@@ -111,7 +111,7 @@ def friction(controller: str, figure: str) -> list[Item]:
                 f"{figure}.friction.{size:g}",
                 "dB",
                 float(lost[0]),
-                f"gain at 1 Hz less that of the linear loop, amplitude {size:g} rad; "
+                f"gain at 1 Hz minus that of the linear loop, amplitude {size:g} rad; "
                 f"phase {late[0]:.2g} degree",
             )
         )
@@ -119,7 +119,7 @@ def friction(controller: str, figure: str) -> list[Item]:
 
 
 def _low_frequency() -> list[Item]:
-    """Return whether friction shows at low frequency in particular, and where it shows most."""
+    """Return the loss by friction at low frequency, and the frequency of the largest loss."""
     sweep = screw()
     f = sweep["frequency"].values
     lost = np.array(
@@ -139,8 +139,8 @@ def _low_frequency() -> list[Item]:
             "fig5.friction.most",
             "Hz",
             float(f[lost[-1].argmax()]),
-            f"where the gain loses most at 2 rad, {lost[-1].max():.3g} dB; {lost[-1][0]:.2g} dB "
-            "at 1 Hz: around its own bandwidth the loop is least stiff",
+            f"frequency of the largest loss of gain at 2 rad, {lost[-1].max():.3g} dB; "
+            f"{lost[-1][0]:.2g} dB at 1 Hz: around its bandwidth the loop is least stiff",
         ),
     ]
 
@@ -148,7 +148,7 @@ def _low_frequency() -> list[Item]:
 # --- Fig. 6: the high-bandwidth controller
 
 _HIGH = "high"
-_SMALL = 0.1  # rad: clear of the current limit up to 60 Hz where the screw loses nothing
+_SMALL = 0.1  # rad: below the current limit up to 60 Hz with a screw without loss
 _SEEN = (1.0, 10.0, 60.0, 100.0)  # Hz
 _SHAKEN, _BELOW, _ABOVE = 1.0, 20.0, 30.0  # rad, Hz, Hz: where two responses answer one sine
 _T_FALL, _T_SEEN = 3.0, 1.0  # s
@@ -183,9 +183,9 @@ def fig6(runs: Runs) -> Part:
     ]
     text = (
         "A controller of 60 Hz on the preloaded screw, at 0.25, 0.5 and 1 rad: all three, and the "
-        "bandwidth, are our choice. Every sine starts from rest: just below where the limit "
-        "sets in, a sweep that comes from above finds another response. Whether theory and "
-        "practice match cannot be judged: the measured curves are not at hand."
+        "bandwidth, are our choice. Every sine starts from rest: just below the frequency where "
+        "the limit begins, a sweep that comes from above gives another response. Theory and "
+        "practice cannot be compared: the measured curves are not available."
     )
     exhibits = (
         Exhibit(
@@ -209,7 +209,7 @@ def fig6(runs: Runs) -> Part:
 
 
 def _current_limit() -> list[Item]:
-    """Return where the current limit sets in, and what it does to gain and phase."""
+    """Return the frequencies where the current limit begins, and its effect on gain and phase."""
     f = screw()["frequency"].values
     model = LOOPS.find("screw-position").closed(changed(_HIGH), 0.0)
     wide = bandwidth(lambda g: model.response(g)[:, 0, 0], (0.5, 500.0))
@@ -263,7 +263,7 @@ def _slope(f: Array, gain: Array) -> float:
 
 
 def _efficiency() -> list[Item]:
-    """Return what the screw's loss takes off the wedge's response, by both readings of it."""
+    """Return the effect of the screw's loss on the wedge's response, by both readings."""
     ideal, load = _wedge("load")
     _, drive = _wedge("drive")
     items: list[Item] = []
@@ -282,7 +282,7 @@ def _efficiency() -> list[Item]:
                     f"fig6.efficiency.{law}.{f:g}",
                     "dB",
                     float(-lost[k]),
-                    f"gain at {f:g} Hz less that of a screw without loss; {note}",
+                    f"gain at {f:g} Hz minus that of a screw without loss; {note}",
                 )
                 for k, f in enumerate(_SEEN)
             ),
@@ -291,7 +291,7 @@ def _efficiency() -> list[Item]:
 
 
 def _wedge(law: str) -> tuple[Complex, Complex]:
-    """Return the assembled wedge's response with a screw without loss, and with its own."""
+    """Return the assembled wedge's response with a screw without loss, and with its loss."""
     loop, par = LOOPS.find("position"), changed(_HIGH).replace({"screw.law": law})
     leaves = par.leaves()
     sweep = Sweep(
@@ -354,7 +354,7 @@ FREQUENCIES = tuple(np.geomspace(1.0, 100.0, 40).tolist())
 _BOTH = tuple(sorted({size for sizes in AMPLITUDES.values() for size in sizes}))
 _WEDGE = (0.25, 0.5, 1.0)  # larger ones would reach the disc
 _PRELOADS = (25.0, 50.0, 75.0, 100.0)  # N
-_PATIENCE = 12  # windows granted to friction, encoder and cogging, which may never repeat
+_PATIENCE = 12  # most windows: with friction, encoder and cogging they may never repeat
 
 
 @cache
@@ -416,8 +416,8 @@ def decibels(response: Complex) -> Array:
 def without_friction(controller: str) -> tuple[float, float]:
     """Return the largest differences of the nonlinear and the linear response, dB and degree.
 
-    Friction, cogging and the encoder's resolution are off, and the amplitude keeps clear of the
-    current limit.
+    Friction, cogging and the encoder's resolution are off, and the amplitude is below the current
+    limit.
     """
     loop = LOOPS.find("screw-position")
     smooth = loop.smooth(changed(controller))
@@ -431,7 +431,7 @@ def without_friction(controller: str) -> tuple[float, float]:
 
 
 def apart(controller: str, *, limited: bool = True) -> float:
-    """Return how far the wedge's response is from the screw's at most, % of the amplitude.
+    """Return the largest distance of the wedge's response from the screw's, % of the amplitude.
 
     ``limited``: whether frequencies count at which the screw reaches the current limit.
     """

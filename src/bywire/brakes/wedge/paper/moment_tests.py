@@ -25,7 +25,7 @@ from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs, kpis, peak
 
 TURNS = 20
-"""revolutions over which the oscillation is analyzed"""
+"""revolutions of the analysis of the oscillation"""
 LONG_HOLD = {"t_hold": 3.0}
 """[s], longer than that many revolutions"""
 FROM = 0.5
@@ -40,7 +40,7 @@ def fig7(runs: Runs) -> Part:
         "The demand goes straight into the simulation, as in the paper; its times, the controller "
         "and most parameters are not printed and are ours. The figure is stacked as the paper's; "
         "a measured recording can be drawn on it. Shaded: shafts and wedge stick, so that the "
-        "run-out passes on to the moment unhindered until the controller has broken them away."
+        "run-out acts fully on the moment until the controller has broken them away."
     )
     exhibit = Exhibit(
         "fig7",
@@ -95,7 +95,7 @@ def _oscillation(runs: Runs) -> list[Item]:
             FACTS["once"],
             float(spectrum["order"][strongest]),
             note="strongest wave over the disc's angle; the model's run-out is one wave per "
-            "revolution, so that this says only that nothing else oscillates more",
+            "revolution, so that this only shows that no other oscillation is larger",
         ),
         compared(
             "fig7.ripple_without_runout",
@@ -114,20 +114,20 @@ def _oscillation(runs: Runs) -> list[Item]:
             "fig7.ripple_passive",
             "N*m",
             2.0 * parameters().flywheel.runout * _stiffness(),
-            "what the run-out would give with the wedge held still: at this frequency, near its "
+            "ripple by the run-out with a fixed wedge: at this frequency, near its "
             "crossover, the moment control adds to it",
         ),
         found(
             "fig7.ripple_third",
             "N*m",
             third,
-            "amplitude of the third wave per revolution: stick and slip bend the sine",
+            "amplitude of the third wave per revolution: stick and slip distort the sine",
         ),
         found(
             "fig7.share_stuck",
             "%",
             100.0 * mean(run, "stuck", FROM, end),
-            "of the hold, shafts and wedge stick",
+            "share of the hold in which shafts and wedge stick",
         ),
     ]
 
@@ -169,10 +169,12 @@ def _hold_power(result: Result) -> list[Item]:
             "fig7.power_peak_filtered",
             "W",
             values["peak_power_filtered"],
-            "at the drives' input through a filter that is ours",
+            "at the drives' input through our filter",
         ),
         found("fig7.hold_power_watt", "W", above, "above standby, mean over a revolution"),
-        found("fig7.brake_power", "W", values["brake_power"], "taken from the disc meanwhile"),
+        found(
+            "fig7.brake_power", "W", values["brake_power"], "power taken from the disc in this time"
+        ),
     ]
 
 
@@ -223,12 +225,12 @@ def fig8(runs: Runs) -> Part:
             "fig8.ramp_error_rms.without_runout",
             "N*m",
             plain["ramp_error_rms"],
-            "the same without run-out: how well the controller itself follows",
+            "the same without run-out: tracking error of the controller itself",
         ),
     ]
     text = (
-        "Length and slope of the ramp are ours; 'slow' was read as 1 s. Means over a revolution of "
-        "the disc are judged, because the run-out's oscillation passes through any of them."
+        "Length and slope of the ramp are ours; we read 'slow' as 1 s. The comparison uses means "
+        "over a revolution of the disc, because the run-out averages out over it."
     )
     exhibit = Exhibit(
         "fig8",
@@ -278,7 +280,7 @@ def _items(result: Result) -> list[Item]:
             "fig8.ramp_error",
             FACTS["followed"],
             values["ramp_error_mean"],
-            note="mean of demand less moment on the ramp",
+            note="mean of demand minus moment on the ramp",
         ),
         found(
             "fig8.ramp_error_rms",
@@ -294,13 +296,13 @@ def _items(result: Result) -> list[Item]:
 SHORT, LONGER = 0.11, 1.0
 """lengths [s] of a pulse that ends as soon as the moment is there, and of a longer braking"""
 THRESHOLDS = (8.0, 20.0)
-"""moments [N m] below which the controller leaves the moment mode: our 12 N m lies between"""
+"""moments [N m] below which the controller leaves the moment mode; our 12 N m lies between"""
 FIRST = 0.2
 """time [s] in which the effect of friction is compared, the length of the pulse"""
 
 
 def fig9(runs: Runs) -> Part:
-    """Return the pulse, its power, and what limits it."""
+    """Return the pulse, its power, and its limits."""
     result = runs.bench("moment-pulse-950", MAIN)
     items = [
         *_pulse_moment(result),
@@ -354,7 +356,7 @@ def limited(result: Result, target: float) -> tuple[float, float]:
 
 
 def _limits(runs: Runs, result: Result) -> list[Item]:
-    """Return what dominates at either amplitude: friction, or limits."""
+    """Return the dominant effect at either amplitude: friction, or limits."""
     small = runs.bench("moment-pulses", MAIN)
     build_up, whole = limited(result, FACTS["pulse"].value)
     _, whole_small = limited(small, FACTS["held"].value)
@@ -380,20 +382,20 @@ def _limits(runs: Runs, result: Result) -> list[Item]:
             "fig9.limits_dominate",
             FACTS["large_limited"],
             whole - whole_small,
-            note=f"share at 950 Nm less that at 200 Nm ({whole_small:.3g} %)",
+            note=f"share at 950 Nm minus that at 200 Nm ({whole_small:.3g} %)",
         ),
         compared(
             "fig9.friction_dominates",
             FACTS["small_friction"],
             at_200 / at_950,
-            note=f"root mean square over {FIRST:g} s of what friction changes: "
+            note=f"root mean square over {FIRST:g} s of the effect of friction: "
             f"{100 * at_200:.3g} % of 200 Nm, {100 * at_950:.3g} % of 950 Nm",
         ),
     ]
 
 
 def _friction_effect(runs: Runs, experiment: str, M: float) -> float:
-    """Return what friction changes in the moment, root mean square over the demand."""
+    """Return the effect of friction on the moment, root mean square over the demand."""
     changed = [
         runs.bench(experiment, MAIN, overrides).recordings["run"]["M_B"].sel(time=slice(0, FIRST))
         for overrides in ({**WITHOUT_RUNOUT, "encoder.law": "ideal"}, IDEAL)
@@ -460,14 +462,14 @@ def _lowest(run: xr.Dataset, begin: float, end: float) -> float:
 
 
 def _tail(runs: Runs) -> list[Item]:
-    """Return how far the end of the release moves with the gap mode's threshold."""
+    """Return the effect of the gap mode's threshold on the end of the release."""
     low, high = (
         runs.bench("moment-pulse-950", MAIN, {"control.moment.M_contact": M}) for M in THRESHOLDS
     )
     times = [_switches(result.recordings["run"]) for result in (low, high)]
     parking = [kpis(result)["parking_time"] for result in (low, high)]
     between = f"between thresholds of {THRESHOLDS[0]:g} and {THRESHOLDS[1]:g} Nm"
-    why = "the paper puts its difference at the end of Fig. 9 down to the time of this switch"
+    why = "the paper attributes its difference at the end of Fig. 9 to the time of this switch"
     return [
         found(
             "fig9.switch_shift",

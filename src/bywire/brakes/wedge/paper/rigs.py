@@ -20,7 +20,7 @@ MICRON = 1e6
 
 
 def current_loop(runs: Runs) -> Part:
-    """Return how fast the current loop is, over windings and gains."""
+    """Return the bandwidth of the current loop, over windings and gains."""
     result = runs.bench("current-loop", MAIN)
     values = kpis(result)
     bandwidths = [value for name, value in values.items() if name.startswith("bandwidth")]
@@ -67,14 +67,14 @@ def efficiency(runs: Runs) -> Part:
             put_in,
             values["eta_f"],
             note=f"with the bearings' torque, {bearing} without load and its growth with the "
-            "force, taken off",
+            "force, subtracted",
         ),
         compared(
             "efficiency.no_load",
             put_in,
             values["eta_f_no_load"],
-            note="with the torque without load alone taken off: what grows with the square of the "
-            "force counts as loss of the screw",
+            note="with only the torque without load subtracted: friction that grows with the "
+            "square of the force counts as loss of the screw",
         ),
         compared(
             "efficiency.raw", put_in, values["eta_f_raw"], note="motor torque and force alone"
@@ -83,8 +83,8 @@ def efficiency(runs: Runs) -> Part:
             "efficiency.back_driven",
             "%",
             values["eta_b"],
-            f"the same for a screw that is driven back; {values['eta_b_true']:.3g} % put in, "
-            f"{values['eta_b_no_load']:.3g} % with the torque without load alone",
+            f"the same for a screw that is driven back; {values['eta_b_true']:.3g} % is true, "
+            f"{values['eta_b_no_load']:.3g} % with only the torque without load",
         ),
         found(
             "efficiency.back_driven.raw", "%", values["eta_b_raw"], "motor torque and force alone"
@@ -120,8 +120,8 @@ def stiffness(runs: Runs) -> Part:
     ]
     text = (
         "The motors are driven against each other: first with a force sensor between the screws, "
-        "which also tells the force per current, then in the brake heart, where tension flows "
-        "through the wedge. What the test finds is compared with what was put into the model."
+        "which also gives the force per current, then in the brake heart, where tension flows "
+        "through the wedge. The results of the test are compared with the values of the model."
     )
     exhibits = tuple(
         Exhibit(f"stiffness-{label}", partial(time_traces, result.recordings[label]), caption)
@@ -134,13 +134,13 @@ def stiffness(runs: Runs) -> Part:
 
 
 def _recovered(name: str, fact: Fact, values: dict[str, float], key: str, size: float) -> Item:
-    """Return a quantity as measured beside what was put in, in the unit of the statement."""
+    """Return a measured quantity and its true value, in the unit of the statement."""
     put_in = replace(fact, value=values[f"{key}_true"] / size)
     return compared(name, put_in, values[key] / size)
 
 
 def _directions(values: dict[str, float]) -> list[Item]:
-    """Return how compression and tension compare."""
+    """Return the comparison of compression and tension."""
     K_F = parameters().rig.sensor.K_F
     line = 1.0 / (1.0 / values["K_line_compression"] - 1.0 / K_F)
     same = replace(FACTS["same_compression"], value=line / MICRON)
@@ -175,7 +175,7 @@ WEAKER = 0.95
 
 
 def position(runs: Runs) -> Part:
-    """Return how little the wedge changes the position response of the screws."""
+    """Return the effect of the wedge on the position response of the screws."""
     result = runs.bench("position-step", MAIN)
     values = kpis(result)
     bands = kpis(runs.bench("screw-position", MAIN))
@@ -235,14 +235,14 @@ def force_fight(runs: Runs) -> Part:
             "force_fight.static",
             "N",
             values["static_force_unequal"],
-            "left after the step: friction holds the screws apart",
+            "remaining force after the step: friction holds the screws apart",
         ),
         *_speed(runs),
     ]
     text = (
         "Both motors follow one reference, a force sensor between their screws. The paper prints "
-        "no forces. The rate limit's reason, higher speeds widen the angle between the motors, is "
-        "looked for in Fig. 9's pulse with a weaker second motor."
+        "no forces. It explains the rate limit by higher speeds, which widen the angle between the "
+        "motors: Fig. 9's pulse with a weaker second motor tests that."
     )
     exhibit = Exhibit(
         "force-fight",
@@ -253,7 +253,7 @@ def force_fight(runs: Runs) -> Part:
 
 
 def _speed(runs: Runs) -> list[Item]:
-    """Return how a doubled rate limit widens the angle between the motors."""
+    """Return the effect of a doubled rate limit on the angle between the motors."""
     par = parameters()
     weaker = {"motor_2.K_ref": WEAKER * par.motor_2.K_ref}
     rate = par.control.moment.rate_max

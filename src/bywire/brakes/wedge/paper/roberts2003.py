@@ -41,7 +41,7 @@ SOURCE = Source(
 reproduce = SOURCE.reproduce
 
 
-# --- Why some statements do not come out: causes with numbers
+# --- Root causes of disagreements, with numbers
 
 
 def causes(items: Iterable[Item]) -> tuple[RootCause, ...]:
@@ -53,7 +53,7 @@ def causes(items: Iterable[Item]) -> tuple[RootCause, ...]:
 
 def _neutral_band(q: Quoted) -> RootCause:
     return RootCause(
-        "The paper's instability above mu_B = tan(alpha) leaves friction out: without "
+        "The paper's instability above mu_B = tan(alpha) neglects friction: without "
         f"it the brake runs away from {q('stability.runaway')} on "
         f"({q.stated('stability.runaway')} stated), but dry friction of bearings, "
         "screws and wedge holds it without power below "
@@ -67,8 +67,8 @@ def _pulse_length(q: Quoted) -> RootCause:
     return RootCause(
         "The length of Fig. 9's pulse is not printed: within our 0.2 s the filtered "
         f"power above standby already falls to {q('fig9.lowest_power')} times that of "
-        "Fig. 7's hold, which the paper does not see; in a pulse that ends as 90 % is "
-        f"reached it is {q('fig9.lowest_power.short')} times.",
+        "Fig. 7's hold, which the paper does not report; in a pulse that ends at 90 % of "
+        f"the moment it is {q('fig9.lowest_power.short')} times.",
         ("fig9.lowest_power",),
     )
 
@@ -76,10 +76,10 @@ def _pulse_length(q: Quoted) -> RootCause:
 def _bearings(q: Quoted) -> RootCause:
     return RootCause(
         "Motor torque and force alone do not measure the screw's efficiency: with the "
-        f"bearings' friction in it the rig reads {q('efficiency.raw')} of "
-        f"{q.stated('efficiency.raw')} put in; with their torque without load taken "
-        f"off, {q('efficiency.recovered')}. What is left is the bearings' friction "
-        "under load, which no sensor of the rig tells from the screw's.",
+        f"bearings' friction included, the rig reads {q('efficiency.raw')} of the true "
+        f"{q.stated('efficiency.raw')}; with their torque without load subtracted, "
+        f"{q('efficiency.recovered')}. The rest is the bearings' friction under load, "
+        "which no sensor of the rig can separate from the screw's.",
         ("efficiency.*",),
     )
 
@@ -88,10 +88,10 @@ def _dead_band(q: Quoted) -> RootCause:
     return RootCause(
         "Position steps stop where friction holds them: with the soft low-bandwidth "
         f"controller a shaft can rest {q('position.dead_band.low')} from its "
-        "reference, and what the wedge leaves of the preload decides where. Its "
+        "reference, and the preload that remains with the wedge decides where. Its "
         f"response differs from that of the screws alone by {q('position.wedge.low')} "
         f"of the step, but only by {q('position.wedge.high')} with the other "
-        f"controller, of which friction holds {q('position.dead_band.high')}.",
+        f"controller, with which friction holds {q('position.dead_band.high')}.",
         ("position.wedge.*",),
     )
 
@@ -110,15 +110,15 @@ def _preload(q: Quoted) -> RootCause:
 def _limit(q: Quoted) -> RootCause:
     return RootCause(
         f"Wedge and screw differ by {q('fig6.wedge.below_limit')} as long as the "
-        f"current limit is not reached, and by {q('fig6.wedge')} where it sets in: "
-        "there the response jumps, and a little more or less friction moves the jump.",
+        f"current limit is not reached, and by {q('fig6.wedge')} where the limit begins: "
+        "there the response jumps, and a small change of friction moves the jump.",
         ("fig6.wedge",),
     )
 
 
 def _stiff_loop(q: Quoted) -> RootCause:
     return RootCause(
-        "Friction shows in the response of a stiff loop only where the amplitude is "
+        "Friction affects the response of a stiff loop only where the amplitude is "
         f"small: with 60 Hz it moves the response at 1 Hz by {q('fig6.friction')} of "
         "0.25 rad, our choice, and by more of a smaller amplitude.",
         ("fig6.friction",),

@@ -33,7 +33,7 @@ COEFFICIENTS = (0.2, 0.35, 0.6)
 TRIED = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6)
 """coefficients at which the actuation force is computed"""
 LOWEST, HIGHEST = 0.32, 0.62
-"""coefficients between which the lowest that runs away is sought"""
+"""bounds of the search for the lowest coefficient that runs away"""
 GROWN = 1.05
 """moment over that at power-off from which the brake has run away"""
 VARIANTS = (
@@ -41,14 +41,14 @@ VARIANTS = (
     (".frictionless", "fixed", "none"),
     (".known", "known", "kept"),
 )
-"""ids' endings, whether the controller knows mu_B, and the brake's friction"""
+"""endings of ids, whether the controller knows mu_B, and the brake's friction"""
 FREE = {"control.offset.delta_preload": 0.0}
 HOLD = (0.1, 0.5)
 """times [s] between which changes of contact are counted"""
 BELOW, ABOVE = 0.2, 0.5
 """friction coefficients on both sides of the neutral point"""
 DEPTH = 5e-5
-"""wedge travel [m] beyond contact at which the brake is linearized; the model is linear there"""
+"""wedge travel [m] beyond contact at the operating point; the model is linear there"""
 
 
 def part(runs: Runs) -> Part:
@@ -56,8 +56,8 @@ def part(runs: Runs) -> Part:
     items = [*_static(runs), *_poles(), *_runaway(runs), *_closed_loop(runs), *_free_play(runs)]
     text = (
         "The paper derives the brake factor and the neutral point without friction. Without "
-        "friction the model obeys both. With it the neutral point is a band: what friction holds "
-        "does not run away, and the more load the less of it."
+        "friction the model obeys both. With friction the neutral point is a band, which the "
+        "brake does not leave by itself; the band narrows with the load."
     )
 
     def pulses() -> Figure:
@@ -72,7 +72,7 @@ def part(runs: Runs) -> Part:
 
 
 def _at(mu_B: float, changes: dict[str, Any]) -> dict[str, Any]:
-    """Return overrides that set the pads' friction and let the controller know it."""
+    """Return overrides that set the pads' friction, known to the controller."""
     return {**with_friction(parameters(), mu_B, known=True), **changes}
 
 
@@ -186,7 +186,7 @@ def _lowest(runs: Runs, changes: dict[str, Any], M_hold: float) -> float:
 
 
 def _closed_loop(runs: Runs) -> list[Item]:
-    """Return whether the closed loop is stable at all coefficients, and how it overshoots."""
+    """Return stability and overshoot of the closed loop at all coefficients."""
     items: list[Item] = []
     for suffix, slope, friction in VARIANTS:
         values = kpis(
@@ -218,7 +218,7 @@ def _closed_loop(runs: Runs) -> list[Item]:
 
 
 def _free_play(runs: Runs) -> list[Item]:
-    """Return how often contacts change at the neutral point, with preload and with free-play."""
+    """Return the changes of contact at the neutral point, with preload and with free-play."""
     shaking = {"flywheel.runout": parameters().flywheel.runout}
     held = {}
     for name, preload in (("preload", {}), ("free_play", FREE)):
@@ -228,7 +228,7 @@ def _free_play(runs: Runs) -> list[Item]:
         name: int(np.count_nonzero(np.diff(run["contacts"].sel(time=slice(*HOLD)).values)))
         for name, run in held.items()
     }
-    note = "changes of contact seen at the rows of 0.4 s of a hold at tan(alpha), without friction"
+    note = "changes of contact between the rows of 0.4 s of a hold at tan(alpha), without friction"
     return [
         compared(
             "stability.contact_changes",

@@ -1,4 +1,4 @@
-"""What Roberts et al. (2003) state, and what all comparisons with it share."""
+"""Statements of Roberts et al. (2003), and common parts of all comparisons with them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FILE = SourceFile(Path(__file__).with_name("roberts2003.toml"))
 FACTS, ALLOWANCES = FILE.facts, FILE.allowances
 
 
-# --- What the figures share: the parameter set, and means over a turn
+# --- Common parts of the figures: parameter set, changes, means over a turn
 
 MAIN = "roberts2003"
 
@@ -86,9 +86,9 @@ def order_spectrum(
     Parameters
     ----------
     turns
-        Revolutions to look at: the spectrum resolves 1/turns.
+        Revolutions of the analysis: the spectrum resolves 1/turns.
     begin
-        Time [s] from which to look.
+        Start of the analysis [s].
 
     Returns
     -------

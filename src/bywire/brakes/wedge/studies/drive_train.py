@@ -35,21 +35,23 @@ from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, edge_warning
 
 ASSUMPTIONS = (
     "The wedge's slope and the screws' lead vary; motors, drives, bearings, stiffnesses, clearance "
-    "and the travel that preloads the screws stay.",
-    "The screws' friction angle stays, so that their efficiency grows with the lead and a small "
-    "lead locks itself; with efficiency 'as-given' the efficiency stays.",
+    "and the travel that preloads the screws are constant.",
+    "The screws' friction angle is constant, so that their efficiency grows with the lead and a "
+    "small lead locks itself; with efficiency 'as-given' the efficiency is constant.",
     "The controllers know the design: travel per shaft angle and moment per angle follow it.",
     "Equal response: all speeds and accelerations of the reference are scaled so that the pads "
     "close equally fast; with response 'enforced' they get a common factor, the smallest at which "
     "the sensor shows 90 % of the demand in time at every friction coefficient.",
-    "Bandwidths stay: those of the position loops on the shaft, the crossover of the moment loop.",
-    "The end stops of the wedge stand where the pads have traveled as far as before.",
-    "Infeasible are designs that at any coefficient are more than 2 % late (where the response is "
-    "enforced), do not hold 95 % of the demand, do not release, or press on an end stop.",
+    "Bandwidths are constant: those of the position loops on the shaft, and the crossover of the "
+    "moment loop.",
+    "The end stops of the wedge allow the same travel of the pads as before.",
+    "A design is infeasible if at any coefficient it is more than 2 % late (where the response is "
+    "enforced), does not hold 95 % of the demand, does not release, or presses on an end stop.",
     "Power counts at the drives' input, standby included, in build-up and hold, and in the release "
-    "where that is asked for.",
+    "where that counts.",
     "Each case runs with the disc at four angles, a quarter turn apart, and the worst counts: "
-    "where the run-out meets the stop is chance, and holding the moment against it takes power.",
+    "the phase of the run-out at the stop is chance, and holding the moment against it takes "
+    "power.",
 )
 
 
@@ -71,13 +73,13 @@ class Options(ParameterSet):
     mu_B: Coefficients
     """friction coefficients of the pads; the worst counts"""
     believed: Literal["known", "as-given"]
-    """whether the moment controller knows them, or believes in that of the parameter set"""
+    """whether the moment controller knows them, or assumes that of the parameter set"""
     response: Literal["enforced", "as-scaled"]
     """whether the time is enforced, or the pads close as fast as with the given drive train"""
     efficiency: Efficiency
-    """what stays of the screw over the lead: its friction angle, or its efficiency"""
+    """constant property of the screw over the lead: its friction angle, or its efficiency"""
     power: Literal["filtered", "instantaneous"]
-    """which power is minimized: as the rig measures it, or as it is"""
+    """power to minimize: with the rig's filter, or without"""
     tan_alpha_min: Slope
     """smallest slope of the wedge"""
     tan_alpha_max: Slope
@@ -124,7 +126,7 @@ NEAR = 1.05
 """designs within this factor of the smallest power count as equally good"""
 _ROUNDS = 2  # of the optimum's refinement; each halves the spacing
 _TINY = 1e-6  # of the spacing
-_BORDER = 0.02  # between 0, feasible, and 1: drawn close to the last feasible designs
+_BORDER = 0.02  # contour between 0, feasible, and 1, close to the last feasible designs
 
 
 class Best(NamedTuple):
@@ -142,7 +144,7 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
     Raises
     ------
     InputError
-        When a design does not exist.
+        When a design is not valid.
     """
     demand = Demand(
         options.moment,
@@ -280,7 +282,7 @@ def _optimum(best: Best, grids: Sequence[xr.Dataset], options: Options) -> tuple
 def _given(given: Answer, options: Options) -> tuple[Kpi, ...]:
     sizes = getattr(given, options.power)
     k, t_90 = int(np.argmax(sizes)), float(given.t_90.max())
-    note = "" if math.isfinite(t_90) else "a case never gets there"
+    note = "" if math.isfinite(t_90) else "a case does not reach it"
     return (
         Kpi(
             "given_power",
@@ -314,7 +316,7 @@ def _given(given: Answer, options: Options) -> tuple[Kpi, ...]:
 
 
 def _cuts(data: xr.Dataset, best: Best) -> tuple[Cut, ...]:
-    """Return what changes along the lead at the map's slope nearest to the optimum."""
+    """Return the dependence on the lead at the map's slope nearest to the optimum."""
     row = data.sel(tan_alpha=best.tan_alpha, method="nearest")
     worst = row[["release", "t_90", "current", "speed", "copper"]].max(dim="mu_B", keep_attrs=True)
     names = ("worst_filtered", "mu_B_filtered", "worst_instantaneous")
@@ -341,13 +343,13 @@ def _edges(best: Best, options: Options) -> tuple[str, ...]:
     )
 
 
-# --- What limits a drive train: constraints at their limit, and what its neighbors fail at or cost
+# --- Limits of a drive train: active constraints, and failures or costs of its neighbors
 
-_AT = 0.99  # share of a limit from which on it counts as reached
+_AT = 0.99  # share of a limit at which it counts as reached
 
 
 def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
-    """Return the constraints that a design is at.
+    """Return the active constraints of a design.
 
     Parameters
     ----------
@@ -356,7 +358,7 @@ def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
     par
         The given brake.
     options
-        The study's.
+        Options of the study.
     """
     texts = []
     if options.response == "enforced" and float(at["lateness"]) >= _AT:
@@ -376,7 +378,7 @@ def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
             f"mu_B = {_where(-at['held']):g}"
         )
     if float(at["left"].max()) > _AT * LEFT * options.moment:
-        texts.append(f"release: {float(at['left'].max()):.3g} N·m are left at its end")
+        texts.append(f"release: {float(at['left'].max()):.3g} N·m remain at its end")
     powers = at[options.power]
     near = at["mu_B"].values[powers.values >= _AT * float(powers.max())]
     texts.append(f"power: {float(powers.max()):.3g} W at mu_B = {_listed(near)}")
@@ -401,7 +403,7 @@ def failures(at: xr.Dataset, options: Options) -> list[str]:
 
 
 def around(grids: Sequence[xr.Dataset], best: xr.Dataset, options: Options) -> list[str]:
-    """Return what happens one step away from the best design, on the finest grid that has it.
+    """Return the neighbors of the best design, on the finest grid that contains it.
 
     ``grids``: maps of designs, coarse to fine; ``best``: one design of the last grid that holds it.
     """
