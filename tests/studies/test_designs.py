@@ -11,8 +11,8 @@ from bywire.core.errors import ParameterError
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
 from bywire.studies.designs import SAMPLED, Sampled, spanned
+from bywire.studies.distribution import read_distribution
 from bywire.studies.plan import correlation_factor
-from bywire.studies.vary_section import read_distribution
 
 LEAF = Leaf("x", Unit("m"), -np.inf, np.inf, False, False)
 UNIFORM = read_distribution("x", {"kind": "uniform", "low": "0 m", "high": "1 m"}, LEAF, 0.5)

@@ -14,18 +14,19 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import xarray as xr
 
-from bywire.bench import bench_file, running
+from bywire.api.run import bench_of
+from bywire.bench import running
 from bywire.bench.bench import Bench
-from bywire.bench.bench_file import flattened
-from bywire.bench.bench_source import experiment_of, names_experiment
+from bywire.bench.bench_file import flattened, names_experiment
+from bywire.bench.changes import OPTION
 from bywire.bench.experiment import Experiment
+from bywire.bench.generic_experiment import experiment_of
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.option_names import OPTION
 from bywire.bench.requirements import Verdict
-from bywire.bench.result import Result
 from bywire.bench.result_folder import is_result_folder, read_result, verdict_record
+from bywire.bench.running import Result
 from bywire.bench.step_error import are_distinct
-from bywire.bench.stimuli.registry import STIMULI
+from bywire.bench.stimulus import STIMULI
 from bywire.core.callers import is_command_line
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError, ParameterError
@@ -269,7 +270,7 @@ class Compared:
         return are_distinct(values, self.errors)
 
 
-def compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tuple[Compared, ...]:
+def _compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tuple[Compared, ...]:
     """Return everything that was set, or what all runs have of it."""
     names = list(dict.fromkeys(name for each in runs for name in each.settings))
     if shared_only:
@@ -282,7 +283,7 @@ def compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tupl
     return tuple(rows)
 
 
-def compared_figures(runs: Sequence[ComparedRun]) -> tuple[Compared, ...]:
+def _compared_figures(runs: Sequence[ComparedRun]) -> tuple[Compared, ...]:
     """Return every key figure that some run has; those of another unit stay apart."""
     keys = dict.fromkeys((kpi.name, kpi.unit) for each in runs for kpi in each.kpis)
     each_run = [{(k.name, k.unit): (k.value, k.bound) for k in each.kpis} for each in runs]
@@ -293,7 +294,7 @@ def compared_figures(runs: Sequence[ComparedRun]) -> tuple[Compared, ...]:
     return tuple(rows)
 
 
-def settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
+def _settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
     """Return settings of all runs, a column each."""
     return Table(
         (Column("setting"), *(Column(label, numeric=True) for label in labels)),
@@ -304,7 +305,7 @@ def settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
     )
 
 
-def kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
+def _kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
     """Return key figures of all runs, a column each, and their change; of many, the spread."""
     change = "change" if len(labels) == 2 else "spread"
     return Table(
@@ -327,7 +328,7 @@ def kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
     )
 
 
-def verdict_table(runs: Sequence[ComparedRun]) -> Table:
+def _verdict_table(runs: Sequence[ComparedRun]) -> Table:
     """Return the requirements of all runs, one row each, with what every run makes of it."""
     each_run = [{(v.kpi, v.limit): v for v in each.verdicts} for each in runs]
     keys = dict.fromkeys(key for verdicts in each_run for key in verdicts)
@@ -402,12 +403,12 @@ class Comparison(Answer):
     @cached_property
     def settings(self) -> tuple[Compared, ...]:
         """Everything that was set; of different brakes, what all of them have."""
-        return compared_settings(self.runs, shared_only=self._mixed)
+        return _compared_settings(self.runs, shared_only=self._mixed)
 
     @cached_property
     def figures(self) -> tuple[Compared, ...]:
         """Every key figure that some run has; those of one name but another unit stay apart."""
-        return compared_figures(self.runs)
+        return _compared_figures(self.runs)
 
     @property
     def warnings(self) -> list[str]:
@@ -441,7 +442,7 @@ class Comparison(Answer):
     def document(self) -> Document:
         """Return what differs, key figures, verdicts and curves."""
         settings, figures = self._tables()
-        verdicts = [TableBlock(verdict_table(self.runs), title="Requirements:")]
+        verdicts = [TableBlock(_verdict_table(self.runs), title="Requirements:")]
         verdicts = verdicts if any(each.verdicts for each in self.runs) else []
         sources = [f"{each.label}: {each.source}" for each in self.runs]
         changed = self._changed()
@@ -527,8 +528,8 @@ class Comparison(Answer):
         labels = [each.label for each in self.runs]
         blocks_of: list[list[Flat]] = []
         for title, shown, rows in (
-            ("Settings", self.settings, settings_table),
-            ("Key figures", self.figures, kpi_table),
+            ("Settings", self.settings, _settings_table),
+            ("Key figures", self.figures, _kpi_table),
         ):
             differing = [each for each in shown if each.differs]
             same = [each for each in shown if not each.differs]
@@ -635,6 +636,24 @@ Comparable = Bench | Result | str | Path
 Run = TypeVar("Run", bound=Comparable)
 
 
+def compared(
+    runs: Sequence[Comparable],
+    overrides: Mapping[str, str],
+    is_full: bool,
+    progress: Progress | None,
+    estimate_error: bool,
+) -> Comparison:
+    """Return a comparison of runs; see `bywire.compare`."""
+    require_comparable(runs, overrides)
+    # Folders first: what they lack is said before anything is computed.
+    read = {k: kept(Path(str(each))) for k, each in enumerate(runs) if _is_folder(each)}
+    shown = [
+        read.get(k) or _resolved(each, overrides, progress, estimate_error)
+        for k, each in enumerate(runs)
+    ]
+    return Comparison(tuple(_told_apart(shown)), is_full)
+
+
 def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> list[Run]:
     """Return those of some runs that are to be run yet, which changes have an effect on.
 
@@ -648,7 +667,7 @@ def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> lis
             f"{len(runs)} {'run is' if len(runs) == 1 else 'runs are'} nothing to compare: name "
             "two at least, bench files, experiments or result folders"
         )
-    benches = [each for each in runs if not was_run(each)]
+    benches = [each for each in runs if not _was_run(each)]
     if overrides and not benches:
         raise ParameterError(
             f"{', '.join(overrides)} would have no effect: what is compared was run before"
@@ -656,12 +675,12 @@ def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> lis
     return benches
 
 
-def was_run(source: Comparable) -> bool:
+def _was_run(source: Comparable) -> bool:
     """Return whether something was run before."""
-    return isinstance(source, Result) or is_folder(source)
+    return isinstance(source, Result) or _is_folder(source)
 
 
-def is_folder(source: Comparable) -> bool:
+def _is_folder(source: Comparable) -> bool:
     """Return whether something is to be read as a result folder."""
     if not isinstance(source, str | Path):
         return False
@@ -671,7 +690,7 @@ def is_folder(source: Comparable) -> bool:
     return is_result_folder(path) or not names_experiment(source)
 
 
-def resolved(
+def _resolved(
     source: Comparable,
     overrides: Mapping[str, str],
     progress: Progress | None,
@@ -680,12 +699,9 @@ def resolved(
     """Return what a bench gives, run now unless it was."""
     if isinstance(source, Result):
         result, text = source, "given"
-    elif isinstance(source, Bench):
-        bench = source.with_overrides(overrides) if overrides else source
-        result, text = _run(bench, progress, estimate_error), "a bench, run now"
     else:
-        bench = bench_file.read(source, overrides)
-        result, text = _run(bench, progress, estimate_error), f"{source}, run now"
+        result = _run(bench_of(source, overrides), progress, estimate_error)
+        text = f"{'a bench' if isinstance(source, Bench) else source}, run now"
     if result.status == "interrupted":
         raise KeyboardInterrupt
     return ran(result, result.bench.name or result.bench.experiment, text)
@@ -701,7 +717,7 @@ def _reported(progress: Progress, name: str, label: str, share: float) -> None:
     progress(f"{name}, {label}", share)
 
 
-def told_apart(runs: Sequence[ComparedRun]) -> list[ComparedRun]:
+def _told_apart(runs: Sequence[ComparedRun]) -> list[ComparedRun]:
     """Return runs whose labels differ: by their sources, and else by their numbers."""
     labels = [clean(each.label) for each in runs]
     if len(set(labels)) < len(runs):

@@ -13,15 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.loop_curves import loop_curve
-from bywire.analysis.margins import NO_LOOP, figures_at
+from bywire.analysis.margins import NO_LOOP, figures_at, loop_curve
 from bywire.api import design_parts
 from bywire.api.design_parts import Part, figure_cell, judged_on, verdict_text
 from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase, loop_case, over_range, spread
 from bywire.api.study_tables import percent
 from bywire.bench.bench import Bench
-from bywire.bench.option_names import OPTION
+from bywire.bench.changes import OPTION
 from bywire.bench.requirements import Limit
 from bywire.core.callers import option
 from bywire.core.errors import InputError, ParameterError, quoted
@@ -44,7 +43,8 @@ from bywire.report.tables import Cell, text_table
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.statistics import Outcome, Share, judged, share
 from bywire.studies.study_file import read_study
-from bywire.synthesis.linear_case import LinearCase, existing_case, require_given
+from bywire.synthesis import designer
+from bywire.synthesis.linear_case import LinearCase, cases_of, existing_case, read, require_given
 from bywire.synthesis.outcome import (
     Across,
     Design,
@@ -54,7 +54,6 @@ from bywire.synthesis.outcome import (
     bench_text,
     judged_over,
 )
-from bywire.synthesis.requirement import read
 from bywire.synthesis.schedules import (
     design_schedule,
     frozen,
@@ -62,7 +61,7 @@ from bywire.synthesis.schedules import (
     scheduled,
     verify_schedule,
 )
-from bywire.synthesis.verification import Trial, Verification
+from bywire.synthesis.verification import Trial, Verification, verify
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -201,7 +200,7 @@ class Probability:
         }
 
 
-def drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
+def _drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
     """Return models of a loop whose parameters vary as in a study file.
 
     What the study says of cases, requirements and its bench's experiment does not count.
@@ -239,19 +238,7 @@ def drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
     return DrawnModels(plan.name, designed, count - len(designed), judges, plan.confidence)
 
 
-def probability_of(
-    drawn: DrawnModels,
-    requirements: Sequence[Limit],
-    gains: Mapping[str, float],
-    wanted: str,
-    progress: Progress | None,
-) -> Probability:
-    """Return how probably gains meet requirements over the models that judge."""
-    judged = judged_over(drawn.judges, requirements, gains, progress or silent)
-    return Probability(drawn, tuple(requirements), judged, probability_wanted(wanted))
-
-
-def probability_wanted(text: str) -> float | None:
+def _probability(text: str) -> float | None:
     """Return the probability that is wanted; None for an empty text.
 
     Raises
@@ -289,7 +276,7 @@ def _model(case: LoopCase, values: Mapping[str, Any], number: int) -> LinearCase
         return None
 
 
-# --- What a design of gains, or of a gain schedule, starts from and says
+# --- What a design starts from
 
 Spans = Mapping[str, tuple[float, float]]
 
@@ -299,7 +286,7 @@ def requirements_of(file: str | Path | None, texts: Sequence[str]) -> tuple[Limi
     return read([*_from_file(None if file is None else Path(file)), *texts])
 
 
-def left_to_choose(
+def _left_to_choose(
     loop: str, spans: Spans, changes: Mapping[str, Any]
 ) -> dict[str, tuple[float, float]]:
     """Return what may be chosen: what the user has set stays.
@@ -319,7 +306,7 @@ def left_to_choose(
     return left
 
 
-def for_ecu(
+def _for_ecu(
     case: LoopCase, changes: Mapping[str, Any], free: bool
 ) -> tuple[LoopCase, dict[str, Any], Spans]:
     """Return a case, its changes, and the spans that an ECU can run, but for what the user has set.
@@ -336,12 +323,12 @@ def for_ecu(
     return replace(case, par=case.par.replace(fixed)), {**changes, **texts}, limits
 
 
-def narrowed(spans: Spans, limits: Spans) -> Spans:
+def _narrowed(spans: Spans, limits: Spans) -> Spans:
     """Return spans with the limits in their place where there are any."""
     return {name: limits.get(name, span) for name, span in spans.items()}
 
 
-def tunables_of(case: LoopCase) -> Spans:
+def _tunables_of(case: LoopCase) -> Spans:
     """Return the loop's tunables; with its schedule on, those of the operating point's region."""
     schedule = case.loop.schedule
     if schedule is None or not schedule.is_on(case.par):
@@ -349,7 +336,7 @@ def tunables_of(case: LoopCase) -> Spans:
     return schedule.regions[schedule.region(case.par, case.value)]
 
 
-def trial_of(case: LoopCase, changes: Mapping[str, Any], amplitudes: str) -> Trial:
+def _trial_of(case: LoopCase, changes: Mapping[str, Any], amplitudes: str) -> Trial:
     """Return what the design is tried on; ``amplitudes`` are those of the sines, with units."""
     loop = case.loop
     sizes = spread(amplitudes, case.input_unit, "amplitudes") if amplitudes else loop.amplitudes[1:]
@@ -635,6 +622,49 @@ def _curve(case: LoopCase, label: str, gains: Mapping[str, float]) -> DesignCurv
 # --- The design
 
 
+def designed_at_point(
+    case: LoopCase,
+    overrides: Mapping[str, Any],
+    wanted: tuple[Limit, ...],
+    over: Sequence[str],
+    amplitudes: str | None,
+    free_derivative: bool,
+    vary: str | Path,
+    drawn: int,
+    probability: str,
+    seed: int,
+    progress: Progress | None,
+) -> LoopDesign:
+    """Return gains of a loop at its operating point, over ranges, and for drawn models.
+
+    ``wanted``: the requirements; ``amplitudes``: None without the nonlinear bench; all else as of
+    `bywire.design`.
+    """
+    least = _probability(probability)
+    if least is not None and not vary:
+        raise ParameterError(
+            f"probability needs drawn models: name a study file, {option('vary')} FILE"
+        )
+    case, overrides, limits = _for_ecu(case, overrides, free_derivative)
+    tunables = _left_to_choose(case.loop.name, _narrowed(_tunables_of(case), limits), overrides)
+    ranges = dict(over_range(text, case)[::2] for text in over)
+    models = _drawn_models(case, vary, drawn) if vary else None
+    cases = cases_of(case.loop, case.par, case.value, ranges)
+    cases += () if models is None else models.cases
+    trial = None if amplitudes is None else _trial_of(case, overrides, amplitudes)
+    start = {name: case.par.leaves()[name] for name in tunables}
+    tried = None
+    designed = designer.design(tunables, wanted, cases, start, seed=seed, progress=progress)
+    if trial is not None and designed.status == "met":
+        tried = verify(designed.gains, wanted, tunables, cases, trial, seed=seed, progress=progress)
+    judged = None
+    if models is not None:
+        gains = designed.gains if tried is None else tried.final.gains
+        met = judged_over(models.judges, wanted, gains, progress or silent)
+        judged = Probability(models, wanted, met, least)
+    return LoopDesign(case, overrides, wanted, limits, tried, designed, judged)
+
+
 def designed_by_region(
     name: str,
     parameters: str,
@@ -657,16 +687,16 @@ def designed_by_region(
     overrides = {**overrides, **schedule.changes}
     case = loop_case(name, parameters, "", overrides, side)
     loop = case.loop
-    case, overrides, limits = for_ecu(case, overrides, free_derivative)
+    case, overrides, limits = _for_ecu(case, overrides, free_derivative)
     given = spread(at, loop.at.unit, loop.at.name) if at else []
     points = points_by_region(loop, case.par, given)
     case = replace(case, value=points[schedule.main][0])
     tunables = {
-        region: {n: span for n, span in narrowed(spans, limits).items() if n not in overrides}
+        region: {n: span for n, span in _narrowed(spans, limits).items() if n not in overrides}
         for region, spans in schedule.regions.items()
     }
     ranges = dict(over_range(text, case)[::2] for text in over)
-    trial = None if amplitudes is None else trial_of(case, overrides, amplitudes)
+    trial = None if amplitudes is None else _trial_of(case, overrides, amplitudes)
     tried = None
     designed = design_schedule(
         loop, case.par, wanted, points, tunables, over=ranges, seed=seed, progress=progress

@@ -13,8 +13,13 @@ from numpy.typing import NDArray
 
 from bywire.analysis.margins import NO_LOOP
 from bywire.analysis.response import frequency_response as by_sines
-from bywire.analysis.response.broadband import Broadband, broadband_response
-from bywire.analysis.response.frequency_response import largest, require_stable, with_step_errors
+from bywire.analysis.response.frequency_response import (
+    Broadband,
+    broadband_response,
+    largest,
+    require_stable,
+    with_step_errors,
+)
 from bywire.analysis.response.large_signal import (
     Variant,
     leaving,
@@ -207,8 +212,8 @@ class FrequencyResponse(Answer):
         case, response = self.case, self.data
         head = f"closed loop {case.loop.name} of {case.name} at {case.point}"
         if self.range[0]:
-            over = TableBlock(over_table(response, self.variants, self.range, self.unit))
-            worst = worst_line(response, self.variants, self.range, self.unit)
+            over = TableBlock(_over_table(response, self.variants, self.range, self.unit))
+            worst = _worst_line(response, self.variants, self.range, self.unit)
             return [f"{head}: bandwidth (-3 dB) by amplitude", over, worst]
         excitation = response.attrs["excitation"]
         peaks = [f"excitation: {excitation}, amplitudes are its peaks"]
@@ -218,19 +223,19 @@ class FrequencyResponse(Answer):
             table,
             *filter(None, [purity(response), largest(response)]),
             "",
-            TableBlock(figures_table(response, self.unit)),
-            NOTE,
+            TableBlock(_figures_table(response, self.unit)),
+            _NOTE,
         ]
 
     def _bandwidths(self) -> list[Block]:
         """Return what a page says of bandwidths."""
-        note = f"{NOTE[0].upper()}{NOTE[1:]}.{self._first(' Of the first case: ', '.')}"
-        blocks: list[Block] = [TableBlock(figures_table(self.data, self.unit), note)]
+        note = f"{_NOTE[0].upper()}{_NOTE[1:]}.{self._first(' Of the first case: ', '.')}"
+        blocks: list[Block] = [TableBlock(_figures_table(self.data, self.unit), note)]
         if not self.range[0]:
             return blocks
         caption = "Bandwidth over the range; rings: worst cases. All else shows the first case."
         over = TableBlock(
-            over_table(self.data, self.variants, self.range, self.unit), "Bandwidth by amplitude."
+            _over_table(self.data, self.variants, self.range, self.unit), "Bandwidth by amplitude."
         )
         name = f"{self.case.loop.name}-bandwidth"
         return [*blocks, FigureBlock(self._over_range, caption, name), over]
@@ -275,10 +280,10 @@ class FrequencyResponse(Answer):
                 "gain": np.abs(self.linear).tolist(),
                 "phase": np.degrees(np.unwrap(np.angle(self.linear))).tolist(),
             },
-            "figures": figures_object(response, 0),
+            "figures": _figures_object(response, 0),
         }
         if self.range[0]:
-            shown |= over_object(response, self.variants, self.range[0])
+            shown |= _over_object(response, self.variants, self.range[0])
         return shown
 
 
@@ -447,7 +452,7 @@ def _measured(
 
 # --- Bandwidths by amplitude, of one case or over a range, as tables and as JSON
 
-NOTE = (
+_NOTE = (
     "bandwidth: -3 dB; crossover and margins of the loop gain's describing function; shares "
     "of the time: the largest of all frequencies"
 )
@@ -469,7 +474,7 @@ def _title(flag: str) -> str:
     return flag.replace("_", " ")
 
 
-def figures_table(response: xr.Dataset, unit: str) -> Table:
+def _figures_table(response: xr.Dataset, unit: str) -> Table:
     """Return bandwidth, crossover, margins and limits of the first variant by amplitude."""
     known = shares(response)
     heading = [
@@ -502,10 +507,10 @@ def figures_table(response: xr.Dataset, unit: str) -> Table:
     return text_table(heading, rows)
 
 
-def worst_line(
+def _worst_line(
     response: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
 ) -> str:
-    """Return the worst case of every amplitude over a range as a line; see `over_table`."""
+    """Return the worst case of every amplitude over a range as a line; see `_over_table`."""
     texts = []
     for j, size in enumerate(response["amplitude"].values):
         k = narrowest(response, j)
@@ -515,7 +520,7 @@ def worst_line(
     return f"worst: {'; '.join(texts)}"
 
 
-def over_table(
+def _over_table(
     response: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
 ) -> Table:
     """Return the bandwidths over a range by amplitude.
@@ -545,7 +550,7 @@ def over_table(
     return text_table([range_[0], *sizes], rows)
 
 
-def figures_object(response: xr.Dataset, variant: int) -> list[dict[str, Any]]:
+def _figures_object(response: xr.Dataset, variant: int) -> list[dict[str, Any]]:
     """Return the figures of a variant by amplitude; null beyond the measured frequencies."""
     rows = []
     for j, size in enumerate(response["amplitude"].values):
@@ -566,12 +571,12 @@ def figures_object(response: xr.Dataset, variant: int) -> list[dict[str, Any]]:
     return rows
 
 
-def over_object(response: xr.Dataset, variants: Sequence[Variant], name: str) -> dict[str, Any]:
+def _over_object(response: xr.Dataset, variants: Sequence[Variant], name: str) -> dict[str, Any]:
     """Return the figures of all cases of a range, and the worst of every amplitude."""
     cases = [
         {
             name: variant.label,
-            "figures": figures_object(response, k),
+            "figures": _figures_object(response, k),
             "gain": _listed(response["gain"].values[k]),
             "phase": _listed(response["phase"].values[k]),
         }

@@ -16,8 +16,8 @@ import xarray as xr
 from bywire.api.parameter_choice import set_for
 from bywire.api.replay import columns_of_bench, driven_bench
 from bywire.bench.bench import Bench
+from bywire.bench.changes import settled
 from bywire.bench.experiment import EXPERIMENTS
-from bywire.bench.relative_changes import settled
 from bywire.core.callers import is_command_line, option
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import FileError, InputError, ParameterError, unknown_name, unknown_of_few
@@ -29,7 +29,7 @@ from bywire.identification.estimate import Estimate, as_object
 from bywire.identification.fitting.question import BENCH_METHODS, BenchMethod, Question, find_method
 from bywire.identification.measured import Measured, measured, name_of, require_signals
 from bywire.identification.method import Effort, Identified
-from bywire.identification.trust import displaced
+from bywire.identification.trust import displaced, put_in
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Attachment,
@@ -180,7 +180,7 @@ def _require_columns_alone(method: Method, question: Question) -> None:
             raise unknown_of_few(f"signal of {method.name}", name, signals)
 
 
-def columns_of(method: Method, question: Question, time: str) -> NamedColumns:
+def _columns_of(method: Method, question: Question, time: str) -> NamedColumns:
     """Return the columns of measurement files that a question names.
 
     Parameters
@@ -286,7 +286,7 @@ def _on_bench(
         optional=on_bench.optional,
         gaps=True,
         multiple=bench.step,
-        named=columns_of(on_bench, question, time),
+        named=_columns_of(on_bench, question, time),
         progress=progress,
     )
     return method.on(bench, replace(question, holdout=held.data))
@@ -294,13 +294,65 @@ def _on_bench(
 
 # --- Identification
 
-STARTS = "starts.jsonl"
+_STARTS = "starts.jsonl"
 """file of the output folder that keeps finished starts"""
 
 _FAR = 30.0  # times: beyond, a unit is the first suspect
 
 
-def far_off(estimates: Mapping[str, float], before: Mapping[str, float]) -> list[str]:
+def identified(
+    chosen: ChosenMethod,
+    question: Question,
+    sources: Sequence[Source],
+    *,
+    mapping: str | Path | None,
+    time: str,
+    synthetic: int | None,
+    folder: Path | None,
+    starts: int,
+    seed: int,
+    progress: Progress,
+) -> Identification:
+    """Return what a method finds in measurements, or in a simulated one; see `bywire.identify`."""
+    method = chosen.method
+    named = _columns_of(method, question, time)
+    _require_one_source(chosen, sources, synthetic, mapping, time)
+    if folder is not None:
+        require_own(folder, method.name)
+    data, source = _data_of(chosen, sources, mapping, named, synthetic, progress)
+    files = tuple(
+        Path(each) for each in (*sources, question.holdout) if isinstance(each, str | Path)
+    )
+    if folder is not None:
+        _remove(folder, files)
+    start = _start_of(chosen, synthetic)
+    store = None if folder is None else folder / _STARTS
+    found = _search(
+        chosen, start, data.data, Effort(starts=starts, seed=seed, store=store, progress=progress)
+    )
+    notes = [*data.notes]
+    if chosen.par is not None:
+        notes += _far_off(found.parameters, chosen.par.leaves())
+    truth: Mapping[str, float] = {}
+    if synthetic is not None:
+        try:
+            truth = put_in(method, chosen.par, chosen.options)
+        except ParameterError as error:
+            notes.append(str(error))
+    return Identification(
+        chosen,
+        found,
+        data.data,
+        source,
+        _begun_at(chosen, start, found),
+        truth,
+        tuple(notes),
+        synthetic is not None,
+        files,
+    )
+
+
+def _far_off(estimates: Mapping[str, float], before: Mapping[str, float]) -> list[str]:
     """Return a note for every parameter that is far from what it was, as by a wrong unit."""
     notes = []
     for name, value in estimates.items():
@@ -314,7 +366,7 @@ def far_off(estimates: Mapping[str, float], before: Mapping[str, float]) -> list
     return notes
 
 
-def require_one_source(
+def _require_one_source(
     chosen: ChosenMethod,
     sources: Sequence[Source],
     synthetic: int | None,
@@ -346,7 +398,7 @@ def require_one_source(
             raise ParameterError(f"{option(name)} is for measurement files: leave it out")
 
 
-def data_of(
+def _data_of(
     chosen: ChosenMethod,
     sources: Sequence[Source],
     mapping: str | Path | None,
@@ -375,14 +427,14 @@ def data_of(
     return Measured(data, ()), f"simulated experiment{made_of}, seed {synthetic}"
 
 
-def start_of(chosen: ChosenMethod, synthetic: int | None) -> ParameterSet | None:
+def _start_of(chosen: ChosenMethod, synthetic: int | None) -> ParameterSet | None:
     """Return the parameters from which the search begins: off those that were put in."""
     if synthetic is None or chosen.par is None:
         return chosen.par
     return displaced(chosen.par, chosen.method.unknowns, Effort().spread, synthetic)
 
 
-def search(
+def _search(
     chosen: ChosenMethod, start: ParameterSet | None, data: xr.Dataset, effort: Effort
 ) -> Identified:
     """Return what the method finds; an interrupted search says where its starts are kept.
@@ -403,7 +455,7 @@ def search(
         ) from None
 
 
-def begun_at(
+def _begun_at(
     chosen: ChosenMethod, start: ParameterSet | None, identified: Identified
 ) -> dict[str, float]:
     """Return the values from which the search began, by label."""
@@ -513,7 +565,7 @@ def _nodes(value: Any) -> tuple[float, ...]:
 
 # --- What an earlier identification or study left in the folder of ``--out``
 
-ESTIMATE = "estimate.json"
+_ESTIMATE = "estimate.json"
 """file of the output folder that says which method wrote it, and what else it wrote"""
 
 STUDY = "study.json"
@@ -530,7 +582,7 @@ def require_own(out: Path, method: str) -> None:
     FileError
         When it does, or what it holds cannot be read.
     """
-    for path, what in ((out / ESTIMATE, "result"), (out / STUDY, "study")):
+    for path, what in ((out / _ESTIMATE, "result"), (out / STUDY, "study")):
         earlier = _read(path)
         if earlier is None or earlier.get("method") == method:
             continue
@@ -551,7 +603,7 @@ def remove_study(out: Path) -> None:
     _unlink(out / STUDY)
 
 
-def remove(out: Path, keep: Sequence[Path]) -> None:
+def _remove(out: Path, keep: Sequence[Path]) -> None:
     """Remove the files of an earlier result, so that none stands beside the new one.
 
     Parameters
@@ -566,14 +618,14 @@ def remove(out: Path, keep: Sequence[Path]) -> None:
     FileError
         When one cannot be removed.
     """
-    earlier = _read(out / ESTIMATE)
+    earlier = _read(out / _ESTIMATE)
     if earlier is None:
         return
     kept = {path.resolve() for path in keep}
     # Names alone, within the folder: it may have moved since. The list itself goes last.
     names = [Path(str(text)).name for text in earlier.get("files", [])]
     written = [out / name for name in names if Path(name).suffix in _OURS]
-    for path in (*written, out / ESTIMATE):
+    for path in (*written, out / _ESTIMATE):
         if path.resolve() not in kept:
             _unlink(path)
 
@@ -712,7 +764,7 @@ class Identification(Answer):
             data=self._data(),
             banner=self._banner(),
             attachments=list(self._attachments()),
-            record=ESTIMATE,
+            record=_ESTIMATE,
             file_notes=self._file_notes(),
             prepare=self._prepare,
             changes=self.chosen.changed,
@@ -865,7 +917,7 @@ class Identification(Answer):
 
     def _prepare(self, folder: Path) -> None:
         require_own(folder, self.chosen.method.name)
-        remove(folder, self.files)
+        _remove(folder, self.files)
 
 
 def _residual_caption(name: str, estimate: Estimate) -> str:

@@ -14,9 +14,8 @@ from bywire.analysis.crossings import bandwidth
 from bywire.analysis.linear.corners import read_sides
 from bywire.analysis.linear.linear_model import LinearModel, rates
 from bywire.analysis.linear.linearize import Friction
-from bywire.analysis.linear.plant import PLANTS, Plant, PlantPoint
 from bywire.analysis.locus import Locus, locus, locus_of
-from bywire.analysis.loop import LOOPS, Quantity
+from bywire.analysis.loop import LOOPS, PLANTS, Plant, PlantPoint, Quantity
 from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.margins import NO_LOOP
 from bywire.analysis.periodic import PeriodicModel, dithered_loop
@@ -227,37 +226,15 @@ class PlantLocus(Answer):
         )
 
 
-def linearize_plant(
-    name: str,
-    parameters: str,
-    at: str,
-    overrides: Mapping[str, Any],
-    friction: str,
-    speed: str,
-    reduce: str,
-    side: str = "",
-) -> LinearizedPlant:
-    """Return the linear model of a plant; see `bywire.linearize`."""
-    case = plant_case(name, parameters, at, overrides, friction, speed, side)
+def _linearized_plant(case: PlantCase, reduce: str) -> LinearizedPlant:
     model = case.plant.linear(case.par, case.point)
     reduced = texts.reduced(model, reduce, case.plant.band) if reduce else None
     return LinearizedPlant(case, model, reduced)
 
 
-def plant_locus(
-    name: str,
-    parameters: str,
-    at: str,
-    overrides: Mapping[str, Any],
-    friction: str,
-    speed: str,
-    range_: str,
-    side: str = "",
-) -> PlantLocus:
-    """Return the poles of a plant over a range; see `bywire.linearize`."""
-    case = plant_case(name, parameters, at, overrides, friction, speed, side)
+def _plant_locus(case: PlantCase, range_: str) -> PlantLocus:
     quantity = case.point.quantity
-    over, unit, values = range_of(range_, quantity, case.par, "locus")
+    over, unit, values = locus_range(case, range_)
 
     def model(value: float) -> LinearModel:
         if over == quantity.name:
@@ -267,7 +244,7 @@ def plant_locus(
     return PlantLocus(case, locus_of(model, over, unit, sorted(values)))
 
 
-def plant_case(
+def _plant_case(
     name: str,
     parameters: str,
     at: str,
@@ -444,7 +421,7 @@ class LinearizedLoop(Answer):
         return [Paragraph(texts.dithered_line(self.dithered)), *poles]
 
     def _figures(self) -> list[FigureBlock]:
-        name, model, width = self.case.loop.name, self.model, closed_bandwidth(self.model)
+        name, model, width = self.case.loop.name, self.model, _closed_bandwidth(self.model)
         blocks = [
             FigureBlock(
                 partial(_poles, model, width),
@@ -472,7 +449,7 @@ class LinearizedLoop(Answer):
         ends = (float(locus.values[0]), float(locus.values[-1]))
         cases = case.loop.varied(case.par, case.value, locus.name, ends)
         models = [self.model, *(case.loop.closed(*each) for each in cases)]
-        widths = [closed_bandwidth(model) for model in models if model.is_stable]
+        widths = [_closed_bandwidth(model) for model in models if model.is_stable]
         return root_locus(locus, max(widths, default=math.nan))
 
     def _attachments(self) -> list[Attachment]:
@@ -507,7 +484,7 @@ class LinearizedLoop(Answer):
         return shown
 
 
-def closed_bandwidth(model: LinearModel) -> float:
+def _closed_bandwidth(model: LinearModel) -> float:
     """Return the -3 dB bandwidth of a closed loop [Hz]; NaN for an unstable one."""
     if not model.is_stable:
         return math.nan
@@ -535,14 +512,28 @@ def _response(model: LinearModel, width: float, dithered: PeriodicModel | None) 
     return bode(lines, gain_unit=unit, marks=marks, depth=_DEPTH)
 
 
-# --- The model
+# --- Linear models of either
 
 
-def linearized_loop(case: LoopCase, locus: str, reduce: str, dither: bool) -> LinearizedLoop:
-    """Return the linear model of a loop, with what else was asked for.
+def linearized(
+    case: LoopCase | PlantCase, locus: str, reduce: str, dither: bool
+) -> LinearizedLoop | LinearizedPlant | PlantLocus:
+    """Return the linear model of a loop or of a plant, or the poles of a plant over a range.
 
     ``locus``, ``reduce``, ``dither``: as of `bywire.linearize`.
     """
+    if isinstance(case, LoopCase):
+        return _linearized_loop(case, locus, reduce, dither)
+    if dither:
+        raise ParameterError(f"{option('dither', True)} is for loops: leave it out, or name a loop")
+    if locus and reduce:
+        raise ParameterError(
+            f"{option('reduce')} and {option('locus')} exclude each other: ask for one of them"
+        )
+    return _plant_locus(case, locus) if locus else _linearized_plant(case, reduce)
+
+
+def _linearized_loop(case: LoopCase, locus: str, reduce: str, dither: bool) -> LinearizedLoop:
     model = case.loop.closed(case.par, case.value)
     dithered = _dithered(case) if dither else None
     return LinearizedLoop(
@@ -577,30 +568,11 @@ def linear_case(
         As `bywire.linearize`.
     """
     if name in PLANTS.all():
-        return plant_case(name, parameters, at, overrides, friction, speed, side)
-    return linear_loop_case(name, parameters, at, overrides, friction, speed, side)
-
-
-def linear_loop_case(
-    name: str,
-    parameters: str,
-    at: str,
-    overrides: Mapping[str, Any],
-    friction: str,
-    speed: str,
-    side: str,
-) -> LoopCase:
-    """Return the loop that is linearized; see `linear_case`.
-
-    Raises
-    ------
-    InputError
-        As `bywire.linearize`, and for what plants alone have.
-    """
+        return _plant_case(name, parameters, at, overrides, friction, speed, side)
     if name not in LOOPS.all():
         raise LOOPS.unknown(name, PLANTS)
-    for argument, given in (("friction", friction), ("speed", speed)):
-        if given:
+    for argument, text in (("friction", friction), ("speed", speed)):
+        if text:
             raise ParameterError(
                 f"{option(argument)} is for plants ({', '.join(PLANTS.all())}): controllers are "
                 "linearized without dry friction; leave it out"

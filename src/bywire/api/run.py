@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,14 +16,16 @@ from bywire.api.run_sections import (
     schematic_section,
     source_says,
 )
+from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
 from bywire.bench.faults.fault_section import from_text
 from bywire.bench.requirements import Verdict
-from bywire.bench.result import Result
 from bywire.bench.result_folder import kpi_record, verdict_record
+from bywire.bench.running import Result
 from bywire.bench.stated import stated_figures
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Progress
 from bywire.report.animation.scene import SCENES
 from bywire.report.answer import Answer
 from bywire.report.document import (
@@ -67,7 +69,7 @@ def require_scene(bench: Bench, over: str = "") -> None:
         raise ParameterError("an animation shows single runs: leave either animate or over out")
 
 
-def playable(result: Result) -> list[str]:
+def _playable(result: Result) -> list[str]:
     """Return the labels of the runs that an animation can show."""
     place = SCENES.find(result.bench.definition.assembly).place
     return [label for label, run in result.recordings.items() if place in run]
@@ -78,7 +80,7 @@ def animations(result: Result) -> list[Attachment]:
     from bywire.report.animation.page import scene_page
     from bywire.report.drawing import write_bytes
 
-    labels, draw = playable(result), SCENES.find(result.bench.definition.assembly).draw
+    labels, draw = _playable(result), SCENES.find(result.bench.definition.assembly).draw
     several = len(labels) > 1
     title = result.bench.name or result.bench.experiment
 
@@ -182,6 +184,7 @@ class BenchResult(Result, Answer):
             brief=[
                 *([Listing(said)] if said else []),
                 *([table] if self.kpis else []),
+                *self._undefined(),
                 Details("", self._scatter()),
             ],
             data={**self._data(), "remarks": said},
@@ -196,6 +199,15 @@ class BenchResult(Result, Answer):
             is_paged=self.status != "interrupted",
             changes=bench_changes(bench),
         )
+
+    def _undefined(self) -> list[Listing]:
+        """Return why key figures are not defined, each reason once."""
+        named: dict[str, list[str]] = {}
+        for kpi in self.kpis:
+            if not math.isfinite(kpi.value) and kpi.note:
+                named.setdefault(kpi.note, []).append(kpi.name)
+        texts = [f"{', '.join(names)}: {note}" for note, names in named.items()]
+        return [Listing(texts, "Not defined:")] if texts else []
 
     def _scatter(self) -> list[Paragraph]:
         """Return what the errors of figures that do not converge are; nothing without any."""
@@ -264,6 +276,29 @@ class BenchResult(Result, Answer):
             "step_errors": self._step_errors(),
             "warnings": self.warnings,
         }
+
+
+def run_once(
+    bench: Bench, progress: Progress | None, engine: str, estimate_error: bool, animated: bool
+) -> BenchResult:
+    """Return what a bench gives; see `bywire.run`."""
+    result = running.run(bench, progress, engine, estimate_error)
+    return BenchResult(
+        **{each.name: getattr(result, each.name) for each in fields(result)}, animated=animated
+    )
+
+
+def bench_of(bench: Bench | str | Path, overrides: Mapping[str, str]) -> Bench:
+    """Return a bench, a bench file's or an experiment's, changed as ``--set`` takes it.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, or a change does not fit.
+    """
+    if not isinstance(bench, Bench):
+        return bench_file.read(bench, overrides)
+    return bench.with_overrides(overrides) if overrides else bench
 
 
 def faulty(bench: Bench, faults: Sequence[str]) -> Bench:

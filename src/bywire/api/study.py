@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.api.parameter_choice import set_for
-from bywire.bench.relative_changes import settled
+from bywire.bench.changes import settled
 from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.values import parsed
@@ -74,7 +74,7 @@ class StudyResult(Answer):
             further=value_changes(self.options, defaults, defaults_of(study.name)),
         )
         kpis = TableBlock(kpi_table(self._rows()))
-        tables = [TableBlock(cut_table(cut), f"{cut.title}.") for cut in findings.cuts]
+        tables = [TableBlock(_cut_table(cut), f"{cut.title}.") for cut in findings.cuts]
         maps = [
             FigureBlock(
                 partial(_drawn, findings.data, shown), shown.caption, f"{study.name}-{kind}"
@@ -191,7 +191,7 @@ def _changed(
     )
 
 
-def cut_table(cut: Cut) -> Table:
+def _cut_table(cut: Cut) -> Table:
     """Return a cut of a study's designs as a table in display units."""
     heading: list[str] = []
     columns: list[list[object]] = []

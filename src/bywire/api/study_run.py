@@ -40,7 +40,7 @@ from bywire.bench import running
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import bench_text
 from bywire.bench.requirements import status_of
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.core.brake import loaded_files
 from bywire.core.callers import is_command_line
 from bywire.core.errors import FileError, InputError, ParameterError, unknown_name
@@ -328,7 +328,7 @@ def noted(findings: Findings, damaged: int) -> list[str]:
     ]
 
 
-def failure_texts(findings: Findings, named: Callable[[int], str]) -> list[str]:
+def _failure_texts(findings: Findings, named: Callable[[int], str]) -> list[str]:
     """Return why cases have no result, each reason once, with the first case that has it.
 
     Parameters
@@ -542,7 +542,7 @@ class StudyRun(Answer):
         figures = spread_blocks(findings)
         texts = self._shown.texts()
         remarks = [*(f"Warning: {text}." for text in self.warnings), *self.notes]
-        missing = failure_texts(findings, self._shown.named)
+        missing = _failure_texts(findings, self._shown.named)
         return Document(
             f"Study {plan.name}",
             f"{len(self.cases)} cases ({plan.design}, seed {plan.seed}) of {subject.line}",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bywire.core.units import difference_unit
-from bywire.report.document import FigureBlock, Listing, TableBlock
+from bywire.report.document import Listing, TableBlock
 from bywire.report.study.drawn_cases import BARS
 from bywire.report.tables import OUTCOMES, Cell, Column, Table, text_table, value_text
 from bywire.report.wording import amount, clean
@@ -23,7 +23,7 @@ from bywire.studies.sought_cases import Importance, RareFailure
 from bywire.studies.statistics import FailureProbability, Influence, Interval, Outcome, Share
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 _URGENCY = ("missed", "undecided", "met")  # outcomes, in the order in which they matter
 _SHOWN = 5  # quantities that drive a key figure
@@ -67,10 +67,10 @@ def _worst(findings: Findings, judgment: Judgment) -> Cell:
     if not known.size:
         return Cell("-" if judgment.worst is None else "not defined")
     value = float(figures[known[0] if judgment.worst is None else judgment.worst])
-    return figure_cell(findings, kpi, value)
+    return _figure_cell(findings, kpi, value)
 
 
-def figure_cell(
+def _figure_cell(
     findings: Findings, name: str, value: float, *, is_difference: bool = False
 ) -> Cell:
     """Return the cell of a value of a key figure; see `figure_text`."""
@@ -141,7 +141,7 @@ def spread_table(findings: Findings) -> Table:
         values = [each.nominal, *middle, each.least, each.largest]
         name = clean(each.name)
         name += f" (not defined in {each.undefined})" if each.undefined else ""
-        cells = (figure_cell(findings, each.name, v) for v in values)
+        cells = (_figure_cell(findings, each.name, v) for v in values)
         rows.append((Cell(name), *cells))
     return Table((Column("name"), *(Column(h, numeric=True) for h in heads)), tuple(rows))
 
@@ -216,8 +216,8 @@ def _effect_table(findings: Findings, name: str, effects: Sequence[Effect]) -> T
             (
                 Cell(each.quantity),
                 *map(Cell, ends),
-                *(figure_cell(findings, name, v) for v in figures),
-                figure_cell(findings, name, each.swing, is_difference=True),
+                *(_figure_cell(findings, name, v) for v in figures),
+                _figure_cell(findings, name, each.swing, is_difference=True),
             )
         )
     return Table((Column("quantity"), *(Column(h, numeric=True) for h in heads)), tuple(rows))
@@ -280,7 +280,6 @@ def _influence_table(influences: Sequence[Influence | ChoiceInfluence], is_parti
 
 # --- Rare failures and sensitivities: how probable, where, what drives them
 
-_POINTS = 200  # of a curve
 _VALUES = 3  # single values of a quantity that are shown
 _SEEN = 0.005  # share of failing cases from which on one is
 
@@ -323,20 +322,6 @@ def importance_tables(findings: Findings) -> list[TableBlock]:
         )
         for each in findings.rare
         if each.importance
-    ]
-
-
-def rare_figures(findings: Findings) -> list[FigureBlock]:
-    """Return the figure of probabilities over the limit; none where nothing was found."""
-    if not any(each.failure.span for each in findings.rare):
-        return []
-    return [
-        FigureBlock(
-            partial(_curves, findings),
-            "Probability that a key figure comes worse than a value, with its interval. Dotted, "
-            "the limit and the probability that is admitted.",
-            "exceedance",
-        )
     ]
 
 
@@ -485,32 +470,6 @@ def _shown(value: float | str, unit: str) -> str:
     return value if isinstance(value, str) else amount(float(value), unit)
 
 
-def _curves(findings: Findings) -> Figure:
-    from bywire.report.study.probabilities import Curve, exceedance
-
-    seen = [each for each in findings.rare if each.failure.span]
-    return exceedance([_curve(findings, each, Curve) for each in seen])
-
-
-def _curve(findings: Findings, each: RareFailure, make: Any) -> Any:
-    demand = each.demand
-    assert each.failure.span is not None
-    assert demand.probability is not None
-    margins = np.linspace(*each.failure.span, _POINTS)
-    sign = -1.0 if demand.is_upper else 1.0
-    intervals: Sequence[Interval] = [each.failure.below(float(m)) for m in margins]
-    return make(
-        demand.figure,
-        demand.unit,
-        demand.bound,
-        1.0 - demand.probability,
-        demand.bound + sign * margins,
-        np.array([f.value for f in intervals]),
-        np.array([f.low for f in intervals]),
-        np.array([f.high for f in intervals]),
-    )
-
-
 def search_notes(findings: Findings) -> list[str]:
     """Return what a search for worst cases stands for, and where it did not come to its end."""
     plan = findings.plan
@@ -530,13 +489,6 @@ def search_notes(findings: Findings) -> list[str]:
 
 # --- Indices of sensitivity
 
-_CAPTIONS = {
-    "sobol-indices": "Shares of the variance of each key figure that a quantity makes, alone and "
-    "with all others, with their intervals. Pale: not distinct from none.",
-    "morris": "Mean size (with its interval) and standard deviation of the elementary effects of "
-    "each quantity. Pale: not distinct from none.",
-}
-
 
 def sensitivity_tables(findings: Findings) -> list[TableBlock]:
     """Return the indices of each key figure of a requirement; of all where nothing is required."""
@@ -547,15 +499,6 @@ def sensitivity_tables(findings: Findings) -> list[TableBlock]:
         for name in shown_figures(findings)
         if (found := findings.sensitivity(name).drivers)
     ]
-
-
-def sensitivity_figures(findings: Findings) -> list[FigureBlock]:
-    """Return the figure of all indices; none where there are none."""
-    drivers = [findings.sensitivity(name).drivers for name in shown_figures(findings)]
-    if not any(drivers):
-        return []
-    caption = _CAPTIONS[findings.plan.design] + strongest(drivers)
-    return [FigureBlock(partial(_bars, findings), caption, "sensitivity")]
 
 
 def drivers_data(findings: Findings, name: str) -> dict[str, Any]:
@@ -635,11 +578,3 @@ def _cells(of: Estimate, written: Callable[[float], str]) -> list[Cell]:
 
 def _share(value: float) -> str:
     return f"{round(value, 2) + 0.0:.2f}"  # no -0.00
-
-
-def _bars(findings: Findings) -> Figure:
-    from bywire.report.study.influences import sensitivity_bars
-
-    each = {name: findings.sensitivity(name).drivers for name in shown_figures(findings)}
-    each = {name: found for name, found in each.items() if found}
-    return sensitivity_bars(each, findings.units, {name: findings.size(name) for name in each})

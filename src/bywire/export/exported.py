@@ -22,16 +22,21 @@ from bywire.core.field_notes import field_notes
 from bywire.core.leaf import Leaf
 from bywire.core.parameters import leaf_fields
 from bywire.core.signals import ranges_of, signals_of
-from bywire.simulation.emission import indented, layout_of, leaf_namer, statements
 from bywire.simulation.emit_single import EXPORTED, emit_single
 from bywire.simulation.engine import prepare
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph, Node
-from bywire.simulation.layout import Layout
 from bywire.simulation.program import Program
 from bywire.simulation.run import Run, initial_vector
-from bywire.simulation.schedule import Schedule
-from bywire.simulation.stages import Stages, build_stages
+from bywire.simulation.schedule import Layout, Schedule
+from bywire.simulation.stages import (
+    Stages,
+    build_stages,
+    indented,
+    layout_of,
+    leaf_namer,
+    statements,
+)
 from bywire.simulation.symbols import SX, column, scalars
 
 

@@ -14,19 +14,18 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
 from matplotlib.ticker import MultipleLocator, NullFormatter
 
-from bywire.analysis.loop_curves import Family, LoopCurve, disk
-from bywire.analysis.margins import LoopMargins
+from bywire.analysis.margins import Family, LoopCurve, LoopMargins, disk
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.panels import Role
 from bywire.report.style import legend_outside, value_color, value_scale
 from bywire.report.wording import amount
 
-Points = Callable[[LoopCurve], tuple[Array, Array]]
+_Points = Callable[[LoopCurve], tuple[Array, Array]]
 
 
-def draw_family(
-    axes: Axes, family: Family, points: Points, *, stable_only: bool = False, label: str = ""
+def _draw_family(
+    axes: Axes, family: Family, points: _Points, *, stable_only: bool = False, label: str = ""
 ) -> None:
     """Draw one line per curve; unstable loops dashed, the worst one on top with its value.
 
@@ -65,7 +64,7 @@ def draw_family(
         )
 
 
-def value_bar(figure: Figure, panels: list[Axes], family: Family) -> None:
+def _value_bar(figure: Figure, panels: list[Axes], family: Family) -> None:
     """Put the scale of the varied parameter beside the panels; nothing for a single curve."""
     if family.name and len(family.curves) >= 2:
         value_scale(figure, panels, family.name, family.unit, family.values)
@@ -86,8 +85,8 @@ def _name(family: Family, label: str) -> str:
 def loop_gain(family: Family) -> Figure:
     """Draw magnitude and phase of the loop gain; margins of the worst curve as vertical spans."""
     figure, (upper, lower) = style.new_figure(5.0, (1.0, 1.0))
-    draw_family(upper, family, _magnitude, label="loop gain L")
-    draw_family(lower, family, _phase)
+    _draw_family(upper, family, _magnitude, label="loop gain L")
+    _draw_family(lower, family, _phase)
     upper.axhline(0.0, color=style.GRAY, linewidth=0.8, zorder=1)
     lower.axhline(-180.0, color=style.GRAY, linewidth=0.8, zorder=1)
     _spans(upper, lower, family.curves[family.worst])
@@ -100,7 +99,7 @@ def loop_gain(family: Family) -> Figure:
     upper.set_ylabel("magnitude of L [dB]")
     lower.set_ylabel("phase of L [°]")
     lower.set_xlabel(style.axis_label("frequency", "Hz"))
-    value_bar(figure, [upper, lower], family)
+    _value_bar(figure, [upper, lower], family)
     style.legend_above(upper)
     figure.align_ylabels([upper, lower])
     return figure
@@ -174,7 +173,7 @@ def nyquist(family: Family) -> Figure:
     axes.plot(
         np.cos(turn), np.sin(turn), color=style.GRAY, linewidth=0.7, linestyle=":", label="gain 1"
     )
-    draw_family(axes, family, _in_the_plane, label="loop gain L")
+    _draw_family(axes, family, _in_the_plane, label="loop gain L")
     _mark_on_the_circle(axes, worst)
     axes.plot(
         -1.0,
@@ -194,7 +193,7 @@ def nyquist(family: Family) -> Figure:
     axes.set_aspect("equal", adjustable="datalim")  # more is shown where there is room
     axes.set_xlabel("real part of L [-]")
     axes.set_ylabel("imaginary part of L [-]")
-    value_bar(figure, [axes], family)
+    _value_bar(figure, [axes], family)
     legend_outside(figure, axes.get_legend_handles_labels()[0], columns=3)
     return figure
 
@@ -257,7 +256,7 @@ def _gain_margins(margins: LoopMargins) -> Iterator[tuple[str, str, float, float
 
 # --- Nichols chart with contours of the closed loop's magnitude
 
-CONTOURS = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.0, 1.0, 3.0, 6.0, 12.0)
+_CONTOURS = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.0, 1.0, 3.0, 6.0, 12.0)
 """magnitudes of T = L/(1 + L) that are drawn [dB]"""
 _LOW, _HIGH = -40.0, 40.0  # gains that are shown, dB
 _TURN = 90.0  # the chart ends at multiples of it, degree
@@ -278,7 +277,7 @@ def nichols(family: Family) -> Figure:
         T = 20.0 * np.log10(np.abs(L / (1.0 + L)))
         apart = np.abs((1.0 - L) / (1.0 + L))
     lines = axes.contour(
-        phase, gain, T, levels=CONTOURS, colors=style.GRAY, linewidths=0.6, linestyles="-"
+        phase, gain, T, levels=_CONTOURS, colors=style.GRAY, linewidths=0.6, linestyles="-"
     )
     axes.clabel(lines, fmt="%g dB", fontsize=0.85 * style.TEXT_SIZE)
     handles: list[Line2D | Patch] = [
@@ -305,14 +304,14 @@ def nichols(family: Family) -> Figure:
                 label=f"disk margin {worst.margins.disk:.2f}",
             )
         )
-    draw_family(axes, family, _in_decibels, label="loop gain L")
+    _draw_family(axes, family, _in_decibels, label="loop gain L")
     _mark_on_the_chart(axes, worst)
     axes.set_xlim(left, right)
     axes.set_ylim(_LOW, _HIGH)
     axes.xaxis.set_major_locator(MultipleLocator(45.0 if right - left <= 540.0 else 180.0))
     axes.set_xlabel("phase of L [°]")
     axes.set_ylabel("magnitude of L [dB]")
-    value_bar(figure, [axes], family)
+    _value_bar(figure, [axes], family)
     gain_lines = [h for h in axes.get_legend_handles_labels()[0] if isinstance(h, Line2D)]
     style.legend_above(axes, [*gain_lines, *handles])
     return figure
@@ -388,7 +387,7 @@ def sensitivity(family: Family) -> Figure:
     panels[1].xaxis.set_minor_formatter(NullFormatter())
     f = family.curves[0].frequency
     panels[1].set_xlim(f[0], f[-1])
-    value_bar(figure, panels, family)
+    _value_bar(figure, panels, family)
     for axes in panels:
         style.legend_above(axes)
     figure.align_ylabels(panels)
@@ -408,7 +407,7 @@ def _panel(axes: Axes, family: Family, quantity: str, limit: float) -> None:
         label=f"usual limit {limit:g}",
     )
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
-    draw_family(axes, family, points, stable_only=True, label=f"|{quantity}|")
+    _draw_family(axes, family, points, stable_only=True, label=f"|{quantity}|")
     worst = family.curves[family.worst]
     if worst.margins.stable:
         size = np.abs(getattr(worst, quantity))

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from bywire.bench.bench import Bench
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.report import style

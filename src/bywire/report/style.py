@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis.samples import smoothed
 from bywire.core.quantities import display_unit
 from bywire.core.typing import Array
 from bywire.report.channel import COLUMNS, Channel, decimate
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
 
-FASTEST = 3 * COLUMNS
+_FASTEST = 3 * COLUMNS
 """points of a thinned line beyond which most pixel columns hold a whole wave of the ripple"""
 
 
-def is_band(shown: Channel) -> bool:
+def _is_band(shown: Channel) -> bool:
     """Return whether a line through all samples fills an area."""
     kept = len(decimate(shown.time, shown.values)[0])
-    return FASTEST < kept < len(shown.values)
+    return _FASTEST < kept < len(shown.values)
 
 
-def averaging_time(time: Array) -> float:
+def _averaging_time(time: Array) -> float:
     """Return 1, 2 or 5 times a power of ten [s], at least one pixel column wide.
 
     Examples
@@ -51,9 +51,9 @@ def averaging_time(time: Array) -> float:
 
 def inside(shown: Channel) -> tuple[Channel, float] | None:
     """Return the moving average and its averaging time [s] where a line fills an area."""
-    if not is_band(shown) or not bool(np.all(np.isfinite(shown.values))):
+    if not _is_band(shown) or not bool(np.all(np.isfinite(shown.values))):
         return None
-    width = averaging_time(shown.time)
+    width = _averaging_time(shown.time)
     return replace(shown, values=smoothed(shown.time, shown.values, width)), width
 
 
@@ -112,7 +112,7 @@ STROKES = {
 
 PALE_OPACITY = 0.3
 """of a ripple behind its average"""
-BAND_ORDER = 2.4
+_BAND_ORDER = 2.4
 """drawing order of a ripple that fills an area: behind every line"""
 
 
@@ -237,7 +237,7 @@ def draw_channel(
                 color=look.color,
                 alpha=opacity * PALE_OPACITY,
                 linewidth=0.8,
-                zorder=BAND_ORDER,
+                zorder=_BAND_ORDER,
             )
         shown, width = average
         pale = "" if role is Role.SET_POINT else " (pale: ripple)"

@@ -35,7 +35,7 @@ FAULTS = "faults"
 _HEIGHT = 0.04  # of a bar, in heights of a panel
 
 
-def mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
+def _mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
     """Draw a bar along the upper edge while a panel's quantity is saturated."""
     spans = _scaled(recording, panel.saturation) if panel.saturation is not None else []
     if spans:
@@ -51,13 +51,13 @@ def mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
         )
 
 
-def mark_faults(axes: Axes, recording: xr.Dataset, *, named: bool) -> None:
+def _mark_faults(axes: Axes, recording: xr.Dataset, *, named: bool) -> None:
     """Draw a bar along the lower edge while a fault is there; ``named``: with a label."""
     if spans := _scaled(recording, FAULTS):
         _draw_fault(axes, spans, 0.0, style.PURPLE, "fault" if named else None)
 
 
-def mark_faults_of(
+def _mark_faults_of(
     axes: Axes, recordings: Sequence[xr.Dataset], colors: Sequence[str | Color], factor: float
 ) -> list[Artist]:
     """Draw the same of several recordings: once where their faults are there at the same times.
@@ -126,7 +126,7 @@ def _spans(recording: xr.Dataset, variable: str) -> list[tuple[float, float]]:
 
 # --- Traces
 
-NEAR = 0.5
+_NEAR = 0.5
 """share of a limit from which its lines are drawn"""
 _LASTING = 0.9  # share of a phase above which its short breaks do not count
 
@@ -189,14 +189,14 @@ def time_traces(
         if axes is rows[0] and limits is not None:
             draw_limits(axes, limits, first)
         _shade_stuck(axes, recording, stuck, named=axes is rows[0])
-        mark_saturation(axes, panel, recording)
-        mark_faults(axes, recording, named=axes is rows[0])
+        _mark_saturation(axes, panel, recording)
+        _mark_faults(axes, recording, named=axes is rows[0])
         _mark_limit(axes, panel, recording, first)
         here = [each for each in left if each.signal in {trace.variable for trace in traces}]
         draw_stated(axes, here, first)
         left = [each for each in left if each not in here]
         axes.margins(x=0.0)
-        set_ticks(axes, panel, first)
+        _set_ticks(axes, panel, first)
         if not panel.levels:  # a mode's ticks say all that its legend would
             style.legend_above(axes)
     _, unit = style.time_scale(first.time)
@@ -301,12 +301,12 @@ def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: boo
 
 def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel) -> None:
     """Draw the limits of a panel's first trace where it comes near; far away they say nothing."""
-    level = limit_of(recording, panel)
+    level = _limit_of(recording, panel)
     if level is None:
         return
     level = convert(level, first.symbol, first.unit)
     look = style.STROKES[Role.LIMIT]
-    sides = [s for s in (1.0, -1.0) if float(np.nanmax(s * first.values)) >= NEAR * level]
+    sides = [s for s in (1.0, -1.0) if float(np.nanmax(s * first.values)) >= _NEAR * level]
     for k, side in enumerate(sides):
         axes.axhline(
             side * level,
@@ -318,7 +318,7 @@ def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel)
         )
 
 
-def limit_of(recording: xr.Dataset, panel: Panel) -> float | None:
+def _limit_of(recording: xr.Dataset, panel: Panel) -> float | None:
     """Return the limit [SI] of a panel's first trace; None where the recording says none."""
     if panel.limit is None:
         return None
@@ -328,7 +328,7 @@ def limit_of(recording: xr.Dataset, panel: Panel) -> float | None:
     return float(value) if isinstance(value, (int, float)) else None
 
 
-def set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:
+def _set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:
     """Set the ticks of an ordinate: few numbers, or the names of a mode."""
     if not panel.levels:
         style.few_ticks(axes, 5 if panel.height < 1.5 else 7)
@@ -340,7 +340,7 @@ def set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:
 
 # --- Several recordings on top of each other, and differences
 
-DOTS: style.Dash = (0, (1.2, 1.2))
+_DOTS: style.Dash = (0, (1.2, 1.2))
 """of the second line of a panel"""
 _APART = 0.03  # of what lines reach over: closer, a set point of a line's color lies below it
 _BRIEF = 0.01  # of the time axis: what shows no longer is not seen
@@ -355,14 +355,14 @@ class Look:
     dash: style.Dash
 
 
-def draw_line(axes: Axes, shown: Channel, look: Look, factor: float, *, second: bool) -> float:
+def _draw_line(axes: Axes, shown: Channel, look: Look, factor: float, *, second: bool) -> float:
     """Draw a line, of a ripple that fills an area its average; return its averaging time [s]."""
     average = inside(shown)
     shown, width = (shown, 0.0) if average is None else average
     axes.plot(
         *decimate(factor * shown.time, shown.values),
         color=look.color,
-        linestyle=DOTS if second else look.dash,
+        linestyle=_DOTS if second else look.dash,
         linewidth=0.9 if second else 1.2,
         zorder=2.8 if second else 3.0,
         label="_",
@@ -370,7 +370,7 @@ def draw_line(axes: Axes, shown: Channel, look: Look, factor: float, *, second: 
     return width
 
 
-def draw_target(
+def _draw_target(
     axes: Axes,
     name: str,
     lines: Sequence[str],
@@ -418,7 +418,7 @@ def _are_seen(targets: Sequence[Channel], followed: Sequence[Channel]) -> bool:
     )
 
 
-def draw_limits_of(
+def _draw_limits_of(
     axes: Axes,
     panel: Panel,
     recordings: Sequence[xr.Dataset],
@@ -427,7 +427,7 @@ def draw_limits_of(
 ) -> list[Line2D]:
     """Draw the limits of a panel's first trace where it comes near; each once."""
     stroke = style.STROKES[Role.LIMIT]
-    levels = [limit_of(recording, panel) for recording in recordings]
+    levels = [_limit_of(recording, panel) for recording in recordings]
     is_one = len(set(levels)) == 1
     drawn = set()
     for recording, look, level in zip(recordings, looks, levels, strict=True):
@@ -437,7 +437,7 @@ def draw_limits_of(
         level = convert(level, first.symbol, first.unit)
         for side in (1.0, -1.0):
             at = side * level
-            if float(np.nanmax(side * values)) < NEAR * level or at in drawn:
+            if float(np.nanmax(side * values)) < _NEAR * level or at in drawn:
                 continue
             drawn.add(at)
             axes.axhline(
@@ -464,7 +464,7 @@ def entry(label: str, color: str | Color, dash: Any) -> Line2D:
 # Every recording has a color, of the palette that any color vision tells apart or, over a range of
 # values, of a scale; what a line is, its dashes say.
 
-FEW = 3
+_FEW = 3
 """recordings up to which the second trace of a panel is drawn as well"""
 _DASHES: tuple[style.Dash, ...] = ("-", (0, (4, 2)), (0, (6, 1.5, 1.5, 1.5)))
 
@@ -491,7 +491,7 @@ def overlaid_panels(
     """Draw the signals that all recordings share, in the panels of the first one's brake.
 
     Panels that stay at zero in all recordings are left out. Set points that are the same are
-    drawn once. Of more than `FEW` recordings, each panel shows its first trace and set points.
+    drawn once. Of more than `_FEW` recordings, each panel shows its first trace and set points.
 
     Parameters
     ----------
@@ -531,7 +531,7 @@ def overlaid_panels(
             if scale is not None or axes is not rows[0]
             else [entry(each.label, each.color, each.dash) for each in looks]
         )
-        faults = mark_faults_of(axes, whole, [each.color for each in looks], factor)
+        faults = _mark_faults_of(axes, whole, [each.color for each in looks], factor)
         entries += faults if axes is rows[0] else []
         style.legend_above(axes, [*heads, *entries])
         axes.margins(x=0.0)
@@ -608,24 +608,24 @@ def _draw_panel(
     targets = [trace for trace in traces if trace.role is Role.SET_POINT]
     lines = [trace for trace in traces if trace not in targets] or targets[:1]
     entries: list[Line2D] = []
-    for k, trace in enumerate(lines[: 2 if len(recordings) <= FEW else 1]):
+    for k, trace in enumerate(lines[: 2 if len(recordings) <= _FEW else 1]):
         averages = [
-            draw_line(axes, channel(recording, trace.variable), look, factor, second=k > 0)
+            _draw_line(axes, channel(recording, trace.variable), look, factor, second=k > 0)
             for recording, look in zip(recordings, looks, strict=True)
         ]
         width = max(averages)
         if len(lines) > 1 or width:  # an ordinate names what its lines have in common
-            dash = DOTS if k > 0 else "-"
+            dash = _DOTS if k > 0 else "-"
             label = channel(recordings[0], trace.variable).label
             label += f", {duration(width)} average" if width else ""
             entries.append(entry(label, style.GRAY, dash))
     for target in [t for t in targets if t not in lines]:
-        entries += draw_target(
+        entries += _draw_target(
             axes, target.variable, [t.variable for t in lines], recordings, looks, factor
         )
-    entries += draw_limits_of(axes, panel, recordings, looks, first)
+    entries += _draw_limits_of(axes, panel, recordings, looks, first)
     axes.set_ylabel(style.axis_label(panel.quantity, first.symbol, "\n"))
-    set_ticks(axes, panel, first)
+    _set_ticks(axes, panel, first)
     return entries
 
 
@@ -641,7 +641,7 @@ def _factor(recordings: Sequence[xr.Dataset]) -> tuple[float, str]:
 
 # --- Differences: each less the first, at the first one's times
 
-LEAST = 1e-9
+_LEAST = 1e-9
 """share of a signal's largest magnitude below which a difference is rounding, and none"""
 
 
@@ -705,7 +705,7 @@ def _less(other: xr.Dataset, base: xr.Dataset, names: list[str]) -> xr.Dataset:
         values = second if is_same else np.interp(time, other["time"].values, second)
         apart = values - first.values
         size = float(np.nanmax(np.abs(first.values), initial=0.0))
-        apart = np.where(np.abs(apart) <= LEAST * size, 0.0, apart)
+        apart = np.where(np.abs(apart) <= _LEAST * size, 0.0, apart)
         unit = difference_unit(str(first.attrs.get("units", "1")))
         signals[name] = ("time", apart, {**first.attrs, "units": unit})
     kept = {key: base.attrs[key] for key in ("model",) if key in base.attrs}

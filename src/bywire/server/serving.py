@@ -37,7 +37,7 @@ from bywire.server.place import Place, place_of
 from bywire.server.routes import answer
 from bywire.server.service import LARGEST_FILE, Service, service_of
 
-METHODS: Final = ("GET", "HEAD", "POST", "PUT")
+_METHODS: Final = ("GET", "HEAD", "POST", "PUT")
 _LINGER: Final = 2.0  # s in which the rest of a refused body is taken and dropped
 _HEADERS: Final = {
     "Cache-Control": "no-store",
@@ -107,8 +107,8 @@ class Handler(BaseHTTPRequestHandler):
             raise RefusedError(400, f"{quoted(self.path)} is not a valid address") from None
         query = dict(parse_qsl(address.query, keep_blank_values=True))
         guard.require_token(self.headers, query, port, self.service.token)
-        if self.command not in METHODS:
-            raise RefusedError(405, f"{self.command} is not answered: use {', '.join(METHODS)}")
+        if self.command not in _METHODS:
+            raise RefusedError(405, f"{self.command} is not answered: use {', '.join(_METHODS)}")
         request = Request(
             self.command, unquote(address.path), query, self.headers, self._body(), self._length()
         )
@@ -188,7 +188,10 @@ class Handler(BaseHTTPRequestHandler):
         self.close_connection = True
         self.request_version = self.protocol_version
         if code == HTTPStatus.NOT_IMPLEMENTED:
-            code, message = 405, f"{quoted(self.command)} is not answered: use {', '.join(METHODS)}"
+            code, message = (
+                405,
+                f"{quoted(self.command)} is not answered: use {', '.join(_METHODS)}",
+            )
         elif code == HTTPStatus.HTTP_VERSION_NOT_SUPPORTED:
             code, message = 400, "this version of HTTP is not spoken: ask by HTTP/1.1"
         status = HTTPStatus(code)
@@ -224,7 +227,7 @@ class _Body:
         return self._handler.rfile.read(size)
 
 
-def quiet_error(*_: object) -> None:
+def _quiet_error(*_: object) -> None:
     """Tell of an error outside of requests, unless somebody has just left."""
     error = sys.exc_info()[1]
     if error is not None and not isinstance(error, (ConnectionError, TimeoutError)):
@@ -238,7 +241,7 @@ class _Server(ThreadingHTTPServer):
     daemon_threads = True
     request_queue_size = 128  # connections that wait: by the standard library's 5, many are cut off
     allow_reuse_address = os.name == "posix"  # elsewhere it lets two servers share a port
-    handle_error = quiet_error  # type: ignore[assignment]
+    handle_error = _quiet_error  # type: ignore[assignment]
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.bench.ensemble import changed
-from bywire.bench.side_by_side import key_figures_of
+from bywire.bench.ensemble import changed, key_figures_of
 from bywire.cases.store import PieceFolder
 from bywire.core.arguments import whole_number
 from bywire.core.brake import loaded_files
@@ -206,7 +205,7 @@ def _fill(
 _WHAT = ("the files of a study", "studies")
 
 
-def require_pyarrow() -> None:
+def _require_pyarrow() -> None:
     """Refuse to go on without the library: nothing could be read, and nothing is damaged.
 
     Raises
@@ -217,7 +216,7 @@ def require_pyarrow() -> None:
     library("pyarrow", *_WHAT)
 
 
-def write_chunk(
+def _write_chunk(
     path: Path, columns: Columns, units: Mapping[str, str], marks: Mapping[bytes, bytes]
 ) -> None:
     """Write a chunk's cases.
@@ -252,7 +251,7 @@ def write_chunk(
     parquet.write_table(table, path, write_page_checksum=True, use_dictionary=texts)
 
 
-def read_chunk(path: Path) -> tuple[Columns, Mapping[bytes, bytes]]:
+def _read_chunk(path: Path) -> tuple[Columns, Mapping[bytes, bytes]]:
     """Return a chunk's cases as they were written, and what tells its file from any other.
 
     Raises
@@ -275,7 +274,7 @@ def read_chunk(path: Path) -> tuple[Columns, Mapping[bytes, bytes]]:
 # The files are the truth: a chunk that is there is never computed again. Each appears whole or not
 # at all, so that whatever is killed loses the chunks that it was at.
 
-CHUNKS = "chunks"
+_CHUNKS = "chunks"
 """folder of the chunks"""
 
 
@@ -309,7 +308,7 @@ class StudyStore(PieceFolder):
     KIND = "study of many cases"
     COMMAND = "bywire study run"
     RECORD = RECORD
-    PIECES = CHUNKS
+    PIECES = _CHUNKS
     FILE = "{:06d}.parquet"
     SAID: ClassVar[Mapping[str, type]] = {
         "digest": str,
@@ -339,7 +338,7 @@ class StudyStore(PieceFolder):
         FileError
             When it holds another study, or cannot be written.
         """
-        require_pyarrow()
+        _require_pyarrow()
         about = {
             "source": str(origin.file.resolve()),
             "name": plan.name,
@@ -394,7 +393,7 @@ class StudyStore(PieceFolder):
         int
             How many there were.
         """
-        require_pyarrow()
+        _require_pyarrow()
         damaged = 0
         for chunk in self.finished():
             try:
@@ -417,7 +416,7 @@ class StudyStore(PieceFolder):
             for name, column in columns.items()
         }
         marks = self._marks(chunk)
-        self.keep_file(chunk, lambda fresh: write_chunk(fresh, columns, units, marks))
+        self.keep_file(chunk, lambda fresh: _write_chunk(fresh, columns, units, marks))
         self._known[chunk] = columns
 
     def read(self, chunks: int) -> pd.DataFrame:
@@ -449,9 +448,9 @@ class StudyStore(PieceFolder):
     def _read(self, chunk: int) -> Columns:
         """Return what the file of a chunk holds; see `columns`."""
         path = self.path(chunk)
-        require_pyarrow()
+        _require_pyarrow()
         try:
-            columns, marks = read_chunk(path)
+            columns, marks = _read_chunk(path)
         except Exception as error:  # the library raises what it likes of damaged files
             raise FileError(
                 f"{path} is damaged ({type(error).__name__}): '{self.resume_command}' computes it "

@@ -66,8 +66,7 @@ def page(
     import gzip
 
     from bywire.api.exports import BenchPage
-    from bywire.bench import bench_file
-    from bywire.bench.bench import Bench
+    from bywire.api.run import bench_of
     from bywire.bench.running import run
     from bywire.core.errors import ParameterError, unknown_name
     from bywire.core.parameters import leaf_fields
@@ -78,10 +77,7 @@ def page(
 
     if Path(out).suffix.lower() not in (".html", ".htm"):
         raise ParameterError(f"out = {str(out)!r} is no page: give a file that ends in .html")
-    if not isinstance(bench, Bench):
-        bench = bench_file.read(bench, overrides)
-    elif overrides:
-        bench = bench.with_overrides(overrides)
+    bench = bench_of(bench, overrides)
     made = exported(bench, case)
     _, reads = start_source(made)
     used = [each.name for each in interface(made, "brake", reads).of("parameter")]

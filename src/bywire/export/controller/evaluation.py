@@ -199,7 +199,7 @@ _COMPARED: dict[type[Any], tuple[str, Callable[[Any, Any], Any]]] = {
 }
 
 
-def unary(at: Context, node: ast.UnaryOp, value: Any) -> Any:
+def _unary(at: Context, node: ast.UnaryOp, value: Any) -> Any:
     """Return what an operator gives of one value."""
     if isinstance(value, Known):
         return Known(_SIGNS[type(node.op)](value.value))
@@ -262,7 +262,7 @@ def _equal(at: Context, node: ast.AST, left: Any, right: Any, sign: str) -> Expr
     return Expr(f"!({both})", UNARY, uses, truth=True)
 
 
-def connected(at: Context, node: ast.BoolOp, values: Iterable[Any]) -> Any:
+def _connected(at: Context, node: ast.BoolOp, values: Iterable[Any]) -> Any:
     """Return "and" or "or" of values, of which those behind a known end are not evaluated."""
     is_and = isinstance(node.op, ast.And)
     parts: list[Expr] = []
@@ -306,13 +306,13 @@ _OURS: dict[Any, str] = {
     ops.exp: "exponential",
 }
 _OURS_IN_DOUBLE: dict[Any, str] = {**_OURS, ops.log: "logarithm", ops.power: "power_of"}
-EXTREMES = {ops.fmin: "smaller", ops.fmax: "larger"}
+_EXTREMES = {ops.fmin: "smaller", ops.fmax: "larger"}
 """functions of core.ops that stand at the top of the C"""
 
-Named = dict[str, Any]
+_Named = dict[str, Any]
 
 
-def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: Named) -> Any:
+def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: _Named) -> Any:
     """Return what a call gives."""
     if isinstance(function, Method):
         return _method(at, node, function, given, named)
@@ -322,7 +322,7 @@ def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: 
     if isinstance(target, partial):
         held = {**{n: Known(v) for n, v in target.keywords.items()}, **named}
         return called(at, node, Known(target.func), [*map(Known, target.args), *given], held)
-    if target in _LIBRARY or target in _OURS or target in EXTREMES:
+    if target in _LIBRARY or target in _OURS or target in _EXTREMES:
         return _elementary(at, node, target, given)
     if target is ops.where:
         return chosen(at, node, *given, *named.values())
@@ -352,8 +352,8 @@ def _elementary(at: Context, node: ast.AST, function: Any, given: list[Any]) -> 
         return Known(function(*(each.value for each in given)))
     arguments = at.body.operands(*(at.body.as_number(at.number(node, v)) for v in given))
     uses: frozenset[Any] = frozenset().union(*(each.uses for each in arguments))
-    if function in EXTREMES:
-        name = EXTREMES[function]
+    if function in _EXTREMES:
+        name = _EXTREMES[function]
         uses |= {("own", name)}
     elif function in (ours := _ours(at)):
         name = ours[function]
@@ -371,7 +371,7 @@ def _ours(at: Context) -> dict[Any, str]:
     return _OURS_IN_DOUBLE if at.body.structs.precision.name == "double" else _OURS
 
 
-def _made(at: Context, node: ast.AST, cls: Any, given: list[Any], named: Named) -> Built:
+def _made(at: Context, node: ast.AST, cls: Any, given: list[Any], named: _Named) -> Built:
     defaults = {name: Known(value) for name, value in cls._field_defaults.items()}
     items = {**defaults, **dict(zip(cls._fields, given, strict=False)), **named}
     missing = [name for name in cls._fields if name not in items]
@@ -380,7 +380,7 @@ def _made(at: Context, node: ast.AST, cls: Any, given: list[Any], named: Named) 
     return Built(cls, {name: items[name] for name in cls._fields})
 
 
-def _class_method(at: Context, node: ast.AST, target: Any, given: list[Any], named: Named) -> Any:
+def _class_method(at: Context, node: ast.AST, target: Any, given: list[Any], named: _Named) -> Any:
     cls, name = target.__self__, target.__func__.__name__
     if is_named_tuple(cls) and name == "_make":
         return Built(cls, dict(zip(cls._fields, at.sequence(node, given[0]), strict=True)))
@@ -392,7 +392,7 @@ def _class_method(at: Context, node: ast.AST, target: Any, given: list[Any], nam
     return at.translation.call(at, node, target.__func__, [Known(cls), *given], named)
 
 
-def _method(at: Context, node: ast.AST, method: Method, given: list[Any], named: Named) -> Any:
+def _method(at: Context, node: ast.AST, method: Method, given: list[Any], named: _Named) -> Any:
     owner, name = method.owner, method.name
     if isinstance(owner, (Record, Built)):
         if name == "_replace":
@@ -418,25 +418,25 @@ def _method(at: Context, node: ast.AST, method: Method, given: list[Any], named:
     raise at.refuse(node, f"the method {name} is not translated")
 
 
-def _zipped(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _zipped(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     rows = [at.sequence(node, each) for each in given]
     return Items(tuple(Items(row) for row in zip(*rows, strict=False)))
 
 
-def _enumerated(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _enumerated(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     rows = enumerate(at.sequence(node, given[0]))
     return Items(tuple(Items((Known(k), each)) for k, each in rows))
 
 
-def _listed(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _listed(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     return Items(at.sequence(node, given[0]) if given else ())
 
 
-def _length(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _length(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     return Known(len(at.sequence(node, given[0])))
 
 
-def _dictionary(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _dictionary(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     items: dict[str, Any] = {}
     for each in map(lifted, given):
         if isinstance(each, Group):
@@ -453,12 +453,12 @@ def _dictionary(at: Context, node: ast.AST, given: list[Any], named: Named) -> A
     return Table({**items, **named})
 
 
-def _attribute_named(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _attribute_named(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     name = at.known(node, given[1], "names of fields must be known at export")
     return attribute(at, node, given[0], name)
 
 
-def _sum(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _sum(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     total: Any = [*given[1:], *named.values(), Known(0)][0]
     for each in at.sequence(node, given[0]):
         if isinstance(total, Known) and isinstance(each, Known):
@@ -472,7 +472,7 @@ def _sum(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
 def _extreme(function: Any) -> Callable[..., Any]:
     """Return the rule of max or min, which keep the first of equal values."""
 
-    def rule(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+    def rule(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
         values = given if len(given) > 1 else list(at.sequence(node, given[0]))
         best = values[0]
         for each in values[1:]:
@@ -482,14 +482,14 @@ def _extreme(function: Any) -> Callable[..., Any]:
     return rule
 
 
-def _float(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _float(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     value = given[0]
     if isinstance(value, Known):
         return Known(float(value.value))
     return at.body.as_number(at.number(node, value))
 
 
-def _absolute(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _absolute(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     return _elementary(at, node, ops.fabs, given)
 
 
@@ -652,7 +652,7 @@ class Evaluator:
         return bool(self.known(node, value, why))
 
     def _unaryop(self, node: ast.UnaryOp) -> Any:
-        return unary(self, node, self.value(node.operand))
+        return _unary(self, node, self.value(node.operand))
 
     def _binop(self, node: ast.BinOp) -> Any:
         return binary(self, node, self.value(node.left), self.value(node.right))
@@ -663,7 +663,7 @@ class Evaluator:
         return compared(self, node, self.value(node.left), self.value(node.comparators[0]))
 
     def _boolop(self, node: ast.BoolOp) -> Any:
-        return connected(self, node, map(self.value, node.values))
+        return _connected(self, node, map(self.value, node.values))
 
     def _subscript(self, node: ast.Subscript) -> Any:
         value = lifted(self.value(node.value))

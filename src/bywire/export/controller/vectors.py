@@ -27,9 +27,9 @@ from bywire.core.typing import Array
 from bywire.export.controller.contract import LARGEST
 from bywire.export.controller.program import Program, Step
 
-Place = tuple[Any, ...]
+_Place = tuple[Any, ...]
 """places in the code that lead to a comparison, innermost first; those of ``core.ops`` as one"""
-Margins = dict[Place, float]
+Margins = dict[_Place, float]
 """how far the sides of comparisons are apart"""
 _LESS = ("__lt__", "__ge__")
 
@@ -57,7 +57,7 @@ def _comparing(name: str) -> Callable[[Traced, Any], Any]:
     return compare
 
 
-def _place(frame: FrameType | None) -> Place:
+def _place(frame: FrameType | None) -> _Place:
     inside: list[int] = []
     while frame is not None and frame.f_code.co_filename == ops.__file__:
         inside.append(frame.f_lasti)
@@ -127,17 +127,17 @@ _BEGIN = margins.__code__
 
 Inputs = tuple[Any, Any, Any]
 """plant, stimulus and memory of a tick"""
-Field = tuple[int, str]
+_Field = tuple[int, str]
 """an input: which of the three, and its name"""
 _STEPS, _JUMP = 60, 1e-7
 
 
-def value_of(inputs: Inputs, field: Field) -> float:
+def _value_of(inputs: Inputs, field: _Field) -> float:
     """Return an input."""
     return float(getattr(inputs[field[0]], field[1]))
 
 
-def changed(inputs: Inputs, changes: Iterable[tuple[Field, float]]) -> Inputs:
+def changed(inputs: Inputs, changes: Iterable[tuple[_Field, float]]) -> Inputs:
     """Return inputs of which some have other values."""
     parts = list(inputs)
     for (part, name), value in changes:
@@ -153,7 +153,7 @@ class Border:
     below: Inputs
     is_met: bool
 
-    def changed(self, field: Field, value: float) -> Border:
+    def changed(self, field: _Field, value: float) -> Border:
         """Return both sides with another input changed, which are taken to be equal at one."""
         above, below = (changed(each, [(field, value)]) for each in (self.above, self.below))
         return Border(above, below, is_met=True)
@@ -175,8 +175,8 @@ class Turn:
 
     tick: Callable[..., Any]
     par: Any
-    place: Place
-    field: Field
+    place: _Place
+    field: _Field
 
     def margins(self, inputs: Inputs, value: float) -> Margins:
         """Return how far the sides of all comparisons are apart, with a value of the input."""
@@ -190,7 +190,7 @@ class Turn:
         self, inputs: Inputs, first: tuple[float, float], last: tuple[float, float]
     ) -> Border:
         """Return where the comparison turns between two values with their margins."""
-        ends = turning_point(lambda value: self.margin(inputs, value), first, last)
+        ends = _turning_point(lambda value: self.margin(inputs, value), first, last)
         above, below = (changed(inputs, [(self.field, value)]) for value, _ in ends)
         return Border(above, below, ends[1][1] == 0.0)
 
@@ -214,7 +214,7 @@ class Turn:
         return any(abs(a - b) > _JUMP * (abs(a) + abs(b)) for a, b in zip(first, last, strict=True))
 
 
-def turning_point(
+def _turning_point(
     margin: Callable[[float], float], first: tuple[float, float], last: tuple[float, float]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return two numbers as close to each other as can be, between which a margin turns.
@@ -294,10 +294,10 @@ class Borders:
         self.fields = [(part, name) for part, names in enumerate(used) for name in sorted(names)]
         self.rows: list[Inputs] = []
         self.reached: list[tuple[Inputs, int]] = []
-        self.shown: Counter[Place] = Counter()
-        self.met: Counter[Place] = Counter()
-        self.unseen: Counter[Place] = Counter()
-        self.sides: dict[Place, list[Field]] = {}
+        self.shown: Counter[_Place] = Counter()
+        self.met: Counter[_Place] = Counter()
+        self.unseen: Counter[_Place] = Counter()
+        self.sides: dict[_Place, list[_Field]] = {}
 
     def near(self, rows: Sequence[tuple[Inputs, Any]], wanted: int) -> Iterator[tuple[Inputs, int]]:
         """Yield inputs on both sides of borders, and which of the rows they come from.
@@ -328,21 +328,21 @@ class Borders:
     def _any(self, count: int) -> int:
         return int(self.rng.integers(count))
 
-    def _another(self, inputs: Inputs, field: Field) -> float:
+    def _another(self, inputs: Inputs, field: _Field) -> float:
         """Return another value of an input: that of other inputs, none, or its own changed."""
         others = self.rows[self._any(len(self.rows))]
-        before = value_of(inputs, field)
-        values = (value_of(others, field), 0.0, -before, 3.0 * before)
+        before = _value_of(inputs, field)
+        values = (_value_of(others, field), 0.0, -before, 3.0 * before)
         return values[max(int(self.rng.integers(-3, 4)), 0)]
 
     def _turned(self, inputs: Inputs, par: Any) -> Iterator[Border]:
         """Yield borders of the rarest comparisons that turn where an input gets another value."""
         along = Turn(self.tick, par, (), self.fields[self._any(len(self.fields))])
-        at, to = value_of(inputs, along.field), self._another(inputs, along.field)
+        at, to = _value_of(inputs, along.field), self._another(inputs, along.field)
         here, there = (along.margins(inputs, value) for value in (at, to))
         ends = [(to, there)]
         ends += [(v, along.margins(inputs, v)) for v in self._aimed((at, here), (to, there))]
-        turning: dict[Place, tuple[float, float]] = {}
+        turning: dict[_Place, tuple[float, float]] = {}
         for value, last in ends:
             for place in here.keys() & last.keys():
                 if (here[place] > 0.0) != (last[place] > 0.0):
@@ -356,7 +356,7 @@ class Borders:
             if self._is_worth(place[:_LAW], shown):
                 yield self._met(turn, shown) if shown is not None else border
 
-    def _is_worth(self, law: Place, shown: Border | None) -> bool:
+    def _is_worth(self, law: _Place, shown: Border | None) -> bool:
         """Count a border; return whether it is kept."""
         self.shown[law] += int(shown is not None)
         self.unseen[law] += int(shown is None)
@@ -374,7 +374,7 @@ class Borders:
                 yield value
                 return
 
-    def _rank(self, place: Place) -> tuple[float, Place]:
+    def _rank(self, place: _Place) -> tuple[float, _Place]:
         """Return how well a comparison is known already."""
         law = place[:_LAW]
         return self.met[law] + self.shown[law] / 3 + self.unseen[law] / 10, place
@@ -395,24 +395,24 @@ class Borders:
         if law not in self.sides:
             self.sides[law] = list(self._sides(turn, border.below))
         for field in self.sides[law]:
-            at = value_of(border.below, field)
+            at = _value_of(border.below, field)
             for ulps in () if field == turn.field else _ULPS:
                 nudged = border.changed(field, at + ulps * math.ulp(at))
                 if turn.is_at(nudged) and turn.is_seen(nudged):
                     yield nudged
 
-    def _sides(self, turn: Turn, inputs: Inputs) -> Iterator[Field]:
+    def _sides(self, turn: Turn, inputs: Inputs) -> Iterator[_Field]:
         """Yield inputs that have a say in a comparison."""
         before = margins(self.tick, inputs, turn.par).get(turn.place)
         for field in self.fields:
-            value = value_of(inputs, field) * (1.0 + _SMALL) + _SMALL
+            value = _value_of(inputs, field) * (1.0 + _SMALL) + _SMALL
             moved = changed(inputs, [(field, value)])
             if margins(self.tick, moved, turn.par).get(turn.place) != before:
                 yield field
 
     def _elsewhere(self, turn: Turn, border: Border) -> Border | None:
         """Return a border of the same comparison that shows, with other inputs changed, if any."""
-        above, below = (value_of(each, turn.field) for each in (border.above, border.below))
+        above, below = (_value_of(each, turn.field) for each in (border.above, border.below))
         for count in range(_CONTEXTS):  # the same place: what follows from it may be hidden
             inputs = border.above
             if count % 2:
@@ -432,7 +432,7 @@ class Borders:
                     return moved
         return None
 
-    def _changes(self, inputs: Inputs, but: Field) -> Iterator[tuple[Field, float]]:
+    def _changes(self, inputs: Inputs, but: _Field) -> Iterator[tuple[_Field, float]]:
         """Yield other values of some inputs."""
         for _ in range(int(self.rng.integers(1, 4))):
             field = self.fields[self._any(len(self.fields))]
@@ -549,10 +549,10 @@ class Draw:
 
 # --- Vectors
 
-BORDERING = 3
+_BORDERING = 3
 """of so many vectors one is next to where a comparison turns"""
 _MOST_AT_BORDERS = 400
-SEGMENT = 40
+_SEGMENT = 40
 """ticks after which a trajectory starts anew"""
 _TRIES = 50
 _KINDS = ("random", "jumping", "smooth")
@@ -617,7 +617,7 @@ def vectors(program: Program, memory: Any, count: int, seed: int = 0) -> list[Ve
         for cls in (model.State, model.Stimulus, model.Memory)
     }
     drawn = _drawn(program, memory, draw, sets, used, count)
-    _filled(rows, drawn, count - min(count // BORDERING, _MOST_AT_BORDERS))
+    _filled(rows, drawn, count - min(count // _BORDERING, _MOST_AT_BORDERS))
     for step in program.steps:
         every = rows[step.task.name]
         parts = [used[cls] for cls in (model.State, model.Stimulus, model.Memory)]
@@ -654,7 +654,7 @@ def _drawn(
         if _KINDS[kind] == "smooth":
             x, u = draw.alike(x, used[model.State]), draw.alike(u, used[model.Stimulus])
             m = _at_rest(program, x, u, m, sets[which], number)
-        for at in range(SEGMENT):
+        for at in range(_SEGMENT):
             if _KINDS[kind] == "random":
                 pool: dict[str, list[float]] = {}
                 draw.kinds = (WILD, CALM, RELATED)[at % 3]
@@ -679,7 +679,7 @@ def _at_rest(
     program: Program, x: Any, u: Any, m: Any, par: ParameterSet, number: Callable[[float], Any]
 ) -> Any:
     """Return the memory behind ticks with unchanged inputs: filters have come to rest."""
-    for _ in range(SEGMENT):
+    for _ in range(_SEGMENT):
         for step in program.steps:
             after = _ticked(step, x, m, u, par, number)
             if after is None:

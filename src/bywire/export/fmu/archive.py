@@ -172,8 +172,8 @@ def _call(compiler: Compiler, cross: tuple[str, ...], arguments: list[str]) -> N
 
 # --- The archive
 
-HERE = Path(__file__).parent
-KERNEL = "kernel.c"
+_HERE = Path(__file__).parent
+_KERNEL = "kernel.c"
 _DATE = (1980, 1, 1, 0, 0, 0)  # of every file in the archive: the same FMU has the same bytes
 Progress = Callable[[str, float], None]
 
@@ -221,7 +221,7 @@ class Unit:
             "generationTool": f"bywire {__version__}",
         }
         arguments = (self.made, self.faces, self.identifier, self.token, head)
-        compiled_files = (KERNEL, self.functions)
+        compiled_files = (_KERNEL, self.functions)
         if self.version == 2:
             return description_2(*arguments, compiled_files)
         return description_3(*arguments)
@@ -245,7 +245,7 @@ def unit_of(made: Exported, part: Part, version: int, kind: Kind = "co-simulatio
     token = f"{{{UUID(bytes=digest.digest()[:16])}}}"
     name = made.bench.name or made.bench.experiment
     files = {
-        KERNEL: kernel,
+        _KERNEL: kernel,
         "model.h": model_header(made, faces, start, token, modes),
         **written,
     }
@@ -272,13 +272,13 @@ def write_unit(unit: Unit, path: Path, targets: Sequence[str], progress: Progres
             for name, text in unit.files.items():
                 _add(archive, f"sources/{name}", text.encode())
             if unit.version == 3:
-                built = build_description(unit.identifier, (KERNEL, unit.functions))
+                built = build_description(unit.identifier, (_KERNEL, unit.functions))
                 _add(archive, "sources/buildDescription.xml", _xml(built))
             for number, target in enumerate(targets):
                 progress(f"compiling for {target}", number / (len(targets) + 1))
                 system = PLATFORMS[target]
                 library = scratch / f"{unit.identifier}{system.suffix}"
-                labels.append(compiled(scratch, KERNEL, unit.functions, target, library))
+                labels.append(compiled(scratch, _KERNEL, unit.functions, target, library))
                 folder = system.folder_2 if unit.version == 2 else system.folder_3
                 _add(archive, f"binaries/{folder}/{library.name}", library.read_bytes())
             progress("reference run", len(targets) / (len(targets) + 1))
@@ -303,7 +303,7 @@ def reference(made: Exported) -> bytes:
 
 
 def _own(name: str) -> str:
-    return (HERE / name).read_text(encoding="utf-8")
+    return (_HERE / name).read_text(encoding="utf-8")
 
 
 def _xml(root: Element) -> bytes:

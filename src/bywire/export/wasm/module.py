@@ -35,13 +35,12 @@ from bywire.export.exported import (
 from bywire.export.model_header import braced, number
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.compiler import KERNEL_MATH, TIMEOUT, bundled_compiler
-from bywire.simulation.emission import leaf_count, unread
 from bywire.simulation.emit_rare import CUT, PROJECTION, rare_header, rare_results
 from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph, Node, Operation
-from bywire.simulation.layout import COUNTERS
 from bywire.simulation.run import sampled_stimulus
-from bywire.simulation.stages import STATE, Stages
+from bywire.simulation.schedule import COUNTERS
+from bywire.simulation.stages import STATE, Stages, leaf_count, unread
 
 OPERATIONS = (
     "add",
@@ -80,7 +79,7 @@ _NEAR = 64  # named values back that a byte of an operand reaches; 0 is none, ab
 _MOST = 0xFFFF  # lengths and names have two bytes
 _EITHER = frozenset({"add", "mul", "eq", "ne", "and", "or"})  # operands may change places
 
-Places = Mapping[tuple[str, int], int]
+_Places = Mapping[tuple[str, int], int]
 _Value = tuple[Any, ...]
 _Token = tuple[str, int, bool]  # operation, which operands have names, whether it gets one
 
@@ -149,7 +148,7 @@ def _value(graph: Graph, node: Node) -> _Value:
     return (operation.op, *operation.args) if is_leaf else (id(graph), node)
 
 
-def table(formulas: Sequence[Formula], places: Places) -> bytes:
+def table(formulas: Sequence[Formula], places: _Places) -> bytes:
     """Return the table of some formulas.
 
     What the first of them computes the others read where that wrote it.
@@ -257,7 +256,7 @@ def _number(kind: _Token) -> int:
     return OPERATIONS.index(op) << 4 | mask << 1 | is_named
 
 
-def with_section(module: bytes, name: str, content: bytes) -> bytes:
+def _with_section(module: bytes, name: str, content: bytes) -> bytes:
     """Return a module of WebAssembly with a section that engines leave alone."""
     title = name.encode()
     body = bytes([len(title)]) + title + content
@@ -281,7 +280,7 @@ class RunFormulas:
     header: str
 
 
-def run_formulas(made: Exported) -> RunFormulas:
+def _run_formulas(made: Exported) -> RunFormulas:
     """Return the formulas of a run."""
     stages, graph = made.stages, made.stages.graph
     lengths = {kind: len(stages.fast[kind]) for kind in STATE}
@@ -402,7 +401,7 @@ def _lent(op: str) -> str:
 
 # --- The files
 
-HERE = Path(__file__).parent
+_HERE = Path(__file__).parent
 _LOADER = ("formulas.mjs", "loader.mjs")
 _FLAGS = (
     "-target",
@@ -439,16 +438,16 @@ def module_files(
     return {
         f"{name}.wasm": _module(made, further),
         f"{name}.json": description.encode(),
-        "bywire.mjs": b"".join((HERE / each).read_bytes() for each in _LOADER),
-        "bywire.d.mts": (HERE / "loader.d.ts").read_bytes(),
+        "bywire.mjs": b"".join((_HERE / each).read_bytes() for each in _LOADER),
+        "bywire.d.mts": (_HERE / "loader.d.ts").read_bytes(),
     }
 
 
 def _module(made: Exported, further: Mapping[str, str]) -> bytes:
     """Return the module: what is the same for every bench in code, its formulas as a table."""
-    formulas = run_formulas(made)
+    formulas = _run_formulas(made)
     headers = {"runtime.h": SCALAR, "layout.h": formulas.header, "cut.h": CUT}
-    return with_section(_compiled(headers, further), "formulas", formulas.table)
+    return _with_section(_compiled(headers, further), "formulas", formulas.table)
 
 
 def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
@@ -461,7 +460,7 @@ def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
         )
     with scratch_folder(process_folder()) as folder:
         for name in ("math.h", "string.h", "page.c"):
-            (folder / name).write_bytes((HERE / name).read_bytes())
+            (folder / name).write_bytes((_HERE / name).read_bytes())
         for name, text in headers.items():
             (folder / name).write_text(text, encoding="utf-8")
         sources = [folder / "page.c"]

@@ -13,7 +13,7 @@ import numpy as np
 
 from bywire.bench.experiment import Case, as_run
 from bywire.bench.kpis.hysteresis import Loop, loop_area
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis.samples import smoothed
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.experiments import friction_ramp, hard_braking
 from bywire.brakes.motorcycle.methods.braking.fit import over_frequency, restricted, unknowns_of
@@ -22,10 +22,10 @@ from bywire.brakes.motorcycle.paper.facts import FACTS, REGIONS
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.typing import Array, Complex
-from bywire.data.recursive_filter import filtered
+from bywire.data.recursive_filter import low_passed
 from bywire.identification.least_squares import solve
+from bywire.simulation.ensemble import fit_lanes, simulate_group
 from bywire.simulation.run import Run, Trajectory, simulate
-from bywire.simulation.run_group import fit_lanes, simulate_group
 
 Par = MotorcycleParameters
 
@@ -235,8 +235,7 @@ def _runs(cases: Iterable[Case], signals: Sequence[str]) -> Sequence[Trajectory]
 
 def _low_passed(run: Trajectory, f: float) -> Array:
     """Return the measured current behind the first-order low-pass of Fig. 5."""
-    decay = math.exp(-2.0 * math.pi * f * float(run.time[1] - run.time[0]))
-    return filtered([1.0 - decay], [1.0, -decay], run["i_meas"], settled=True)
+    return low_passed(run["i_meas"], f, float(run.time[1] - run.time[0]))
 
 
 def _braking(brakes: Sequence[Par]) -> list[dict[str, float]]:
