@@ -163,6 +163,7 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
             document.facts  # noqa: B018 - made while copies draw
     if document.is_paged:
         from bywire.report.drawing import save_figure
+        from bywire.report.identity import identity
         from bywire.report.page import write_page
 
         for block in figures:
@@ -174,6 +175,7 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
             document.page,
             banner=document.banner,
             files=names,
+            made=identity(),
         )
     if document.record:
         _record(document, place, names)
