@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from bywire.analysis.loop import LOOPS, PLANTS
 from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.api.describe import Description, described
-from bywire.api.described import fault_summaries
+from bywire.api.things import all_things
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.kpis.families import definitions
@@ -115,7 +115,7 @@ def faults_page() -> str:
         "about one fault.",
         "",
     ]
-    rows = ([f"`{name}`", plain(summary)] for name, summary in fault_summaries().items())
+    rows = ([f"`{name}`", plain(summary)] for name, summary in all_things()["faults"].items())
     return "\n".join([*lines, *table_lines(["fault", "effect"], rows)])
 
 

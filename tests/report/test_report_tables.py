@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from bywire.api.run_faults import Quantity, record_data, record_table
 from bywire.core.parameters import ParameterSet
 from bywire.core.provenance import chosen, paper
 from bywire.core.quantities import Fraction, Length, Resistance
 from bywire.report.answer import frame_of
 from bywire.report.page import table_html
-from bywire.report.record import Quantity, record_data, record_table
 from bywire.report.subject import parameter_rows
 from bywire.report.tables import (
     KpiRow,

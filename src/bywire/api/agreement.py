@@ -13,9 +13,9 @@ from bywire.analysis.margins import NO_LOOP
 from bywire.analysis.response.frequency_response import require_stable
 from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase, spread
-from bywire.bench.running import Progress
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Progress
 from bywire.report.answer import Answer
 from bywire.report.document import Banner, Document, FigureBlock, Paragraph, Section, TableBlock
 from bywire.report.tables import Table, text_table

@@ -118,7 +118,7 @@ def _set_point(result: Result) -> list[str]:
 
 # --- Sections
 
-RECORDED = ("bywire_version", "parameter_hash", "step", "engine", "status", "seed")
+_RECORDED = ("bywire_version", "parameter_hash", "step", "engine", "status", "seed")
 """attributes of a recording that say how it was made"""
 
 
@@ -133,7 +133,7 @@ def outcome(result: Result, rows: Sequence[KpiRow], notes: Sequence[Block]) -> S
     return Section("Outcome", [*blocks, Subject.of_bench(result.bench).changes_block, *notes])
 
 
-def options_in_use(bench: Bench) -> Details:
+def _options_in_use(bench: Bench) -> Details:
     """Return all options of a bench's experiment, folded."""
     table = parameter_table(parameter_rows(bench.chosen_options))
     return Details("Options of the experiment", [TableBlock(table)])
@@ -184,7 +184,7 @@ def how_it_was_made(
     """
     bench, cited = result.bench, PARAMETER_SETS.find(result.bench.parameters)
     attrs = next(iter(result.recordings.values())).attrs if result.recordings else {}
-    kept = "; ".join(f"{key} {attrs[key]}" for key in RECORDED if key in attrs)
+    kept = "; ".join(f"{key} {attrs[key]}" for key in _RECORDED if key in attrs)
     parameters = parameter_table(parameter_rows(bench.par, cited.values))
     return Section(
         "How it was made",
@@ -192,7 +192,7 @@ def how_it_was_made(
             Paragraph(f"Source of the parameters: {cited.source}."),
             Paragraph(f"{kept}."),
             *_signal_errors(errors),
-            options_in_use(bench),
+            _options_in_use(bench),
             Details("All parameters", [TableBlock(parameters)]),
         ],
     )
@@ -264,7 +264,7 @@ def tested_section(nominal: Result, source: StudiedBench | None, subject: Subjec
     faults = fault_texts(nominal.bench, nominal.recordings)
     blocks: list[Block] = [Paragraph(f"{_source_text(source)}.")] if source is not None else []
     blocks += [Listing(faults)] if faults else []
-    blocks += [subject.changes_block, options_in_use(nominal.bench)]
+    blocks += [subject.changes_block, _options_in_use(nominal.bench)]
     return Section("What was tested", blocks)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,8 +20,13 @@ from bywire.core.interrupts import interrupt_heard
 from bywire.core.scratch import made_folder
 
 if TYPE_CHECKING:
-    from bywire.bench.running import Progress
+    from bywire.core.typing import Progress
     from bywire.report.answer import Answer
+
+JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+
+
+# --- What every command does with its answer: progress, messages, files, the exit status
 
 _INTERVAL = 0.1  # s between two drawings of the bar
 

@@ -11,8 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from bywire.cli import completion
-from bywire.cli.options import JsonFlag
-from bywire.cli.show import ANOTHER, folder, show
+from bywire.cli.show import ANOTHER, JsonFlag, folder, show
 from bywire.core.pairs import changes, named
 from bywire.usecases.asks import OUT
 from bywire.usecases.declare import Argument, Command, UseCase

@@ -99,7 +99,7 @@ def _simulated(
             stop = ", ".join(f"{n} = {v[which[lacking[0]]]:g}" for n, v in plan.population.items())
             raise RunError(
                 f"a stop{stop and f' with {stop} (in SI)'} has no {name}: "
-                + known[name].told(lacking[0])
+                + known[name].note_of(lacking[0])
             )
     warnings = dict.fromkeys(text for texts in made.warnings for text in texts)
     return {name: np.asarray(known[name].values) for name in plan.life.figures}, tuple(warnings)

@@ -151,7 +151,7 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
         *([document.page_name] if document.is_paged else []),
         *([document.record] if document.record else []),
     ]
-    from bywire.report.side_by_side import drawn_side_by_side  # loads what starts processes
+    from bywire.report.drawing import drawn_side_by_side  # loads what starts processes
 
     with drawn_side_by_side(shown):
         for each in document.attachments:

@@ -15,7 +15,7 @@ from bywire.analysis.response.sweep import Sweep
 from bywire.brakes.wedge.paper.runs import parameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
-from bywire.report.bode import Response, bode
+from bywire.report.response_figures import Response, bode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
