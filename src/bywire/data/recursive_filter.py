@@ -67,7 +67,7 @@ def low_passed(x: Array, f_c: float, interval: float) -> Array:
     """
     decay = math.exp(-2.0 * math.pi * f_c * interval)
     # Off the first sample: its gain at rest would be 0 / 0 where the decay rounds to 1.
-    return x[0] + filtered([1.0 - decay], [1.0, -decay], x - x[0])
+    return np.asarray(x[0] + filtered([1.0 - decay], [1.0, -decay], x - x[0]))
 
 
 def _recursive(a: Array, driven: Array, before: Array) -> Array:
