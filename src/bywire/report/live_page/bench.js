@@ -83,7 +83,7 @@ function judge() {
       ? element("td", { class: outcome, title: computed.reason }, `${mark} ${figure.text}`)
       : element("td", {}, computed.reason);
     const { text, where } = figure.stated ?? { text: "", where: "" };
-    const stated = isStated ? [element("td", {}, text, element("span", { class: "meaning" }, ` ${where}`))] : [];
+    const stated = isStated ? [element("td", { title: where }, text)] : [];
     return element("tr", {}, element("th", { scope: "row", title: figure.definition }, figure.name), value, verdict, ...stated);
   }));
 }
