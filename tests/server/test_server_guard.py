@@ -136,7 +136,7 @@ def test_what_is_not_there_and_what_is_not_taken(visit):
 def test_files_that_are_dropped(visit):
     large = visit("PUT", "/api/measurements/a.csv", b"", Content_Length=str(2_000_000_000))
     assert large.status == 413
-    assert "2,000.0 MB, and 3.0 MB are taken" in large.object["error"]
+    assert "2,000.0 MB is too large (at most 3.0 MB)" in large.object["error"]
     assert visit("PUT", "/api/measurements/a.toml", b"x").status == 415
     assert visit("PUT", "/api/measurements/a.csv", b"").status == 400
     assert visit("PUT", "/api/measurements/a.csv", iter([b"x"])).status == 411
