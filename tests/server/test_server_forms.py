@@ -70,7 +70,7 @@ BAD = [
     ("life", {"life": "wedge-pads", "check": "-1"}, "check", "whole number >= 0"),
     ("life", {"life": "two-wheeler-pads", "check": "1"}, "check", "it must be 0 or >="),
     ("life", {"life": "wedge-pads", "set": "wear.x=1"}, "set", "unknown"),
-    ("compare", {"runs": "curve.toml"}, "runs", "two at least"),
+    ("compare", {"runs": "curve.toml"}, "runs", "at least two"),
     ("compare", {"runs": "curve.toml\naside"}, "runs", "no finished result"),
     ("compare", {"runs": "curve.toml\nseal-stribek"}, "runs", "seal-stribeck"),
     ("compare", {"runs": "curve.toml\nseal-stribeck", "set": "motor.x=1"}, "set", "motor.x"),
