@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
@@ -32,7 +33,7 @@ def drawn_once(laid_out: bool = False) -> Iterator[None]:
         patch.setattr(drawing, "PNG_DPI", 50)
         if not laid_out:
             patch.setattr(drawing, "settle", lambda figure: figure.set_layout_engine("none"))
-        patch.setattr(page, "inline_figures", lambda figures: _inline([text for _, text in figures]))
+        patch.setattr(page, "inline_figures", _inline)
         yield
 
 
@@ -48,8 +49,8 @@ def undrawn_unless_asked(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
 
 
-def _inline(texts: list[str]) -> list[str]:
-    return drawing.inline_figures([(Figure((1.0, 1.0)), text) for text in texts])
+def _inline(figures: list[tuple[Any, str]]) -> list[str]:
+    return drawing.inline_figures([(Figure((1.0, 1.0)), text) for _, text in figures])
 
 
 @cache

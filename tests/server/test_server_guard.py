@@ -218,7 +218,7 @@ def test_a_port_and_a_folder_that_do_not_do(visit, tmp_path):
         ({"port": visit.server.port}, ParameterError, "--port 0|port=0|port 0"),
         ({"port": 65536}, ParameterError, "0 to 65535"),
         ({"folder": tmp_path / "none"}, FileError, "is not a folder"),
-        ({"subject": "none.toml"}, FileError, "is no file"),
+        ({"subject": "none.toml"}, FileError, "does not exist"),
         ({"subject": "hard-brakin"}, UnknownNameError, "hard-braking"),
         ({"subject": visit.folder / "curve.toml"}, FileError, "is not in"),
         ({"subject": visit.folder}, ParameterError, f"or bywire serve {re.escape(str(tmp_path))}$"),

@@ -13,7 +13,7 @@ import bywire
 from bywire.brakes.motorcycle.sizing import demand as actuator_demand
 from bywire.brakes.motorcycle.sizing.trial import sine_figures
 from bywire.brakes.motorcycle.studies import actuator_sizing
-from bywire.brakes.wedge.sizing.design import Demand, answer, closing_speed, redesigned
+from bywire.brakes.wedge.sizing import Demand, answer, closing_speed, redesigned
 from bywire.brakes.wedge.studies import drive_train
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError

@@ -536,12 +536,12 @@ class Comparison(Answer):
             blocks: list[Flat] = []
             if differing:
                 caption = f"{title} that differ."
-                blocks.append(TableBlock(rows(labels, differing), caption, 0, f"{caption[:-1]}:"))
+                blocks.append(TableBlock(rows(labels, differing), caption, f"{caption[:-1]}:"))
             else:
                 blocks.append(Paragraph(f"{title}: all {len(same)} are the same."))
             if same and self.is_full:
                 caption = f"{title} that are the same."
-                blocks.append(TableBlock(rows(labels, same), caption, 0, f"{caption[:-1]}:"))
+                blocks.append(TableBlock(rows(labels, same), caption, f"{caption[:-1]}:"))
             blocks_of.append(blocks)
         return blocks_of[0], blocks_of[1]
 

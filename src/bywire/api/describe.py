@@ -61,7 +61,7 @@ class Mentioned(Answer):
             self.words,
             head,
             sections=[Section("Mentioned by", [TableBlock(table)])],
-            brief=[head, TableBlock(start, width=0), *left],
+            brief=[head, TableBlock(start), *left],
             data={
                 "name": self.words,
                 "found": [

@@ -38,7 +38,6 @@ from bywire.report.document import (
     Listing,
     Paragraph,
     Section,
-    TableBlock,
 )
 from bywire.report.tables import Cell, text_table
 from bywire.studies.plan import CHUNK, StudyPlan
@@ -464,7 +463,7 @@ class DesignAnswer(Answer):
                 Section("Figures", self._figures()),
                 self.case.subject.provenance("Parameters as they were before the design."),
             ],
-            brief=[part if isinstance(part, str) else TableBlock(part) for part in parts],
+            brief=design_parts.brief_blocks(parts),
             data={**self.data(), "kept_for_the_ecu": {k: list(v) for k, v in self.limits.items()}},
             banner=Banner(verdict, "good" if self.holds else "bad"),
             attachments=[Attachment(f"{loop.name}-design.toml", self._write_bench)],

@@ -12,7 +12,7 @@ from bywire.bench.requirements import Limit
 from bywire.core.callers import option
 from bywire.core.parameters import leaf_fields
 from bywire.core.units import shown
-from bywire.report.document import Flat, Listing, TableBlock
+from bywire.report.document import Block, Flat, Listing, TableBlock
 from bywire.report.tables import Cell, Table, amount_cell, text_table
 from bywire.report.wording import amount
 from bywire.synthesis.bench_figures import BenchFigures
@@ -297,9 +297,9 @@ def as_parts(
             design.worst[name][1],
             wanted.get(name, "").removeprefix(name).strip(),
         ]
-        for name in LOOP_FIGURES
+        for name in sorted(LOOP_FIGURES, key=lambda name: name not in wanted)
     ]
-    parts.append(text_table(["linear", "nominal", "worst", "at", "wanted"], figures))
+    parts.append(text_table(["linear model", "nominal", "worst", "at", "limit"], figures))
     parts += _kept_lines(design) + _unsound_lines(design)
     parts += [
         f"{'binds' if design.binds else 'tightest'}: {binding.requirement}, "
@@ -354,6 +354,19 @@ def _unit_of(case: LoopCase, name: str) -> str:
 def _gain_text(case: LoopCase, name: str, value: float) -> str:
     """Return a gain with its unit."""
     return amount(value, _unit_of(case, name))
+
+
+def brief_blocks(parts: Sequence[Part]) -> list[str | Block]:
+    """Return parts as a terminal shows them: of loop figures, those that have a limit."""
+    blocks: list[str | Block] = []
+    for part in parts:
+        if isinstance(part, str):
+            blocks.append(part)
+            continue
+        is_limited = part.columns[-1].heading == "limit"
+        limited = sum(bool(row[-1].text) for row in part.rows) if is_limited else 0
+        blocks.append(TableBlock(part, most=limited))
+    return blocks
 
 
 def as_blocks(parts: Sequence[Part]) -> list[Flat]:

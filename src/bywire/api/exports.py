@@ -116,7 +116,7 @@ class ControllerCheck:
             "in README.txt, bits beside those of the first row; instructions and stack of the task "
             "that takes most, calls included."
         )
-        return TableBlock(Table(tuple(columns), rows), caption, width=120)
+        return TableBlock(Table(tuple(columns), rows), caption)
 
     def _row(self, trial: Trial) -> tuple[Cell, ...]:
         identical = self.is_identical(trial)

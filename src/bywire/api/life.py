@@ -102,7 +102,7 @@ class LifeResult(Answer):
             [each.name for each in plan.varied],
             _wear_changes(plan),
         )
-        kpis, states = TableBlock(kpi_table(self._rows())), TableBlock(self._states(), width=110)
+        kpis, states = TableBlock(kpi_table(self._rows())), TableBlock(self._states())
         warned = [Listing([f"Warning: {text}." for text in self.warnings])] if self.warnings else []
         wear = Details(
             "Parameters of wear",

@@ -59,7 +59,7 @@ class Overview(Answer):
             "What there is",
             _HINT.replace("\n", " "),
             sections=[Section(title, [TableBlock(table)]) for title, table in tables.items()],
-            brief=[brief[0], TableBlock(brief[1], width=0)] if brief else [self._index()],
+            brief=[brief[0], TableBlock(brief[1])] if brief else [self._index()],
             data=shown,
             has_files=False,
         )

@@ -91,7 +91,7 @@ class Replay(Answer):
         """Return how well it fits, stretch by stretch, with figures and tracked parameters."""
         bench, inputs = self.bench, ", ".join(map(str, self.replayed.inputs.data_vars))
         subject = Subject.of_bench(bench)
-        table = TableBlock(_fit_table(self.fits), width=110)
+        table = TableBlock(_fit_table(self.fits))
         definitions = [f"{k.name}: {k.definition}" for k in self.fits[0].kpis] if self.fits else []
         head = f"{self.source} drives {bench.experiment} of {bench.parameters} by {inputs}"
         return Document(

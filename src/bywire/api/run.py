@@ -32,6 +32,7 @@ from bywire.report.document import (
     Attachment,
     Banner,
     Block,
+    Details,
     Document,
     FigureBlock,
     Listing,
@@ -170,7 +171,6 @@ class BenchResult(Result, Answer):
         """Return verdict and changes, figures, key figures, energy, and how it was made."""
         bench = self.bench
         table = TableBlock(kpi_table(self.rows))
-        narrow = TableBlock(kpi_table([replace(row, where="") for row in self.rows]))
         said = [*remarks(self), *self._unplayed()]
         notes: list[Block] = [Paragraph(f"Warning: {text}.") for text in self.warnings]
         notes += [Listing(said)] if said else []
@@ -187,8 +187,9 @@ class BenchResult(Result, Answer):
             ],
             brief=[
                 *([Listing(said)] if said else []),
-                *([narrow] if self.kpis else []),
-                *self._scatter(),
+                *([table] if self.kpis else []),
+                *self._undefined(),
+                Details("", self._scatter()),
             ],
             data={**self._data(), "remarks": said},
             banner=self._banner(),
@@ -202,6 +203,15 @@ class BenchResult(Result, Answer):
             is_paged=self.status != "interrupted",
             changes=bench_changes(bench),
         )
+
+    def _undefined(self) -> list[Listing]:
+        """Return why key figures are not defined, each reason once."""
+        named: dict[str, list[str]] = {}
+        for kpi in self.kpis:
+            if not math.isfinite(kpi.value) and kpi.note:
+                named.setdefault(kpi.note, []).append(kpi.name)
+        texts = [f"{', '.join(names)}: {note}" for note, names in named.items()]
+        return [Listing(texts, "Not defined:")] if texts else []
 
     def _scatter(self) -> list[Paragraph]:
         """Return what the errors of figures that do not converge are; nothing without any."""
@@ -245,7 +255,7 @@ class BenchResult(Result, Answer):
 
     def _banner(self) -> Banner:
         if not self.verdicts:
-            return Banner("done")
+            return Banner("done, no requirement is stated")
         met = sum(v.met for v in self.verdicts)
         text = f"{met} of {len(self.verdicts)} requirements met"
         if open_ := sum(not v.is_decided for v in self.verdicts):

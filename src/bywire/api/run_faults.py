@@ -19,7 +19,15 @@ from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, display_factor
 from bywire.report.answer import Answer
-from bywire.report.document import Banner, Document, FigureBlock, Listing, Section, TableBlock
+from bywire.report.document import (
+    Banner,
+    Details,
+    Document,
+    FigureBlock,
+    Listing,
+    Section,
+    TableBlock,
+)
 from bywire.report.subject import Subject
 from bywire.report.tables import Cell, Column, Table, amount_cell, text_table
 from bywire.report.wording import amount, clean
@@ -96,6 +104,12 @@ _COLUMNS = (
     "with reaction",
 )
 
+_SHORT = ("fault", "class", "severity", "violates", "within", "seen within", "with reaction")
+"""columns of a terminal"""
+_RANK = ("undetected", "too late", "covered", "latent", "harmless, seen")
+"""classes of faults, the most dangerous first"""
+_MOST = 12
+
 
 @dataclass(frozen=True, repr=False)
 class FaultCampaign(Answer):
@@ -149,8 +163,9 @@ class FaultCampaign(Answer):
         """Return the table of faults, coverage, and when each is too much and seen."""
         plan, bench, findings = self.findings.plan, self.findings.plan.bench, self.findings
         subject = Subject.of_bench(bench, plan.name, varied=[each.name for each in plan.varied])
-        table = TableBlock(self._table(), width=0)
-        residuals = TableBlock(self._residual_table(), width=120)
+        table = TableBlock(self._table())
+        residuals = TableBlock(self._residual_table())
+        uncovered = sum(f.kind in _RANK[:2] for f in findings.faults)
         kinds = ", ".join(f"{n} {kind}" for kind, n in findings.kinds().most_common())
         known = Listing([kinds, *varied_texts(plan.varied), *self.notes])
         return Document(
@@ -164,7 +179,11 @@ class FaultCampaign(Answer):
                 Section("Criteria", [TableBlock(self._criteria_table())]),
                 subject.provenance("" if self.folder is None else f"Outcomes: {self.folder}."),
             ],
-            brief=[table, "", residuals, "", known],
+            brief=[
+                TableBlock(self._worst_first(), most=max(_MOST, uncovered)),
+                f"{len(plan.faults)} faults: {kinds}",
+                Details("", [table, residuals, known]),
+            ],
             data=self._data(),
             banner=self._banner(),
             record="report.json",
@@ -227,6 +246,15 @@ class FaultCampaign(Answer):
     def _table(self) -> Table:
         columns = [self._quantities[name] for name in _COLUMNS if name in self._quantities]
         return record_table(self.findings.faults, columns)
+
+    def _worst_first(self) -> Table:
+        """Return what a terminal shows of each fault, beginning with the most dangerous."""
+        ranked = sorted(
+            self.findings.faults,
+            key=lambda f: (_RANK.index(f.kind), f.tolerance if f.dangerous else math.inf),
+        )
+        columns = [self._quantities[name] for name in _SHORT if name in self._quantities]
+        return record_table(ranked, columns)
 
     def _off_healthy(self, each: FaultFinding) -> str:
         signals = signals_of(self.findings.plan.case(0).model.Output)

@@ -110,7 +110,7 @@ class BenchRange(Answer):
         title = bench.name or bench.experiment
         subject = Subject.of_bench(bench, varied=[self.name])
         pieces = [kpis[k : k + _COLUMNS] for k in range(0, len(kpis), _COLUMNS)]
-        tables = [TableBlock(self._table(piece), width=110) for piece in pieces]
+        tables = [TableBlock(self._table(piece)) for piece in pieces]
         judged = list(self._judged())
         listing = [Listing([text for _, text in judged], "Requirements:")] if judged else []
         listing += [Listing(said)] if (said := self._indistinct()) else []

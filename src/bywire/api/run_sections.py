@@ -239,9 +239,12 @@ def tested_line(plan: StudyPlan) -> str:
     return f"{line}, with the fault{'s' * (len(names) > 1)} {', '.join(names)}"
 
 
-def tested_brief(nominal: Result, plan: StudyPlan) -> list[Listing]:
+def tested_brief(nominal: Result, plan: StudyPlan) -> list[Block]:
     """Return for a terminal the faults, if there are any, and what varies."""
-    return [Listing([*fault_texts(nominal.bench, nominal.recordings), *varied_texts(plan.varied)])]
+    names = ", ".join(each.name for each in plan.varied)
+    faults = fault_texts(nominal.bench, nominal.recordings)
+    listed = Listing([*faults, *([f"varied: {names}"] if names else [])])
+    return [listed, Details("", [Listing(varied_texts(plan.varied))])]
 
 
 def varied_texts(varied: Sequence[Varied]) -> list[str]:

@@ -406,6 +406,7 @@ def _wide_shares(findings: Findings) -> list[str]:
 # --- The answer
 
 _BRIEF = 3  # tables of drivers that a terminal shows
+_DRIVERS = 3  # rows of each without --verbose
 
 
 @dataclass(frozen=True, repr=False)
@@ -527,7 +528,7 @@ class StudyRun(Answer):
         )
         is_rare = bool(findings.rare)
         table = failure_table(findings) if is_rare else demand_table(findings)
-        demands = TableBlock(table, width=120)
+        demands = TableBlock(table)
         is_indexed = plan.sensitivity is not None
         drivers = (
             importance_tables(findings)
@@ -572,7 +573,7 @@ class StudyRun(Answer):
                     *tested_brief(self.nominal, plan),
                     *([demands] if judged else []),
                     *figures,
-                    *drivers[:_BRIEF],
+                    *[replace(each, most=_DRIVERS) for each in drivers[:_BRIEF]],
                     *(unexplained if findings.plan.sensitivity is None else []),
                     *([f"and {more} more such tables in the report"] if more > 0 else []),
                     *([Listing(missing, "Cases without a result")] if missing else []),

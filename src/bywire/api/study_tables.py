@@ -128,7 +128,7 @@ def spread_blocks(findings: Findings) -> list[TableBlock | Listing]:
         return []
     absent = [name for name in findings.units if name not in {s.name for s in findings.spreads}]
     said = [Listing([f"not defined in any case: {', '.join(absent)}"])] if absent else []
-    return [TableBlock(spread_table(findings), width=140), *said]
+    return [TableBlock(spread_table(findings)), *said]
 
 
 def spread_table(findings: Findings) -> Table:

@@ -74,9 +74,8 @@ function judge() {
     const computed = followed.length && following.includes(figure.name)
       ? { value: NaN, reason: `an option follows ${followed}: save the bench file and run it`, open: true }
       : run.figures[figure.name];
-    const unit = figure.unit && ` ${figure.unit}`;
     const value = computed.reason ? element("td", { class: "number", title: computed.reason }, "–")
-      : element("td", { class: "number" }, digits(shownOf(computed.value, figure)) + unit);
+      : element("td", { class: "number" }, readable(shownOf(computed.value, figure), figure.unit));
     const met = figure.limit && isMet(computed, figure.limit);
     const outcome = computed.open ? "undecided" : met ? "met" : "missed";
     const mark = { undecided: "?", met: "✓", missed: "✗" }[outcome];

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bywire.bench.running import Result
-from bywire.brakes.wedge.series import tag
+from bywire.brakes.wedge.case import tag
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.report import style
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FARTHEST = 60.0
-"""brake factor at which the ordinate ends: at the neutral point it has no bound"""
+"""largest brake factor on the ordinate: at the neutral point it has no bound"""
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ class WedgeForces:
 def brake_factor(forces: WedgeForces, tan_alpha: float) -> Figure:
     """Draw force ratio and brake factor C* over the friction coefficient.
 
-    ``forces``: what was computed; ``tan_alpha``: tangent of the wedge's angle, where the closed
-    form changes its sign.
+    ``forces``: computed forces; ``tan_alpha``: tangent of the wedge's angle, where the closed form
+    changes its sign.
     """
     mu = np.asarray(forces.mu_B, dtype=np.float64)
     figure, (upper, lower) = style.new_figure(5.0, (1.0, 1.0))
@@ -94,7 +94,7 @@ def brake_factor(forces: WedgeForces, tan_alpha: float) -> Figure:
 
 
 def _shown(mu: Array, ratio: Array, over: bool) -> Array:
-    """Return the force ratio, or the brake factor where it has room."""
+    """Return the force ratio, or the brake factor within the ordinate."""
     if not over:
         return ratio
     with np.errstate(divide="ignore"):

@@ -12,7 +12,7 @@ from bywire.brakes.two_wheeler.rigs.wheel_on_drum import (
     WheelOnDrumParameters,
 )
 from bywire.control import slip_pi
-from bywire.core.errors import ParameterError
+from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.plant import adhesion, brake_disc, pressure_loop, road_wheel, tyre
 
@@ -25,8 +25,8 @@ def point(par: ParameterSet, value: float) -> Point:
     Raises
     ------
     ParameterError
-        When the speed is not positive, or the slip lies beyond the peak, where no slip that is
-        not controlled stays.
+        When the speed is not positive, or the slip lies beyond the peak, where slip is unstable
+        without control.
     """
     SPEED.require_positive(value)
     at = cast(WheelOnDrumParameters, par.replace({"drum.v": value}))
@@ -34,10 +34,8 @@ def point(par: ParameterSet, value: float) -> Point:
     surface = adhesion.surface_of(at.drum.surface)
     peak = adhesion.peak_slip(surface, at.tyre)
     if not slip < peak:
-        raise ParameterError(
-            f"slip.slip_set = {slip:g} is no operating point: the adhesion has its peak at "
-            f"{peak:.3g}, ask for less"
-        )
+        valid, advice = f"< {peak:.3g}", "the slip of the largest adhesion"
+        raise not_valid("slip.slip_set", f"{slip:g}", valid, advice)
     v_wheel = value * (1.0 - slip)
     force = at.drum.N * adhesion.adhesion(slip, surface, at.tyre)
     held = at.wheel.r * force - road_wheel.rolling_resistance(at.drum.N, at.wheel)

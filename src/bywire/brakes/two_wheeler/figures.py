@@ -1,4 +1,4 @@
-"""Figure: speeds over the road, what it is made of, and the marks that tyres leave on it."""
+"""Figure: speeds over the road, its surfaces, and the marks of the tyres."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ _LOADED = 1.0  # N: a wheel off the ground leaves no mark
 def road_marks(run: xr.Dataset, par: VehicleParameters) -> Figure:
     """Draw the speeds of a two-wheeler and of its treads over the road, and the marks on it.
 
-    Surfaces are bands with their names; a tyre marks the road where it slides, black where its
-    wheel stands, each at the place of its own contact. Speeds are drawn where the front wheel is;
-    it is at zero at time zero. The end of the ideal stop is told where the surface is one.
+    Surfaces are bands with their names. A tyre marks the road where it slides, black where its
+    wheel stands, each at the place of its contact. Speeds are drawn at the place of the front
+    wheel, which is zero at time zero. The end of the ideal stop is drawn on a single surface.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def road_marks(run: xr.Dataset, par: VehicleParameters) -> Figure:
 
 
 def _draw_surfaces(axes: Axes, par: VehicleParameters, span: tuple[float, float]) -> None:
-    """Fill the stretches of the road that are seen, with their names."""
+    """Fill the visible stretches of the road, with their names."""
     ways = par.road
     edges = (span[0], ways.x_change, ways.x_back, span[1])
     drawn: set[str] = set()
@@ -105,7 +105,7 @@ def _draw_surfaces(axes: Axes, par: VehicleParameters, span: tuple[float, float]
 
 
 def _draw_marks(axes: Axes, run: xr.Dataset, place: Array, wheel: str, row: int) -> None:
-    """Draw where a tyre slides, and where its wheel stands meanwhile."""
+    """Mark where a tyre slides, and where its wheel stands."""
     slides = (run[f"sliding_{wheel}"].values > 0.5) & (run[f"N_{wheel}"].values > _LOADED)
     stands = slides & (run[f"omega_{wheel}"].values == 0)
     marks = (

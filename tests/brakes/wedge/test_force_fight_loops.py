@@ -14,6 +14,7 @@ from bywire.core.errors import ParameterError
 from bywire.core.signals import zeros
 from bywire.plant import force_sensor, roller_screw
 from bywire.simulation.run import simulate
+from raising import raises
 
 
 @pytest.mark.parametrize("force", [0.0, 400.0, -250.0])
@@ -50,5 +51,5 @@ def test_equal_motors_on_one_reference_press_nothing():
 
 
 def test_a_force_beyond_the_drives_is_refused():
-    with pytest.raises(ParameterError, match=r"control\.position\.i_max"):
+    with raises(ParameterError, name="force", valid="control.position.i_max"):
         LOOPS.find("force-fight").point(parameters("roberts2003"), 1e5)

@@ -1,23 +1,33 @@
-"""What the figures of Roberts et al. (2003) share: the parameter set, and means over a turn."""
+"""Statements of Roberts et al. (2003), and common parts of all comparisons with them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import xarray as xr
 
+from bywire.brakes.wedge.case import FRICTIONLESS
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.panels import BRAKING
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.series import FRICTIONLESS
+from bywire.brakes.wedge.sets import roberts2003
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.report.time_traces import time_traces
+from bywire.reproduction.source_file import SourceFile
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+CITATION = roberts2003.FILE.citation
+FILE = SourceFile(Path(__file__).with_name("roberts2003.toml"))
+FACTS, ALLOWANCES = FILE.facts, FILE.allowances
+
+
+# --- Common parts of the figures: parameter set, changes, means over a turn
 
 MAIN = "roberts2003"
 
@@ -76,9 +86,9 @@ def order_spectrum(
     Parameters
     ----------
     turns
-        Revolutions to look at: the spectrum resolves 1/turns.
+        Revolutions of the analysis: the spectrum resolves 1/turns.
     begin
-        Time [s] from which to look.
+        Start of the analysis [s].
 
     Returns
     -------

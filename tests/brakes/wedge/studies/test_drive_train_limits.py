@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.brakes.wedge.sizing.options import DEFAULTS
-from bywire.brakes.wedge.studies.drive_train import active, around, failures
+from bywire.brakes.wedge.studies.drive_train import DEFAULTS, active, around, failures
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.synthesis.study import STUDIES
