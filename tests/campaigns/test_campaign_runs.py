@@ -207,7 +207,7 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
     [
         ("[campaign]", "[campain]", "unknown key of a campaign file 'campain'"),
         ('"motor.hot"', '"motor.hott"', "unknown fault of .campaign. only 'motor.hott'"),
-        ('onset = "0.4 s"', 'onset = "0.9 s"', "must lie between"),
+        ('onset = "0.4 s"', 'onset = "0.9 s"', "must be between"),
         ("healthy = 8", "healthy = 2", "a whole number from 4"),
         ('"pressure.stuck" = ["0 bar"', '"pressure.stuck" = ["0 A"', "wrong unit"),
         ('signal = "p_pd"\nbelow', 'signal = "p_pads"\nbelow', "unknown signal of criterion"),
@@ -251,7 +251,7 @@ def test_a_campaign_is_computed_by_the_engine_of_its_bench(campaign, monkeypatch
     monkeypatch.setitem(sys.modules, "cuda.bindings.driver", None)
     find_device.cache_clear()
     plan = campaign.findings.plan
-    with pytest.raises(DeviceError, match="engine 'cuda' takes"):
+    with pytest.raises(DeviceError, match="engine 'cuda' needs"):
         healthy_traces(replace(plan, bench=replace(plan.bench, engine="cuda")))
 
 

@@ -127,7 +127,7 @@ def test_a_piece_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     (tmp_path / "terms").write_text("a file in its place")
     store = SumStore(tmp_path)
-    said = "make room there and resume the sum; what is finished stays"
+    said = "make room there and resume the sum; finished pieces are kept"
     for refuse in (lambda: store.begin(Sums(), {}), lambda: store.keep_file(1, Path.touch)):
         with pytest.raises(FileError, match=f"cannot write .*{said}"):
             refuse()
