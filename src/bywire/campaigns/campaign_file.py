@@ -129,7 +129,7 @@ def _plan(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
     if not singles:
         raise ParameterError(
             "[campaign] leaves no fault: only and leave_out contradict each other",
-            name="campaign.only",
+            name="[campaign]",
         )
     latent = [
         Failing(mode, size, is_present=True)
@@ -245,7 +245,7 @@ def _onsets(section: CampaignSection, case: Case) -> tuple[float, ...]:
         raise ParameterError(
             f"[campaign] onsets from {first:g} s to {onsets[-1]:g} s: they must be between "
             f"{-case.keep:g} s and the end of the run at {case.duration:g} s",
-            name="campaign.onsets",
+            name="[campaign] onsets",
             value=f"{first:g} s to {onsets[-1]:g} s",
             valid=f"{-case.keep:g} s to {case.duration:g} s",
         )
@@ -279,7 +279,7 @@ def _reaction(section: ReactionSection, modes: Mapping[str, Mode]) -> Reaction:
     mode = modes[section.fault]
     if section.value is not None and not mode.unit:
         raise ParameterError(
-            f"[reaction] {mode.name} takes no value: leave it out", name="reaction.value"
+            f"[reaction] {mode.name} takes no value: leave it out", name="[reaction]"
         )
     size = mode.value if section.value is None else section.value
     return Reaction(Failing(mode, _size(mode, size, "[reaction] value")), section.delay)

@@ -63,7 +63,7 @@ def require_small(plan: CampaignPlan) -> None:
             f"{runs} runs of {rows:.3g} rows of {signals} signals are more than {_MOST:.3g} "
             "numbers: take fewer healthy runs or onsets, a shorter maneuver, or a longer "
             "simulation.record",
-            name="campaign.runs",
+            name="simulation.record",
         )
 
 

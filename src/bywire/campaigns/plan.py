@@ -115,9 +115,7 @@ def criteria_of(
     names = [criterion.name for criterion in criteria]
     for name in names:
         if names.count(name) > 1:
-            raise ParameterError(
-                f"[[criteria]] {name!r} occurs twice: rename one", name=f"criteria.{name}"
-            )
+            raise ParameterError(f"[[criteria]] {name!r} occurs twice: rename one", name=name)
     return criteria
 
 
@@ -130,7 +128,7 @@ def _criterion(section: CriterionSection, signals: Mapping[str, Signal]) -> Crit
         raise ParameterError(
             f"[[criteria]] {name!r}: give exactly one of {', '.join(SENSES)}, for instance "
             'above_healthy = "5 bar"',
-            name=f"criteria.{name}",
+            name=name,
             valid=", ".join(SENSES),
         )
     (sense,) = senses

@@ -79,5 +79,5 @@ def test_state_space_has_names_and_the_same_response(period: float) -> None:
 
 def test_a_sample_time_of_ages_is_one_error():
     """Numbers of an unstable model overflow."""
-    with raises(ParameterError, name="period", value="1.3e+19 s"):
+    with raises(ParameterError, name="sample time", value="1.3e+19 s"):
         model_of(1.0, 1.0, 1.0).sampled(1.3e19)
