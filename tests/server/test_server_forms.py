@@ -13,7 +13,7 @@ from bywire.core.errors import RunError, UnknownNameError
 from bywire.server import job_process
 from bywire.server.contents import Contents, contents
 from bywire.server.exchange import RefusedError
-from bywire.server.pages.frame import form
+from bywire.server.pages import form
 from bywire.server.place import Place
 from bywire.server.task import Task, tasks
 from undrawn import drawn, undrawn_unless_asked

@@ -10,8 +10,7 @@ import pytest
 from bywire.core.errors import InputError
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
-from bywire.studies.distribution import read_choice
-from bywire.studies.distribution_section import read_distribution
+from bywire.studies.distribution import read_choice, read_distribution
 
 LEAF = Leaf("motor.R_m", Unit("ohm"), 0.0, 10.0, True, False)
 MIDDLES = (np.arange(200_000) + 0.5) / 200_000

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.api.described import faults
+from bywire.api.things import faults
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import bench_text, load, read
 from bywire.bench.faults.fault_section import AT_ZERO
