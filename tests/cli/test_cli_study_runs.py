@@ -79,7 +79,7 @@ def test_an_unfinished_study_says_so(bywire, study, tmp_path):
 def test_bad_input_is_one_error(bywire, study, tmp_path):
     study.write_text(STUDY.replace("motor.R_m", "motor.R_x"))
     refused(bywire("study", "run", study), "motor.R_m", str(study))
-    refused(bywire("study", "status", tmp_path), "holds no study")
+    refused(bywire("study", "status", tmp_path), "does not contain a study")
     refused(bywire("study", "tolerances.toml"), "bywire study run tolerances.toml")
 
 

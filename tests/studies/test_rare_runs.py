@@ -255,7 +255,7 @@ def test_a_study_of_another_limit_is_another(spent):
     path.write_text(path.read_text().replace("99.9 %", "99 %"))
     assert bywire.study_report(out).findings.rare[0].demand.probability == 0.99
     path.write_text(path.read_text().replace("19 A", "20 A"))
-    with pytest.raises(FileError, match="holds another study"):
+    with pytest.raises(FileError, match="contains another study"):
         bywire.study_report(out)
 
 

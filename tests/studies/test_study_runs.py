@@ -140,14 +140,14 @@ def test_a_folder_of_another_study_is_refused(study, tmp_path):
         lambda: bywire.resume_study(out),
         lambda: bywire.study_report(out),
     ):
-        with pytest.raises(FileError, match="holds another study") as refused:
+        with pytest.raises(FileError, match="contains another study") as refused:
             call()
         assert "varied motor.R_m: normal, mean" in str(refused.value)
         assert "quantiles" not in str(refused.value)
     path.unlink()
     with pytest.raises(FileError, match="is gone"):
         bywire.resume_study(out)
-    with pytest.raises(FileError, match="holds no study"):
+    with pytest.raises(FileError, match="does not contain a study"):
         bywire.study_report(tmp_path)
 
 
