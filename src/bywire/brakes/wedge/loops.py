@@ -36,10 +36,10 @@ _MOTORS: Causes = {
     "encoder": {"encoder.law": "ideal"},
 }
 
-DRIVE_TRAIN: Causes = {**_SCREWS, **_MOTORS}
+_DRIVE_TRAIN: Causes = {**_SCREWS, **_MOTORS}
 """causes in motors and screws on a rig"""
 
-CAUSES: Causes = {
+_CAUSES: Causes = {
     **_SCREWS,
     "wedge friction": {"wedge_friction.mu_int": 0.0, "wedge_friction.mu_R": 0.0},
     **_MOTORS,
@@ -47,7 +47,7 @@ CAUSES: Causes = {
 }
 """causes in the whole brake"""
 
-DRIVE_LIMITS = (
+_DRIVE_LIMITS = (
     Saturation("sat_current", ("i_1_ref", "i_2_ref"), ("control.position.i_max", "drive.i_max")),
 )
 """current demand of a drive at the controller's or at its own limit"""
@@ -210,23 +210,23 @@ MOMENT_LOOP = Loop(
     output="y_M",
     cut="rate",
     point=moment_point,
-    causes=CAUSES,
+    causes=_CAUSES,
     band=(0.5, 100.0),
     amplitudes=(0.5, 20.0),
     # The law depends on f_c over slope_hat alone: one of them is enough.
     tunables={"control.moment.f_c": (0.3, 60.0)},
-    sustained=CAUSES["run-out, disc slowing"],
+    sustained=_CAUSES["run-out, disc slowing"],
     proof="moment-pulses",
-    saturations=DRIVE_LIMITS,
+    saturations=_DRIVE_LIMITS,
 )
 
 
 # --- Position loop of the assembled wedge
 
-BAND = (1.0, 150.0)
+_BAND = (1.0, 150.0)
 """frequencies [Hz]"""
 
-TUNABLES: Mapping[str, tuple[float, float]] = {
+_TUNABLES: Mapping[str, tuple[float, float]] = {
     "control.position.f_n": (2.0, 200.0),
     "control.position.zeta": (0.2, 4.0),
     "control.position.c": (0.0, 1.0),
@@ -234,7 +234,7 @@ TUNABLES: Mapping[str, tuple[float, float]] = {
 """gains of the law -> lowest and highest values worth trying"""
 
 
-def two_motor_loop(
+def _two_motor_loop(
     name: str,
     summary: str,
     at: Quantity,
@@ -256,11 +256,11 @@ def two_motor_loop(
         cut="i_2_ref",
         point=point,
         causes=causes,
-        band=BAND,
+        band=_BAND,
         amplitudes=(1e-3, 0.25, 0.5, 1.0),
-        tunables=TUNABLES,
+        tunables=_TUNABLES,
         proof=proof,
-        saturations=DRIVE_LIMITS,
+        saturations=_DRIVE_LIMITS,
         single=False,  # two motors share the load
     )
 
@@ -285,18 +285,18 @@ def position_point(par: ParameterSet, value: float) -> Point:
     return Point(WedgeBrake(), closed, state_at(value, closed), memory, stimulus)
 
 
-POSITION_LOOP = two_motor_loop(
+POSITION_LOOP = _two_motor_loop(
     name="position",
     summary="position control of the assembled wedge in its clearance, 5 kHz",
     at=Quantity("wedge travel", "m", 0.0),
     point=position_point,
-    causes=CAUSES,
+    causes=_CAUSES,
 )
 
 
 # --- Position loop of one motor on a preloaded screw (Figs. 5 and 6)
 
-_ONE_MOTOR = {**DRIVE_TRAIN, "cogging": {"motor_1.T_cog": 0.0}}  # the one motor that there is
+_ONE_MOTOR = {**_DRIVE_TRAIN, "cogging": {"motor_1.T_cog": 0.0}}  # the one motor that there is
 
 
 def screw_position_point(par: ParameterSet, value: float) -> Point:
@@ -322,9 +322,9 @@ SCREW_POSITION_LOOP = Loop(
     cut="i_1_ref",
     point=screw_position_point,
     causes=_ONE_MOTOR,
-    band=BAND,
+    band=_BAND,
     amplitudes=(1e-3, 0.25, 0.5, 1.0, 2.0),
-    tunables=TUNABLES,
+    tunables=_TUNABLES,
     proof="screw-position",
 )
 
@@ -391,12 +391,12 @@ def _require_force(value: float, demand: float, par: WedgeParameters) -> None:
 
 _FORCE = Quantity("force", "N", 0.0)
 
-FORCE_FIGHT = two_motor_loop(
+FORCE_FIGHT = _two_motor_loop(
     name="force-fight",
     summary="position control of two motors on one reference, a force sensor between, 5 kHz",
     at=_FORCE,
     point=force_point,
-    causes=DRIVE_TRAIN,
+    causes=_DRIVE_TRAIN,
     proof="force-fight",
 )
 
@@ -409,10 +409,10 @@ FORCE_AGAINST = Loop(
     output="F",
     cut="i_1_ref",
     point=force_point,
-    causes=DRIVE_TRAIN,
-    band=BAND,
+    causes=_DRIVE_TRAIN,
+    band=_BAND,
     amplitudes=(1e-3, 0.05, 0.1, 0.2),
-    tunables=TUNABLES,
-    saturations=DRIVE_LIMITS,
+    tunables=_TUNABLES,
+    saturations=_DRIVE_LIMITS,
     single=False,  # the output is the force, but the angle is controlled
 )

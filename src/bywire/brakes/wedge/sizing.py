@@ -34,7 +34,7 @@ Slope = Annotated[float, Unit("1", 0.3), Field(gt=0, le=2, allow_inf_nan=False)]
 Count = Annotated[int, Unit("1", 11.0), Field(ge=3, le=101)]
 
 
-PHASES = tuple(0.5 * math.pi * k for k in range(4))
+_PHASES = tuple(0.5 * math.pi * k for k in range(4))
 """angles of the disc [rad] at which a run begins"""
 
 
@@ -71,7 +71,7 @@ class Demand:
     known: bool
     enforced: bool
     whole: bool = False
-    phases: Sequence[float] = PHASES
+    phases: Sequence[float] = _PHASES
 
 
 @dataclass(frozen=True)
@@ -125,9 +125,9 @@ class Answer:
 
 Efficiency = Literal["friction-angle", "as-given"]
 """constant property of the screw over the lead: the friction angle, or the efficiency"""
-SPEEDS = ("omega_gap", "a_gap", "omega_creep", "rate_max")
+_SPEEDS = ("omega_gap", "a_gap", "omega_creep", "rate_max")
 """parameters of the moment control that set how fast the reference moves"""
-SIGNALS = (
+_SIGNALS = (
     "y_M",
     "P_in",
     "P_meas",
@@ -175,13 +175,13 @@ def redesigned(
         "control.offset.k_hat": par.control.offset.k_hat * k / roller_screw.slope(par.screw),
         "control.moment.slope_hat": control.slope_hat / ratio,
     }
-    speeds = {f"control.moment.{name}": getattr(control, name) * ratio for name in SPEEDS}
+    speeds = {f"control.moment.{name}": getattr(control, name) * ratio for name in _SPEEDS}
     if efficiency == "friction-angle":
-        changes |= efficiencies(par, lead)
+        changes |= _efficiencies(par, lead)
     return par.replace(changes | speeds)
 
 
-def efficiencies(par: WedgeParameters, lead: float) -> dict[str, float]:
+def _efficiencies(par: WedgeParameters, lead: float) -> dict[str, float]:
     r"""Return the efficiencies of a screw of another lead [m] with the same friction angle.
 
     With the lead angle :math:`\lambda` and the friction angle :math:`\rho`, both small, as in a
@@ -248,7 +248,7 @@ def _variations(par: WedgeParameters, demand: Demand, factors: Array) -> Mapping
     )
     control = par.control.moment
     cases = {"wedge.mu_B": mu}
-    cases |= {f"control.moment.{name}": getattr(control, name) * factor for name in SPEEDS}
+    cases |= {f"control.moment.{name}": getattr(control, name) * factor for name in _SPEEDS}
     if demand.known:
         cases["control.moment.slope_hat"] = control.slope_hat * mu / par.wedge.mu_B
     return cases
@@ -274,7 +274,7 @@ def _judged(par: WedgeParameters, demand: Demand, factor: float) -> Answer:
     cases = _variations(par, demand, np.array([factor]))
     whole = demand.t_hold + demand.t_release
     runs = [
-        simulate_ensemble(_run(par, demand, phase, whole), cases, SIGNALS, threads=1)
+        simulate_ensemble(_run(par, demand, phase, whole), cases, _SIGNALS, threads=1)
         for phase in demand.phases
     ]
     time = runs[0].time - _SETTLE

@@ -143,8 +143,8 @@ def friction(omega: float, torque: float, par: Par) -> Bounds:
 
     Notes
     -----
-    A preloaded nut has two halves that push on each other through the screw: whichever way it
-    turns, one half drives and the other is driven. Both rub, and their net torque is zero.
+    A preloaded nut has two halves that push on each other through the screw: in either direction
+    of rotation, one half drives and the other is driven. Both rub, and their net torque is zero.
     """
     T_p = T_n = drive_train.bearing_friction(omega, NUT, par)
     if par.rig.load == "screw":
