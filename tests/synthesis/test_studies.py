@@ -19,7 +19,7 @@ from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
 from bywire.core.model import ASSEMBLIES
 from bywire.plant import roller_screw, seal_friction
-from bywire.report.contour import contour, levels_between
+from bywire.report.range_figures import contour, levels_between
 from bywire.synthesis.study import STUDIES, Map, Mark
 from run_once import run_once
 

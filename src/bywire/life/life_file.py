@@ -25,7 +25,7 @@ from bywire.data.file_kinds import LIFE, require_kind
 from bywire.data.toml_file import read_toml
 from bywire.life.declaration import LIVES, Life, StopConditions
 from bywire.studies.designs import Sampled
-from bywire.studies.distribution_section import read_distribution
+from bywire.studies.distribution import read_distribution
 from bywire.studies.plan import Varied
 from bywire.studies.vary_section import entries_of, quantities_of, read_varied
 

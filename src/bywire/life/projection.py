@@ -99,7 +99,7 @@ def _simulated(
             stop = ", ".join(f"{n} = {v[which[lacking[0]]]:g}" for n, v in plan.population.items())
             raise RunError(
                 f"a stop{stop and f' with {stop} (in SI)'} has no {name}: "
-                + figures[name].told(lacking[0]),
+                + figures[name].note_of(lacking[0]),
                 name=name,
             )
     warnings = dict.fromkeys(text for texts in results.warnings for text in texts)

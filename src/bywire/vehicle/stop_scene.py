@@ -14,7 +14,7 @@ from bywire.core.typing import Array
 from bywire.plant import road
 from bywire.report import style
 from bywire.report.animation.scene import Dial, Move, Scene, frames_of, over_frames
-from bywire.report.decimation import phases
+from bywire.report.channel import phases
 from bywire.vehicle.surfaces import surface_name
 
 SCALE = 100.0

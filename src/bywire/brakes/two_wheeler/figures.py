@@ -14,8 +14,7 @@ from bywire.brakes.two_wheeler.case import vehicle_of
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.bench_figures import FigureKind, Shown
-from bywire.report.channel import channel
-from bywire.report.decimation import decimate, phases
+from bywire.report.channel import channel, decimate, phases
 from bywire.vehicle.ideal_stop import ideal_distance
 from bywire.vehicle.stop_scene import TINTS
 from bywire.vehicle.surfaces import surface_name

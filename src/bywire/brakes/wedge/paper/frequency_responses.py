@@ -18,7 +18,7 @@ from bywire.analysis.response.sweep import Sweep, amplitudes
 from bywire.brakes.wedge.paper.statements import FACTS, parameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
-from bywire.report.bode import Response, bode
+from bywire.report.response_figures import Response, bode
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs

@@ -1,36 +1,54 @@
-"""The ECU of a bench as C, and its trials on processors: the same bits everywhere."""
+"""Exports of a bench: the C of its ECU, functional mock-up units, WebAssembly, a page."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
-from bywire.core.errors import CompilerError, ModelError
+from bywire.core.errors import CompilerError, FileError, ModelError
 from bywire.core.provenance import Cited
-from bywire.export.controller.c_text import PRECISIONS
-from bywire.export.controller.files import files
-from bywire.export.controller.program import program
-from bywire.export.controller.target.trial import (
-    TARGETS,
-    Trial,
-    host_trial,
-    missing_tools,
-    target_trial,
-)
-from bywire.export.controller.vectors import vectors
+from bywire.core.scratch import made_folder
+from bywire.core.units import shown
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Flat, Listing, Paragraph, Section, TableBlock
 from bywire.report.subject import bench_changes
-from bywire.report.tables import Cell, Column, Table, Verdict
+from bywire.report.tables import Cell, Column, Table, Verdict, text_table
 from bywire.simulation.compiler import find_compiler
 
 if TYPE_CHECKING:
     from bywire.export.controller.program import Program
+    from bywire.export.controller.target.trial import Trial
+    from bywire.export.exported import Causality, Exported
+    from bywire.export.fmu.archive import Unit
+
+
+@contextmanager
+def export_folder(out: str | Path) -> Iterator[Path]:
+    """Yield the folder of an export; what was made of it is removed where nothing is written.
+
+    Raises
+    ------
+    FileError
+        When it cannot be made, or files in it cannot be written.
+    """
+    folder = Path(out).expanduser()
+    try:
+        with made_folder(folder):
+            yield folder
+    except OSError as error:
+        raise FileError(
+            f"{folder} cannot be written: {error.strerror or error}; make room there, or name "
+            "another folder"
+        ) from None
+
+
+# --- The ECU as C
 
 GOALS: Mapping[tuple[str, str], Mapping[str, int]] = {
     ("Cortex-M4F", "single"): {"rom": 2048, "ram": 128, "stack": 128, "instructions": 400},
@@ -97,7 +115,7 @@ class ControllerCheck:
             "in README.txt, bits beside those of the first row; instructions and stack of the task "
             "that takes most, calls included."
         )
-        return TableBlock(Table(tuple(columns), rows), caption, width=120)
+        return TableBlock(Table(tuple(columns), rows), caption)
 
     def _row(self, trial: Trial) -> tuple[Cell, ...]:
         identical = self.is_identical(trial)
@@ -168,6 +186,17 @@ def check_controller(case: Case, cited: Mapping[str, Cited], count: int) -> Cont
     CompilerError
         When nothing can be compiled, or a compiler fails.
     """
+    from bywire.export.controller.c_text import PRECISIONS
+    from bywire.export.controller.files import files
+    from bywire.export.controller.program import program
+    from bywire.export.controller.target.trial import (
+        TARGETS,
+        host_trial,
+        missing_tools,
+        target_trial,
+    )
+    from bywire.export.controller.vectors import vectors
+
     compiler, missing = find_compiler(), missing_tools()
     if compiler is None and missing:
         raise CompilerError(
@@ -202,9 +231,6 @@ def check_controller(case: Case, cited: Mapping[str, Cited], count: int) -> Cont
             if not missing:
                 trials += [target_trial(made, every, folder, t, scratch) for t in TARGETS]
     return ControllerCheck(tuple(trials), tried, tuple(skipped), tuple(inexact))
-
-
-# --- The export
 
 
 @dataclass(frozen=True)
@@ -282,3 +308,194 @@ class ControllerExport(Answer):
             "vectors": self.vectors,
             **({} if self.check is None else {"check": self.check.as_object()}),
         }
+
+
+# --- Functional mock-up units
+
+_KINDS: dict[Causality, str] = {
+    "input": "inputs",
+    "output": "outputs",
+    "parameter": "parameters",
+    "local": "others",
+}
+_NO_START = (
+    "the start at rest of this experiment is not known for other parameters: with changed "
+    "parameters the unit begins where the exported ones rest, and settles"
+)
+_EXCHANGED = (
+    "a solver integrates its states and meets its events; between them contacts and frictions keep "
+    "their modes"
+)
+
+
+@dataclass(frozen=True)
+class ExportedFmu(Answer):
+    """An FMU that was written.
+
+    Parameters
+    ----------
+    path
+        Its file.
+    unit
+        What it holds: run, variables, sources.
+    targets
+        Systems that it has binaries for.
+    compilers
+        What made each of them.
+    """
+
+    path: Path
+    unit: Unit
+    targets: tuple[str, ...]
+    compilers: tuple[str, ...]
+
+    @property
+    def notes(self) -> list[str]:
+        """What else to know of it."""
+        return [] if self.unit.begins_anywhere else [_NO_START]
+
+    def document(self) -> Document:
+        """Return what was written, and how it steps."""
+        unit = self.unit
+        schedule = unit.made.schedule
+        table = TableBlock(self._table())
+        steps = Paragraph(
+            _EXCHANGED
+            if unit.faces.kind == "model-exchange"
+            else (
+                f"internal step {shown(schedule.step, 's')}, communication steps are multiples of "
+                f"{shown(schedule.frame, 's')}; the start time is "
+                f"{shown(unit.made.case.settle, 's')} before time zero of the bench"
+            )
+        )
+        written = f"written: {self.path}"
+        return Document(
+            f"FMU {unit.identifier}",
+            written,
+            sections=[Section("What it holds", [table, steps])],
+            brief=[table, steps, written],
+            data=self._data(),
+            is_paged=False,
+            changes=bench_changes(unit.made.bench),
+        )
+
+    def _table(self) -> Table:
+        faces = self.unit.faces
+        rows = [
+            (name, str(len(faces.of(kind))), _some([each.name for each in faces.of(kind)]))
+            for kind, name in _KINDS.items()
+            if faces.of(kind)
+        ]
+        return text_table(("of", "count", "names"), rows)
+
+    def _data(self) -> dict[str, Any]:
+        unit = self.unit
+        return {
+            "file": str(self.path),
+            "fmi": unit.version,
+            "part": unit.faces.part,
+            "kind": unit.faces.kind,
+            "identifier": unit.identifier,
+            "token": unit.token,
+            "case": unit.made.case.label,
+            "step": unit.made.schedule.step,
+            "communication_step": unit.made.schedule.frame,
+            "begins_at_rest": unit.begins_anywhere,
+            "targets": dict(zip(self.targets, self.compilers, strict=True)),
+            "variables": [
+                {"name": v.name, "causality": v.causality, "unit": v.unit, "start": v.start}
+                for v in unit.faces.variables
+            ],
+            "files": [str(self.path)],
+        }
+
+
+def _some(names: list[str], most: int = 6) -> str:
+    """Return the first of some names."""
+    return ", ".join(names[:most]) + (" ..." if len(names) > most else "")
+
+
+# --- WebAssembly
+
+
+@dataclass(frozen=True)
+class ExportedWasm(Answer):
+    """A module that was written.
+
+    Parameters
+    ----------
+    files
+        Module, description (JSON), loader and types.
+    made
+        The run that it is of.
+    size
+        Bytes of the module.
+    """
+
+    files: tuple[Path, ...]
+    made: Exported
+    size: int
+
+    def document(self) -> Document:
+        """Return what was written."""
+        run = f"{self.made.bench.experiment}, run {self.made.case.label!r}"
+        listing = Listing([str(path) for path in self.files], f"{run}: {self.size / 1e3:.1f} kB")
+        return Document(
+            f"WebAssembly of {self.made.bench.name or self.made.bench.experiment}",
+            f"written: {self.files[0]}",
+            sections=[Section("Files", [listing])],
+            brief=[listing],
+            data=self._data(),
+            is_paged=False,
+            changes=bench_changes(self.made.bench),
+        )
+
+    def _data(self) -> dict[str, Any]:
+        return {
+            "case": self.made.case.label,
+            "bytes": self.size,
+            "files": [str(p) for p in self.files],
+        }
+
+
+# --- A page that anybody can open
+
+
+@dataclass(frozen=True)
+class BenchPage(Answer):
+    """A page that was written.
+
+    Parameters
+    ----------
+    file
+        The page.
+    made
+        The run that it computes.
+    size, compressed
+        Bytes of the file, and of what a server sends of it (gzip).
+    """
+
+    file: Path
+    made: Exported
+    size: int
+    compressed: int
+
+    def document(self) -> Document:
+        """Return what was written."""
+        run = f"{self.made.bench.experiment}, run {self.made.case.label!r}"
+        sizes = f"{self.size / 1e3:.0f} kB, {self.compressed / 1e3:.0f} kB compressed"
+        listing = Listing([str(self.file)], f"{run}: {sizes}")
+        return Document(
+            f"Page of {self.made.bench.name or self.made.bench.experiment}",
+            f"written: {self.file}",
+            sections=[Section("File", [listing])],
+            brief=[listing],
+            data={
+                "file": str(self.file),
+                "case": self.made.case.label,
+                "bytes": self.size,
+                "compressed": self.compressed,
+            },
+            is_paged=False,
+            changes=bench_changes(self.made.bench),
+        )
