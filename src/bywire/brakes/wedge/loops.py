@@ -68,82 +68,6 @@ def beyond(name: str, value: str, need: str, limit: str) -> InputError:
     return not_valid(name, value, f"small enough for {limit}", f"and needs {need}")
 
 
-# --- Current loop of the drives, the shaft clamped
-
-_SAMPLE = 20e-6  # sample time of the demand [s]; an analog drive takes it without sampling
-_STEP = 5e-6  # substep [s]
-
-
-def current_point(par: ParameterSet, value: float) -> Point:
-    """Return the drive that holds a current [A] in a motor whose shaft is clamped.
-
-    Raises
-    ------
-    ParameterError
-        When the current is beyond the drive's limit, its voltage beyond the supply, or its
-        torque beyond the clamp.
-    """
-    clamped = cast(
-        WedgeParameters,
-        par.replace(
-            {
-                "rig.mode_1": "current",
-                "rig.load": "dummy",
-                "rig.clamp": "closed",
-                "control.T_fast": _SAMPLE,
-            }
-        ),
-    )
-    _require_current(value, clamped)
-    drive, motor = clamped.drive, clamped.motor_1
-    held = value / drive.G_sense
-    duty = servo_motor.resistance(motor) * held / drive.V_dc
-    state = ShaftRig.state(
-        drive=current_drive.State(demand=value, sensed=value, integral=duty),
-        motor=servo_motor.State(i=held, theta=0.0, omega=0.0),
-    )
-    memory = zeros(ShaftRig.Memory)._replace(i_1_ref=value)
-    stimulus = zeros(ShaftRig.Stimulus)._replace(i_1_set=value)
-    return Point(ShaftRig(), clamped, state, memory, stimulus, _STEP)
-
-
-def _require_current(value: float, par: WedgeParameters) -> None:
-    if ops.is_symbol(par.drive.V_dc):
-        return
-    drive, motor = par.drive, par.motor_1
-    held = abs(value) / drive.G_sense
-    torque = servo_motor.torque_constant(motor) * held
-    limits = (
-        ("drive.i_max", abs(value), drive.i_max, "A"),
-        ("drive.V_dc", servo_motor.resistance(motor) * held, drive.V_dc, "V"),
-        ("rig.T_clamp", torque, par.rig.T_clamp, "N*m"),
-    )
-    for name, need, most, unit in limits:
-        if not need < most:
-            needed, limit = f"{need:.4g} {unit}", f"{name} = {most:g} {unit}"
-            raise beyond("current", f"{value:g} A", needed, limit)
-
-
-DRIVE_CURRENT_LOOP = Loop(
-    name="drive-current",
-    assembly="wedge-brake",
-    summary="current control in the drive, analog, shaft clamped",
-    at=Quantity("current", "A", 0.0),
-    inputs=("i_1_set",),
-    output="i_1",
-    cut="sensed_1",
-    point=current_point,
-    causes={},
-    band=(10.0, 3000.0),
-    amplitudes=(1e-2, 1.0, 5.0),
-    tunables={"drive.k_p": (1e-3, 1.0), "drive.k_i": (1.0, 5e3)},
-    proof="current-loop",
-    single=False,
-    analog=True,
-    locked=("theta_1", "omega_1"),
-)
-
-
 # --- Moment loop, around position and current loops
 
 MOMENT = Quantity("moment", "N*m", 200.0)
@@ -296,7 +220,7 @@ POSITION_LOOP = _two_motor_loop(
 
 # --- Position loop of one motor on a preloaded screw (Figs. 5 and 6)
 
-_ONE_MOTOR = {**_DRIVE_TRAIN, "cogging": {"motor_1.T_cog": 0.0}}  # the one motor that there is
+_ONE_MOTOR = {**_DRIVE_TRAIN, "cogging": {"motor_1.T_cog": 0.0}}
 
 
 def screw_position_point(par: ParameterSet, value: float) -> Point:
@@ -415,4 +339,80 @@ FORCE_AGAINST = Loop(
     tunables=_TUNABLES,
     saturations=_DRIVE_LIMITS,
     single=False,  # the output is the force, but the angle is controlled
+)
+
+
+# --- Current loop of the drives, the shaft clamped
+
+_SAMPLE = 20e-6  # sample time of the demand [s]; an analog drive takes it without sampling
+_STEP = 5e-6  # substep [s]
+
+
+def current_point(par: ParameterSet, value: float) -> Point:
+    """Return the drive that holds a current [A] in a motor whose shaft is clamped.
+
+    Raises
+    ------
+    ParameterError
+        When the current is beyond the drive's limit, its voltage beyond the supply, or its
+        torque beyond the clamp.
+    """
+    clamped = cast(
+        WedgeParameters,
+        par.replace(
+            {
+                "rig.mode_1": "current",
+                "rig.load": "dummy",
+                "rig.clamp": "closed",
+                "control.T_fast": _SAMPLE,
+            }
+        ),
+    )
+    _require_current(value, clamped)
+    drive, motor = clamped.drive, clamped.motor_1
+    held = value / drive.G_sense
+    duty = servo_motor.resistance(motor) * held / drive.V_dc
+    state = ShaftRig.state(
+        drive=current_drive.State(demand=value, sensed=value, integral=duty),
+        motor=servo_motor.State(i=held, theta=0.0, omega=0.0),
+    )
+    memory = zeros(ShaftRig.Memory)._replace(i_1_ref=value)
+    stimulus = zeros(ShaftRig.Stimulus)._replace(i_1_set=value)
+    return Point(ShaftRig(), clamped, state, memory, stimulus, _STEP)
+
+
+def _require_current(value: float, par: WedgeParameters) -> None:
+    if ops.is_symbol(par.drive.V_dc):
+        return
+    drive, motor = par.drive, par.motor_1
+    held = abs(value) / drive.G_sense
+    torque = servo_motor.torque_constant(motor) * held
+    limits = (
+        ("drive.i_max", abs(value), drive.i_max, "A"),
+        ("drive.V_dc", servo_motor.resistance(motor) * held, drive.V_dc, "V"),
+        ("rig.T_clamp", torque, par.rig.T_clamp, "N*m"),
+    )
+    for name, need, most, unit in limits:
+        if not need < most:
+            needed, limit = f"{need:.4g} {unit}", f"{name} = {most:g} {unit}"
+            raise beyond("current", f"{value:g} A", needed, limit)
+
+
+DRIVE_CURRENT_LOOP = Loop(
+    name="drive-current",
+    assembly="wedge-brake",
+    summary="current control in the drive, analog, shaft clamped",
+    at=Quantity("current", "A", 0.0),
+    inputs=("i_1_set",),
+    output="i_1",
+    cut="sensed_1",
+    point=current_point,
+    causes={},
+    band=(10.0, 3000.0),
+    amplitudes=(1e-2, 1.0, 5.0),
+    tunables={"drive.k_p": (1e-3, 1.0), "drive.k_i": (1.0, 5e3)},
+    proof="current-loop",
+    single=False,
+    analog=True,
+    locked=("theta_1", "omega_1"),
 )

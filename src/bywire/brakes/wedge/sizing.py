@@ -314,6 +314,3 @@ def _times(time: Array, y: Array, level: float) -> Array:
             share = (level - row[k - 1]) / (row[k] - row[k - 1])
             times[n] = time[k - 1] + share * (time[k] - time[k - 1]) - _SETTLE
     return times
-
-
-# --- Many drive trains as a dataset

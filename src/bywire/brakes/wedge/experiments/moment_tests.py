@@ -51,16 +51,15 @@ BRAKING_FIGURES = Figures(
     energy_left=("J", "Largest residual of the energy balance: the numerical error."),
     undefined="the signal does not reach the level in this time",
 )
-"""key figures of :func:`braking`"""
+"""key figures of a braking"""
 
 
 def _braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
-    """Return the key figures of a braking that begins at time zero, in the disc's direction.
+    """Return the key figures of a braking that begins at time zero.
 
-    ``target``: moment demanded [N m]; ``end``: time [s] at which the demand changes for the first
-    time.
+    ``run``: along the disc's direction; ``target``: demanded moment [N m]; ``end``: time of the
+    first change of the demand [s].
     """
-    run = along_disc(run)
     after = run.sel(time=slice(-1e-9, None))
     held = run.sel(time=slice(-1e-9, end + 1e-9))
     peak = int(np.argmax(held["U_caliper"].values))
@@ -92,15 +91,6 @@ def _contact(held: xr.Dataset) -> float:
 
 def _gained(run: xr.Dataset, name: str) -> float:
     return float(run[name].values[-1] - run[name].values[0])
-
-
-def _last_turn(run: xr.Dataset, begin: float, end: float) -> float | None:
-    """Return when the disc's last revolution before a time begins [s]; None if before another."""
-    nearest = int(np.abs(run["time"].values - end).argmin())
-    speed = abs(float(run["Omega"].values[nearest]))
-    if speed * (end - begin) < 2.0 * math.pi:
-        return None
-    return end - 2.0 * math.pi / speed
 
 
 def _too_coarse(run: xr.Dataset, begin: float, end: float, rows: int = 1) -> str:
@@ -209,8 +199,10 @@ def _turn(run: xr.Dataset, begin: float, end: float, last: float) -> tuple[float
     It is the disc's last revolution, over which the run-out averages out. Without a whole
     revolution it is the ``last`` share of the time.
     """
-    turn = _last_turn(run, begin, end)
-    start = end - last * (end - begin) if turn is None else turn
+    nearest = int(np.abs(run["time"].values - end).argmin())
+    speed = abs(float(run["Omega"].values[nearest]))
+    whole = speed * (end - begin) >= 2.0 * math.pi
+    start = end - (2.0 * math.pi / speed if whole else last * (end - begin))
     return start + 2e-9, end - 2e-9
 
 

@@ -33,7 +33,7 @@ from bywire.synthesis.study import (
     variable,
 )
 
-ASSUMPTIONS = (
+_ASSUMPTIONS = (
     "The wedge's slope and the screws' lead vary; motors, drives, bearings, stiffnesses, clearance "
     "and the travel that preloads the screws are constant.",
     "The screws' friction angle is constant, so that their efficiency grows with the lead and a "
@@ -121,15 +121,15 @@ DEFAULTS = Options(
 )
 """the pulse of Fig. 9 in Roberts et al. (2003), around the catalog's design"""
 
-NONE_FEASIBLE = "no design is feasible: allow more time (t_90, t_hold), or compare other designs"
-NEAR = 1.05
+_NONE_FEASIBLE = "no design is feasible: allow more time (t_90, t_hold), or compare other designs"
+_NEAR = 1.05
 """designs within this factor of the smallest power count as equally good"""
 _ROUNDS = 2  # of the optimum's refinement; each halves the spacing
 _TINY = 1e-6  # of the spacing
 _BORDER = 0.02  # contour between 0, feasible, and 1, close to the last feasible designs
 
 
-class Best(NamedTuple):
+class _Best(NamedTuple):
     """A design, and its largest power [W] at the worst friction coefficient."""
 
     tan_alpha: float
@@ -160,18 +160,18 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
     given = answer(par, demand)  # first and alone: it also builds the kernels
     slopes = np.linspace(options.tan_alpha_min, options.tan_alpha_max, options.slopes)
     leads = np.linspace(options.lead_min, options.lead_max, options.leads)
-    data = mapped(par, demand, slopes, leads, partial(progress, "designs"), options.efficiency)
+    data = _mapped(par, demand, slopes, leads, partial(progress, "designs"), options.efficiency)
     warnings = _warnings(data)
     if data["infeasible"].values.all():
-        warnings += (NONE_FEASIBLE,)
-        return Findings(data, _given(given, options), ASSUMPTIONS, {}, (), warnings)
-    coarse = smallest(data, options.power)
+        warnings += (_NONE_FEASIBLE,)
+        return Findings(data, _given(given, options), _ASSUMPTIONS, {}, (), warnings)
+    coarse = _smallest(data, options.power)
     grids, best = [data], coarse
     for n in range(1, _ROUNDS + 1):
         near = (_around(slopes, best.tan_alpha, n), _around(leads, best.lead, n))
         report = partial(progress, f"optimum, round {n}")
-        grids.append(mapped(par, demand, *near, report, options.efficiency))
-        best = min(best, smallest(grids[-1], options.power), key=lambda design: design.power)
+        grids.append(_mapped(par, demand, *near, report, options.efficiency))
+        best = min(best, _smallest(grids[-1], options.power), key=lambda design: design.power)
     here = Mark("given drive train", par.screw.lead, wedge.slope(par.wedge))
     marks = (Mark("optimum", best.lead, best.tan_alpha), here)
     maps = {
@@ -188,16 +188,16 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
     kpis = (*_optimum(best, grids, options), *_given(given, options))
     limits = (*active(best.at, par, options), *around(grids, best.at, options))
     return Findings(
-        data, kpis, ASSUMPTIONS, maps, _cuts(data, best), warnings + _edges(best, options), limits
+        data, kpis, _ASSUMPTIONS, maps, _cuts(data, best), warnings + _edges(best, options), limits
     )
 
 
-def smallest(data: xr.Dataset, power: str) -> Best:
+def _smallest(data: xr.Dataset, power: str) -> _Best:
     """Return the feasible design of least power; there must be one."""
     worst = data[f"worst_{power}"].values
     i, j = np.unravel_index(int(np.nanargmin(worst)), worst.shape)
     at = data.isel(tan_alpha=int(i), lead=int(j))
-    return Best(float(at["tan_alpha"]), float(at["lead"]), float(worst[i, j]), at)
+    return _Best(float(at["tan_alpha"]), float(at["lead"]), float(worst[i, j]), at)
 
 
 def _around(nodes: Array, middle: float, halvings: int) -> Array:
@@ -212,14 +212,14 @@ def _other(power: str) -> str:
     return "instantaneous" if power == "filtered" else "filtered"
 
 
-def _optimum(best: Best, grids: Sequence[xr.Dataset], options: Options) -> tuple[Kpi, ...]:
-    other = smallest(grids[0], _other(options.power))
+def _optimum(best: _Best, grids: Sequence[xr.Dataset], options: Options) -> tuple[Kpi, ...]:
+    other = _smallest(grids[0], _other(options.power))
     slopes, leads = [best.tan_alpha], [best.lead]
     for data in grids:
-        good = np.argwhere(data[f"worst_{options.power}"].values <= NEAR * best.power)
+        good = np.argwhere(data[f"worst_{options.power}"].values <= _NEAR * best.power)
         slopes += [float(value) for value in data["tan_alpha"].values[good[:, 0]]]
         leads += [float(value) for value in data["lead"].values[good[:, 1]]]
-    share = f"of designs within {100 * (NEAR - 1):.0f} % of the smallest power"
+    share = f"of designs within {100 * (_NEAR - 1):.0f} % of the smallest power"
     return (
         Kpi("optimum_tan_alpha", best.tan_alpha, "1", "Slope of the wedge of least power."),
         Kpi("optimum_lead", best.lead, "m", "Lead of the screws of least power."),
@@ -315,7 +315,7 @@ def _given(given: Answer, options: Options) -> tuple[Kpi, ...]:
     )
 
 
-def _cuts(data: xr.Dataset, best: Best) -> tuple[Cut, ...]:
+def _cuts(data: xr.Dataset, best: _Best) -> tuple[Cut, ...]:
     """Return the dependence on the lead at the map's slope nearest to the optimum."""
     row = data.sel(tan_alpha=best.tan_alpha, method="nearest")
     worst = row[["release", "t_90", "current", "speed", "copper"]].max(dim="mu_B", keep_attrs=True)
@@ -333,7 +333,7 @@ def _warnings(data: xr.Dataset) -> tuple[str, ...]:
     return (f"{count} substeps hit the cap of the contact iteration",) if count else ()
 
 
-def _edges(best: Best, options: Options) -> tuple[str, ...]:
+def _edges(best: _Best, options: Options) -> tuple[str, ...]:
     """Return whether the optimum lies at the edge of the designs compared."""
     slopes = (options.tan_alpha_min, options.tan_alpha_max)
     leads = (options.lead_min, options.lead_max)
@@ -345,15 +345,15 @@ def _edges(best: Best, options: Options) -> tuple[str, ...]:
 
 # --- Many drive trains as a dataset
 
-LATE = 1.02
+_LATE = 1.02
 """share of the demanded time up to which a design answers equally fast"""
 
 
-HELD = 0.95
+_HELD = 0.95
 """share of the demand that counts as held"""
 
 
-LEFT = 0.05
+_LEFT = 0.05
 """share of the demand below which the brake counts as released"""
 
 
@@ -375,13 +375,13 @@ _PER_CASE = {
 }
 
 
-def mapped(
+def _mapped(
     par: WedgeParameters,
     demand: Demand,
     slopes: Array,
     leads: Array,
-    progress: Callable[[float], None] = lambda share: None,
-    efficiency: Efficiency = "friction-angle",
+    progress: Callable[[float], None],
+    efficiency: Efficiency,
 ) -> xr.Dataset:
     """Return the responses of all designs on a grid, computed on all cores; can be interrupted.
 
@@ -423,9 +423,9 @@ def _dataset(answers: Sequence[Answer], demand: Demand, axes: Mapping[str, Label
     data = labeled(axes, {name: (cases[name], *_PER_CASE[name]) for name in _PER_CASE})
     slowest = cases["t_90"].max(axis=2)  # NaN where one case does not reach it
     lateness = np.where(np.isnan(slowest), _NEVER, slowest / demand.t_90)
-    in_time = (lateness <= LATE) if demand.enforced else (lateness < _NEVER)
-    holds = cases["held"].min(axis=2) >= HELD * demand.moment
-    released = cases["left"].max(axis=2) <= LEFT * demand.moment
+    in_time = (lateness <= _LATE) if demand.enforced else (lateness < _NEVER)
+    holds = cases["held"].min(axis=2) >= _HELD * demand.moment
+    released = cases["left"].max(axis=2) <= _LEFT * demand.moment
     feasible = in_time & holds & released & (cases["stop"].max(axis=2) == 0.0)
     speeds = np.array([each.closing_speed for each in answers]).reshape(shape[:2])
     data["closing_speed"] = variable(speeds, plane, "m/s", "closing speed of the pads")
@@ -470,12 +470,12 @@ def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
         reached = at["mu_B"].values[at["current"].values >= _AT * i_max]
         texts.append(f"current: at the limit {name} = {i_max:g} A with mu_B = {_listed(reached)}")
     held = at["held"].min() / options.moment
-    if float(held) < HELD / _AT:
+    if float(held) < _HELD / _AT:
         texts.append(
             f"hold: {100.0 * float(held):.3g} % of the demand is held, least at "
             f"mu_B = {_where(-at['held']):g}"
         )
-    if float(at["left"].max()) > _AT * LEFT * options.moment:
+    if float(at["left"].max()) > _AT * _LEFT * options.moment:
         texts.append(f"release: {float(at['left'].max()):.3g} N·m remain at its end")
     powers = at[options.power]
     near = at["mu_B"].values[powers.values >= _AT * float(powers.max())]
@@ -489,11 +489,11 @@ def failures(at: xr.Dataset, options: Options) -> list[str]:
     slowest = float(at["t_90"].max(skipna=False))
     if math.isnan(slowest):
         reasons.append("never reaches 90 % of the demand")
-    elif options.response == "enforced" and float(at["lateness"]) > LATE:
+    elif options.response == "enforced" and float(at["lateness"]) > _LATE:
         reasons.append(f"late, {slowest * 1e3:.4g} ms at mu_B = {_where(at['t_90']):g}")
-    if float(at["held"].min()) < HELD * options.moment:
+    if float(at["held"].min()) < _HELD * options.moment:
         reasons.append("does not hold the demand")
-    if float(at["left"].max()) > LEFT * options.moment:
+    if float(at["left"].max()) > _LEFT * options.moment:
         reasons.append("does not release")
     if float(at["stop"].max()) > 0.0:
         reasons.append("presses on an end stop")
