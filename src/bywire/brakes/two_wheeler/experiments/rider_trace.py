@@ -14,14 +14,7 @@ from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.families import units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.bench.stimulus import Stimulus
-from bywire.brakes.two_wheeler.case import (
-    JUDGE,
-    Course,
-    RidingSpeed,
-    on_surface,
-    parameters_of,
-    rolling_case,
-)
+from bywire.brakes.two_wheeler.case import JUDGE, Course, RidingSpeed, on_surface, rolling_case
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
@@ -74,13 +67,21 @@ def _course(values: tuple[float, ...]) -> Course:
     return lambda t: np.interp(t, _TIMES, values)
 
 
+def _parameters_of(run: xr.Dataset) -> TwoWheelerParameters:
+    """Return the parameters with which a recording was made."""
+    par = getattr(run, "par", None)  # plain rows carry them
+    if isinstance(par, TwoWheelerParameters):
+        return par
+    return TwoWheelerParameters.model_validate_json(run.attrs["parameters"])
+
+
 def rider_shares(run: xr.Dataset, _: Options) -> tuple[Kpi, ...]:
     """Return the remaining shares of the rider's demand."""
     return FIGURES(**_shares(run))
 
 
 def _shares(run: xr.Dataset) -> dict[str, float]:
-    par = parameters_of(run)
+    par = _parameters_of(run)
     t = run["time"].values
     end = vehicle_stop.standstill(t, run["v"].values)
     braked = (t >= 0.0) & (t <= (end if math.isfinite(end) else math.inf))
