@@ -80,7 +80,7 @@ def test_what_nothing_has_is_worst_nowhere() -> None:
     assert math.isnan(value)
     assert at == 1.0  # nowhere worse than where it was looked first
     assert worst([none, some], [1.0, 2.0])["delay"] == (7.0, 2.0)
-    with pytest.raises(ParameterError, match="give at least one value"):
+    with pytest.raises(ParameterError, match="at least one value"):
         worst([], [])
 
 

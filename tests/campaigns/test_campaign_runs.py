@@ -198,7 +198,7 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
         tuple(finding(campaign.findings.plan, k, json.loads(text)) for k, text in enumerate(texts)),
     )
     assert again.findings.coverage == first.coverage == campaign.findings.coverage
-    with pytest.raises(FileError, match="holds another campaign"):
+    with pytest.raises(FileError, match="contains another campaign"):
         bywire.run_faults(file, folder, {"options.p_to": "36.5 bar"})
 
 
@@ -207,13 +207,13 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
     [
         ("[campaign]", "[campain]", "unknown key of a campaign file 'campain'"),
         ('"motor.hot"', '"motor.hott"', "unknown fault of .campaign. only 'motor.hott'"),
-        ('onset = "0.4 s"', 'onset = "0.9 s"', "must lie between"),
+        ('onset = "0.4 s"', 'onset = "0.9 s"', "must be between"),
         ("healthy = 8", "healthy = 2", "a whole number from 4"),
         ('"pressure.stuck" = ["0 bar"', '"pressure.stuck" = ["0 A"', "wrong unit"),
         ('signal = "p_pd"\nbelow', 'signal = "p_pads"\nbelow', "unknown signal of criterion"),
         ('below_share = "80 %"', 'beneath = "80 %"', "unknown key of ..criteria.. 'beneath'"),
-        ('below_share = "80 %"', 'above = "1 bar"\nbelow = "2 bar"', "say exactly one of"),
-        ('name = "too much"', 'name = "loss"', "stands there twice"),
+        ('below_share = "80 %"', 'above = "1 bar"\nbelow = "2 bar"', "give exactly one of"),
+        ('name = "too much"', 'name = "loss"', "occurs twice"),
         ("battery = 1", "batery = 1", "unknown fault in .rates. 'batery'"),
         ('delay = "5 ms"', 'delay = "-5 ms"', "must be >= 0 s"),
         ('"motor.R_m" = "+-10 %"', f'"adc.law" = {LAWS}', "only numbers vary"),
@@ -236,7 +236,7 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
         ("present =", 'leave_out = ["*"]\npresent =', "leaves no fault"),
         ('delay = "5 ms"', "value = 3", "bridge.open-phase takes no value"),
         ("battery = 1", "battery = 1" + "0" * 400, "battery = a number of 300 digits or more"),
-        ("battery = 1", "battery = 1e13", "0 to 1e12 is wanted"),
+        ("battery = 1", "battery = 1e13", "a number from 0 to 1e12"),
         (SMALL, 'bench = "bandwidths"', "makes one run without faults, but 'bandwidths' makes"),
     ],
 )
@@ -251,7 +251,7 @@ def test_a_campaign_is_computed_by_the_engine_of_its_bench(campaign, monkeypatch
     monkeypatch.setitem(sys.modules, "cuda.bindings.driver", None)
     find_device.cache_clear()
     plan = campaign.findings.plan
-    with pytest.raises(DeviceError, match="engine 'cuda' takes"):
+    with pytest.raises(DeviceError, match="engine 'cuda' needs"):
         healthy_traces(replace(plan, bench=replace(plan.bench, engine="cuda")))
 
 

@@ -61,7 +61,13 @@ def test_experiments_of_ours_name_what_there_is(name: str) -> None:
         ("assembly", '"spring-axis", "a', '"spring-axes", "a', "did you mean 'spring-axis'", ""),
         ("stimuli", 'F_set": np', 'F_sett": np', "'F_sett': did you mean 'F_set'?", "PUSH = "),
         ("key figures", '["x"]', '["xx"]', "xx", "    return (Kpi("),
-        ("key figures", '{"farthest": "m"}', '{"fartest": "m"}', "never gives: fartest", "PUSH = "),
+        (
+            "key figures",
+            '{"farthest": "m"}',
+            '{"fartest": "m"}',
+            "key figures fartest",
+            "PUSH = ",
+        ),
         ("key figures", '"m", "largest', '"mm", "largest', "farthest in mm", "PUSH = "),
     ],
 )

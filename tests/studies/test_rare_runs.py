@@ -226,8 +226,8 @@ def test_each_requirement_in_turn_shares_the_first_level(study, tmp_path):
     ("old", "new", "why"),
     [
         (" with 99.9 %", "", "none has a probability"),
-        ("cases = 3000", "cases = 600", "at least 640"),
-        ('"subset-simulation"', '"importance-sampling"', "cases_per_level: 'importance-sampling'"),
+        ("cases = 3000", "cases = 600", ">= 640"),
+        ('"subset-simulation"', '"importance-sampling"', "cases_per_level is only for"),
         ('"subset-simulation"', '"subset"', "did you mean 'subset-simulation'"),
         ("cases_per_level = 640", "levels = 3", "levels"),
         (
@@ -255,7 +255,7 @@ def test_a_study_of_another_limit_is_another(spent):
     path.write_text(path.read_text().replace("99.9 %", "99 %"))
     assert bywire.study_report(out).findings.rare[0].demand.probability == 0.99
     path.write_text(path.read_text().replace("19 A", "20 A"))
-    with pytest.raises(FileError, match="holds another study"):
+    with pytest.raises(FileError, match="contains another study"):
         bywire.study_report(out)
 
 

@@ -81,7 +81,7 @@ def test_gains_hold_as_probably_as_is_wanted(study, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "given", "message"),
     [
-        (STUDY.replace("motor.L_m", "ecu.current.k_p"), {}, "what the design chooses"),
+        (STUDY.replace("motor.L_m", "ecu.current.k_p"), {}, "the design chooses"),
         (STUDY + '"options.p_to" = "+-1 %"\n', {}, "option of the experiment"),
         (STUDY, {"drawn": 0}, "1 to 1000"),
         (STUDY, {"vary": "", "probability": "99 %"}, "needs drawn models"),

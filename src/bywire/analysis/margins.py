@@ -167,7 +167,7 @@ def worst(
     Nothing is worse than an unstable loop, or none, whose margins are NaN.
     """
     if not margins:
-        raise ParameterError("margins need at least one value", name="values")
+        raise ParameterError("margins need at least one value", name="margins")
     result: dict[str, tuple[float, float]] = {}
     for field, figure in MARGINS.items():
         if field == "crossover":  # neither a larger nor a smaller one is better

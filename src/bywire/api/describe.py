@@ -207,7 +207,11 @@ def describe(name: str) -> Description | Mentioned:
     """
     if len(name) > _LONGEST:
         raise UnknownNameError(
-            f"{quoted(name)}: a name, or a few words, of at most {_LONGEST} characters is wanted"
+            f"{quoted(name)} is too long: give a name or a few words, of at most {_LONGEST} "
+            "characters",
+            name="name",
+            value=quoted(name),
+            valid=f"at most {_LONGEST} characters",
         )
     try:
         return Description(name, tuple(described(name)))

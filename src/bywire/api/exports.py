@@ -44,7 +44,8 @@ def export_folder(out: str | Path) -> Iterator[Path]:
     except OSError as error:
         raise FileError(
             f"{folder} cannot be written: {error.strerror or error}; make room there, or name "
-            "another folder"
+            "another folder",
+            name=str(folder),
         ) from None
 
 

@@ -26,7 +26,7 @@ from bywire.campaigns.plan import (
     touch_alike,
 )
 from bywire.campaigns.residual import CAMPAIGNS, Residual, residuals_of
-from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
+from bywire.core.errors import InputError, ParameterError, not_valid, quoted, unknown_name
 from bywire.core.quantities import TimeConstant, Unit
 from bywire.core.section import Name, Names, Section, Table
 from bywire.core.signals import signals_of
@@ -40,7 +40,7 @@ _MOST = 10_000
 
 
 class CampaignSection(Section):
-    """The section ``[campaign]``: which faults, when, and what a false alarm is."""
+    """Section ``[campaign]``: faults, their onsets, and false alarms."""
 
     only: Names = ()
     leave_out: Names = ()
@@ -55,7 +55,7 @@ class CampaignSection(Section):
 
 
 class ReactionSection(Section):
-    """The section ``[reaction]``: what an ECU does when a residual alarms."""
+    """Section ``[reaction]``: reaction of the ECU to an alarm."""
 
     fault: str = ""
     value: Any = None
@@ -93,7 +93,7 @@ def read_campaign(
     Raises
     ------
     FileError
-        When the file cannot be read or is no TOML.
+        When the file cannot be read or is not valid TOML.
     InputError
         For anything in it that does not fit, with the file's name in front.
     """
@@ -119,13 +119,18 @@ def _plan(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
     varied, correlations = read_all_varied(bench, file.vary, file.measured, folder)
     chosen = [v.name for v in varied if not v.unit]
     if chosen:
-        raise ParameterError(f"[vary] {chosen[0]} is a choice: in a campaign only numbers vary")
+        raise ParameterError(
+            f"[vary] {chosen[0]} is a choice: in a campaign only numbers vary", name=chosen[0]
+        )
     known = modes_of(case.model, case.par)
     modes = {name: mode for name, mode in known.items() if not mode.lacks(case.par)}
     _require_known_values(file.values, modes)
     singles = tuple(_failing(modes, section, file.values))
     if not singles:
-        raise ParameterError("[campaign] leaves no fault: only and leave_out contradict each other")
+        raise ParameterError(
+            "[campaign] leaves no fault: only and leave_out contradict each other",
+            name="[campaign]",
+        )
     latent = [
         Failing(mode, size, is_present=True)
         for name, mode in modes.items()
@@ -135,7 +140,10 @@ def _plan(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
     pairs = _pairs(singles, latent, case)
     criteria = criteria_of(file.criteria, signals_of(case.model.Output))
     if not criteria:
-        raise ParameterError("[[criteria]] are missing: say what a fault must not do")
+        raise ParameterError(
+            "[[criteria]] are missing: define the effects that a fault must not have",
+            name="criteria",
+        )
     plan = CampaignPlan(
         file.name,
         bench,
@@ -160,7 +168,10 @@ def _only_case(bench: Bench) -> Case:
     if len(cases) != 1 or bench.faults:
         what = "has faults already" if bench.faults else f"makes {len(cases)} runs"
         raise ParameterError(
-            f"the bench of a campaign makes one run without faults, but {bench.experiment!r} {what}"
+            f"the bench of a campaign makes one run without faults, but {bench.experiment!r} "
+            f"{what}",
+            name="bench",
+            value=bench.experiment,
         )
     return cases[0]
 
@@ -186,9 +197,11 @@ def _require_known_values(values: Mapping[str, Any], modes: Mapping[str, Mode]) 
         if name not in modes:
             raise unknown_name("fault in [values]", name, modes)
         if not modes[name].unit:
-            raise ParameterError(f"[values] {name} takes no value: leave it out")
+            raise ParameterError(f"[values] {name} takes no value: leave it out", name=name)
         if given == []:
-            raise ParameterError(f"[values] {name} = []: give a value, or use leave_out")
+            raise ParameterError(
+                f"[values] {name} = []: give a value, or use leave_out", name=name, value="[]"
+            )
 
 
 def _sizes(mode: Mode, values: Mapping[str, Any]) -> Iterator[float]:
@@ -210,7 +223,7 @@ def _size(mode: Mode, value: Any, where: str) -> float:
 
 
 def _pairs(singles: Sequence[Failing], latent: Sequence[Failing], case: Case) -> Iterator[Failing]:
-    """Yield every fault once more beside each of the latent ones, where both can be there."""
+    """Yield every fault again with each latent one, if both can be present."""
     for before in latent:
         for each in singles:
             if not touch_alike(each, before, case.par):
@@ -230,8 +243,11 @@ def _onsets(section: CampaignSection, case: Case) -> tuple[float, ...]:
     onsets = evenly(first, section.spread, section.onsets or (8 if section.spread > 0 else 1))
     if not (-case.keep <= first and onsets[-1] < case.duration):
         raise ParameterError(
-            f"[campaign] onsets from {first:g} s to {onsets[-1]:g} s: they must lie between "
-            f"{-case.keep:g} s and the end of the run at {case.duration:g} s"
+            f"[campaign] onsets from {first:g} s to {onsets[-1]:g} s: they must be between "
+            f"{-case.keep:g} s and the end of the run at {case.duration:g} s",
+            name="[campaign] onsets",
+            value=f"{first:g} s to {onsets[-1]:g} s",
+            valid=f"{-case.keep:g} s to {case.duration:g} s",
         )
     return onsets
 
@@ -253,7 +269,7 @@ def _rates(section: Mapping[str, Any], modes: Mapping[str, Mode]) -> dict[str, f
             raise unknown_name("fault in [rates]", name, {*modes, *places})
         is_number = isinstance(rate, (int, float)) and not isinstance(rate, bool)
         if not is_number or not 0 <= rate <= 1e12:
-            raise ParameterError(f"[rates] {name} = {quoted(rate)}: 0 to 1e12 is wanted")
+            raise not_valid(f"[rates] {name}", quoted(rate), "a number from 0 to 1e12")
     return {name: float(rate) for name, rate in section.items()}
 
 
@@ -262,6 +278,8 @@ def _reaction(section: ReactionSection, modes: Mapping[str, Mode]) -> Reaction:
         raise unknown_name("mode of [reaction]", section.fault, modes)
     mode = modes[section.fault]
     if section.value is not None and not mode.unit:
-        raise ParameterError(f"[reaction] {mode.name} takes no value: leave it out")
+        raise ParameterError(
+            f"[reaction] {mode.name} takes no value: leave it out", name="[reaction]"
+        )
     size = mode.value if section.value is None else section.value
     return Reaction(Failing(mode, _size(mode, size, "[reaction] value")), section.delay)

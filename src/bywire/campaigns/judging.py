@@ -1,4 +1,4 @@
-"""Runs with a fault beside healthy ones: simulated, and judged by what they did and when."""
+"""Runs with a fault and healthy runs: simulated and compared, with effects and times."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ class Traces:
 
 
 def require_small(plan: CampaignPlan) -> None:
-    """Refuse a campaign whose recordings do not fit into memory.
+    """Reject a campaign whose recordings do not fit into memory.
 
     Raises
     ------
     ParameterError
-        With what there would be.
+        With the size of the recordings.
     """
     case = plan.case(0)
     rows = (case.keep + case.duration) / case.record
@@ -62,7 +62,8 @@ def require_small(plan: CampaignPlan) -> None:
         raise ParameterError(
             f"{runs} runs of {rows:.3g} rows of {signals} signals are more than {_MOST:.3g} "
             "numbers: take fewer healthy runs or onsets, a shorter maneuver, or a longer "
-            "simulation.record"
+            "simulation.record",
+            name="simulation.record",
         )
 
 
@@ -104,7 +105,7 @@ def faulty_traces(
 
 
 def _case(plan: CampaignPlan, sample: int, faults: Sequence[Injection], is_apart: bool) -> Case:
-    """Return a run of a sample with faults, of the model that most share or of one of its own."""
+    """Return a run of a sample with faults, of the common model or of a separate one."""
     taps, tasks = ((), ()) if is_apart else plan.taps
     return injected(plan.case(sample), faults, taps, tasks)
 
@@ -135,7 +136,7 @@ def _computed(runs: Sequence[Run], signals: Sequence[str], engine: str) -> Seque
 
 
 def _missed(case: Case, task: str, time: Array) -> Array:
-    """Return where a task misses its ticks, which a watchdog sees."""
+    """Return where a task misses its ticks, which a watchdog detects."""
     given = case.falsified(time) if isinstance(case, FaultyCase) else {}
     return np.minimum(given.get(rests(task), np.zeros(time.size)), 1.0)
 
@@ -150,7 +151,7 @@ Outcome = dict[str, Any]
 
 @dataclass(frozen=True)
 class Healthy:
-    """What healthy runs show: signals, thresholds, false alarms.
+    """Results of healthy runs: signals, thresholds, false alarms.
 
     Parameters
     ----------
@@ -172,7 +173,7 @@ class Healthy:
 
 
 def judge_healthy(plan: CampaignPlan, traces: Traces) -> Healthy:
-    """Return thresholds and false alarms of healthy runs, each of its own half."""
+    """Return thresholds and false alarms of healthy runs, each from one half of the runs."""
     thresholds: dict[str, float] = {}
     alarms: dict[str, list[int]] = {}
     alarmed = np.zeros(plan.healthy - plan.tuning, dtype=bool)
@@ -192,14 +193,14 @@ def judge_healthy(plan: CampaignPlan, traces: Traces) -> Healthy:
 
 
 def _scaled(limit: float, factor: float) -> float:
-    """Return a threshold that is farther from what is healthy by a factor, whatever its sign."""
+    """Return a threshold that is less sensitive by a factor, for either sign."""
     if limit <= NEVER:  # there is none to scale
         return limit
     return limit * factor if limit >= 0 else limit / factor
 
 
 def judge_fault(plan: CampaignPlan, failing: Failing, healthy: Healthy) -> Outcome:
-    """Return what all runs with a fault did, as plain numbers."""
+    """Return the outcomes of all runs with a fault, as plain numbers."""
     onsets = np.array(plan.onsets_of(failing))
     # By its name: another fault in the catalog must not change whose scatter this one has.
     first = crc32(failing.name.encode())
@@ -221,7 +222,7 @@ def judge_fault(plan: CampaignPlan, failing: Failing, healthy: Healthy) -> Outco
 def _reached(
     plan: CampaignPlan, traces: Traces, beside: Traces, onsets: Array
 ) -> dict[str, list[Any]]:
-    """Return how long after its onset a fault has done too much [s], by criterion."""
+    """Return the time from the onset of a fault until each criterion is violated [s]."""
     return {
         c.name: _plain(
             c.reached(traces.signals[c.signal], beside.signals[c.signal], traces.time, onsets)
@@ -251,7 +252,7 @@ def _extremes(
 def _detections(
     plan: CampaignPlan, traces: Traces, onsets: Array, thresholds: Mapping[str, float]
 ) -> dict[str, list[Array]]:
-    """Return how long after its onset a fault is seen [s], by residual and factor."""
+    """Return the time from the onset of a fault until its detection [s], by residual and factor."""
     seen = {}
     for residual in plan.watched:
         lasted = residual.lasted(traces.signals, plan.bench.par, traces.time)
@@ -266,7 +267,7 @@ def _detections(
 def _with_reaction(
     plan: CampaignPlan, failing: Failing, samples: Sequence[int], earliest: Array, beside: Traces
 ) -> dict[str, Any]:
-    """Return what is reached where the fault is answered, of the runs in which it is seen."""
+    """Return the outcomes with the reaction, for the runs in which the fault is detected."""
     assert plan.reaction is not None
     onsets = np.array(plan.onsets_of(failing))
     cases = np.flatnonzero(~np.isnan(earliest)).tolist()

@@ -1,4 +1,4 @@
-"""The plan of a campaign: which maneuver, what fails and when, what is judged, who sees it."""
+"""Plan of a campaign: maneuver, faults and onsets, criteria, and residuals."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ class CriterionSection(Section):
 
 @dataclass(frozen=True)
 class Criterion:
-    """What a failure must not do.
+    """Criterion of a campaign: an effect that a fault must not have.
 
     Parameters
     ----------
     name
-        What reports call it.
+        Name in reports.
     signal
         Recorded signal that is judged.
     sense, level
@@ -63,7 +63,7 @@ class Criterion:
     lasting
         For how long without a break [s].
     severity
-        Class that the user gives it, for instance ``"S3"``.
+        Severity class from the user, for instance ``"S3"``.
     """
 
     name: str
@@ -74,7 +74,7 @@ class Criterion:
     severity: str = ""
 
     def excess(self, values: Array, healthy: Array) -> Array:
-        """Return by how much each row exceeds what is admitted, shape (cases, rows)."""
+        """Return the excess of each row over the limit, shape (cases, rows)."""
         if self.sense == "above":
             return values - self.level
         if self.sense == "below":
@@ -115,7 +115,7 @@ def criteria_of(
     names = [criterion.name for criterion in criteria]
     for name in names:
         if names.count(name) > 1:
-            raise ParameterError(f"[[criteria]] {name!r} stands there twice: rename one")
+            raise ParameterError(f"[[criteria]] {name!r} occurs twice: rename one", name=name)
     return criteria
 
 
@@ -126,8 +126,10 @@ def _criterion(section: CriterionSection, signals: Mapping[str, Signal]) -> Crit
     senses = [sense for sense in SENSES if sense in section.given]
     if len(senses) != 1:
         raise ParameterError(
-            f"[[criteria]] {name!r}: say exactly one of {', '.join(SENSES)}, for instance "
-            'above_healthy = "5 bar"'
+            f"[[criteria]] {name!r}: give exactly one of {', '.join(SENSES)}, for instance "
+            'above_healthy = "5 bar"',
+            name=name,
+            valid=", ".join(SENSES),
         )
     (sense,) = senses
     unit = "1" if sense == "below_share" else signals[signal].unit
@@ -176,7 +178,7 @@ class Failing:
 
 @dataclass(frozen=True)
 class Reaction:
-    """What is done once a fault is seen: a fail-safe mode of the brake.
+    """Reaction to a detected fault: a fail-safe mode of the brake.
 
     Parameters
     ----------
@@ -192,20 +194,20 @@ class Reaction:
 
 @dataclass(frozen=True)
 class CampaignPlan:
-    """What a campaign file says.
+    """Content of a campaign file.
 
     Parameters
     ----------
     name
-        What reports call it.
+        Name in reports.
     bench
         The maneuver.
     faults
-        What fails, one at a time.
+        Faults, one at a time.
     onsets
         When [s].
     criteria, residuals
-        What is judged, and how a fault is seen.
+        Criteria, and residuals that detect faults.
     varied, correlations
         What scatters from run to run; pairs of names -> correlation of their normal scores.
     healthy
@@ -217,7 +219,7 @@ class CampaignPlan:
     rates
         Failure rates by fault, or by its place.
     reaction
-        What is done once a fault is seen; None for nothing.
+        Reaction to a detected fault; None without reaction.
     """
 
     name: str

@@ -33,7 +33,7 @@ def mean_of_the_last(values: Array, rows: int) -> Array:
 
 
 def first_time(holds: Array, time: Array, since: Array) -> Array:
-    """Return when something holds first at or after a time [s]; NaN where it never does.
+    """Return the first time [s] at or after another at which a condition holds; else NaN.
 
     Parameters
     ----------
@@ -57,14 +57,14 @@ NEVER = -1e9
 
 @dataclass(frozen=True)
 class Residual:
-    """What should be small while nothing has failed.
+    """Residual: a quantity that is small without faults.
 
     Parameters
     ----------
     name
-        What reports call it.
+        Name in reports.
     summary
-        What it compares.
+        The compared quantities.
     assembly
         Name of the assembly whose controller computes it, or of several.
     unit
@@ -93,7 +93,7 @@ class Residual:
         return (self.assembly,) if isinstance(self.assembly, str) else self.assembly
 
     def lasted(self, signals: Mapping[str, Array], par: Any, time: Array) -> Array:
-        """Return what it has exceeded for the time that it has to, shape (cases, rows)."""
+        """Return the value that it has exceeded for its hold time, shape (cases, rows)."""
         dt = float(time[1] - time[0])
         return least_of_the_last(self.compute(signals, par, dt), round(self.hold / dt) + 1)
 
@@ -103,7 +103,7 @@ RESIDUALS = Kind("residual", ("residuals",), instances(Residual), declared="a Re
 
 
 def residuals_of(model: Any) -> dict[str, Residual]:
-    """Return what the controllers of a model compute, and those of the assemblies within it.
+    """Return the residuals of a model, and those of the assemblies within it.
 
     These are named by the path of the parameters there, and take what was recorded under a prefix.
     """
@@ -152,7 +152,7 @@ def missed_ticks(task: str, assembly: str, period: float) -> Residual:
 
 
 def threshold(largest: Array, share: float) -> float:
-    """Return what a share of healthy runs exceeds at most.
+    """Return the threshold that a share of healthy runs exceeds at most.
 
     Parameters
     ----------
@@ -187,11 +187,11 @@ class DeclaredCampaign:
     Parameters
     ----------
     name
-        What the command line calls it.
+        Name on the command line.
     summary
         One line for listings.
     content
-        What a campaign file holds; its ``bench`` names an experiment.
+        Content of a campaign file; its ``bench`` names an experiment.
     """
 
     name: str

@@ -29,12 +29,12 @@ Class = Literal["covered", "too late", "undetected", "harmless, seen", "latent"]
 
 @dataclass(frozen=True)
 class FaultFinding:
-    """What all runs with a fault did.
+    """Outcomes of all runs with a fault.
 
     Parameters
     ----------
     failing
-        What failed.
+        The fault.
     reached
         Time from onset until each criterion is violated [s], by name; NaN where it is not.
     detected
@@ -59,7 +59,7 @@ class FaultFinding:
 
     @property
     def cases(self) -> int:
-        """How many runs."""
+        """Number of runs."""
         return len(next(iter(self.reached.values())))
 
     @cached_property
@@ -69,7 +69,7 @@ class FaultFinding:
 
     @cached_property
     def seen(self) -> Array:
-        """Time until the first residual sees it [s], NaN where none does; shape (cases,)."""
+        """Time until the first residual detects it [s], NaN without detection; shape (cases,)."""
         never = np.full(self.cases, math.nan)
         return _first([never, *(each[_AT] for each in self.detected.values())])
 
@@ -85,7 +85,7 @@ class FaultFinding:
 
     @property
     def in_time(self) -> int:
-        """Dangerous runs in which it is seen, and answered, before the tolerant time is over."""
+        """Dangerous runs in which detection and reaction come within the tolerant time."""
         there = ~np.isnan(self.violated)
         if not self.dangerous:
             return 0
@@ -93,13 +93,13 @@ class FaultFinding:
 
     @property
     def criteria(self) -> dict[str, int]:
-        """How many runs violate each criterion, of those that any does."""
+        """Number of runs that violate each criterion, for violated criteria."""
         counts = {name: int(np.sum(~np.isnan(times))) for name, times in self.reached.items()}
         return {name: count for name, count in counts.items() if count}
 
     @cached_property
     def only_with_reaction(self) -> dict[str, int]:
-        """How many runs violate each criterion because of the reaction alone."""
+        """Number of runs that violate each criterion because of the reaction alone."""
         counts = {
             name: int(np.sum(np.isnan(self._unanswered(name)) & ~np.isnan(times)))
             for name, times in self.reacted.items()
@@ -108,7 +108,7 @@ class FaultFinding:
 
     @cached_property
     def sooner_with_reaction(self) -> dict[str, int]:
-        """How many runs violate each criterion in any case, and sooner with the reaction."""
+        """Number of runs that violate each criterion in any case, and sooner with the reaction."""
         counts = {
             name: int(np.sum(times < self._unanswered(name) - _SAME))
             for name, times in self.reacted.items()
@@ -117,7 +117,7 @@ class FaultFinding:
 
     @cached_property
     def prevented_by_reaction(self) -> dict[str, int]:
-        """How many runs violate each criterion without the reaction, and not with it."""
+        """Number of runs that violate each criterion only without the reaction."""
         counts = {
             name: int(np.sum(~np.isnan(self._unanswered(name)) & np.isnan(times)))
             for name, times in self.reacted.items()
@@ -138,7 +138,7 @@ class FaultFinding:
 
     @property
     def first_seen_by(self) -> str:
-        """Residual that sees it first in most runs; empty where none does."""
+        """Residual that detects it first in most runs; empty without detection."""
         names = [*self.detected]
         times = np.array([self.detected[name][_AT] for name in names])
         if not times.size:
@@ -153,7 +153,7 @@ class FaultFinding:
 
     @property
     def kind(self) -> Class:
-        """What becomes of it, by its worst run."""
+        """Class of the fault, by its worst run."""
         if self.dangerous:
             if self.in_time == self.dangerous:
                 return "covered"
@@ -168,7 +168,7 @@ class FaultFinding:
 
 @dataclass(frozen=True)
 class CampaignFindings:
-    """What a campaign found, as far as it is computed."""
+    """Findings of a campaign, as far as they are computed."""
 
     plan: CampaignPlan
     healthy: Healthy
@@ -181,7 +181,7 @@ class CampaignFindings:
 
     @property
     def coverage(self) -> float:
-        """Share of dangerous runs that are seen in time, by the rates; NaN without any."""
+        """Share of dangerous runs detected in time, weighted by rates; NaN without any."""
         rows = [(self.plan.rate(f.failing) / f.cases, f.in_time, f.dangerous) for f in self.faults]
         total = sum(weight * dangerous for weight, _, dangerous in rows)
         return sum(weight * seen for weight, seen, _ in rows) / total if total else math.nan
@@ -203,7 +203,7 @@ class CampaignFindings:
         return Counter(each.kind for each in self.faults)
 
     def harm_of_reaction(self) -> tuple[str, ...]:
-        """Return what the reaction makes worse, a sentence each; none where it harms no fault."""
+        """Return the harmful effects of the reaction, a sentence each."""
         if self.plan.reaction is None:
             return ()
         groups = {
@@ -221,7 +221,7 @@ class CampaignFindings:
         )
 
     def benefit_of_reaction(self) -> str:
-        """Return what the reaction prevents, and how many faults it makes harmless."""
+        """Return the violations that the reaction prevents, and the number of harmless faults."""
         dangerous = [each for each in self.faults if each.dangerous]
         prevented = _harm({"dangerous": [each.prevented_by_reaction for each in dangerous]})
         relieved = sum(each.is_relieved for each in dangerous)
@@ -246,7 +246,7 @@ class CampaignFindings:
 
 
 def finding(plan: CampaignPlan, number: int, outcome: Mapping[str, Any]) -> FaultFinding:
-    """Return what the outcome of a fault says, nulls as NaN; ``number``: of it in the plan."""
+    """Return the finding of a fault's outcome, nulls as NaN; ``number``: its index in the plan."""
     reacted = outcome.get("reacted", {}).get("reached", {})
     return FaultFinding(
         plan.faults[number],
@@ -284,7 +284,7 @@ def _first(columns: Sequence[Array]) -> Array:
 
 @dataclass(frozen=True)
 class CampaignStore(PieceFolder):
-    """Where the outcomes of a campaign lie.
+    """Folder of the outcomes of a campaign.
 
     Parameters
     ----------
@@ -302,7 +302,7 @@ class CampaignStore(PieceFolder):
 
     @property
     def elsewhere(self) -> str:
-        """What to do where the folder holds another campaign."""
+        """Advice if the folder contains another campaign."""
         return f"name another folder with {option('out')}, or remove it"
 
     def kept(self, plan: CampaignPlan) -> dict[int, dict[str, Any]]:
@@ -334,7 +334,7 @@ class CampaignStore(PieceFolder):
 def run_campaign(
     plan: CampaignPlan, store: CampaignStore | None, progress: Progress
 ) -> CampaignFindings:
-    """Return what a campaign finds, computed as far as its folder does not hold it.
+    """Return the findings of a campaign; outcomes that its folder contains are not computed again.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Long work in pieces: what tells one from another, who computes them, where finished ones lie."""
+"""Long work in pieces: its identity, its computation, and the store of finished pieces."""

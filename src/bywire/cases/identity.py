@@ -13,12 +13,12 @@ class Plan(Protocol):
 
     @property
     def name(self) -> str:
-        """What reports call it."""
+        """Name in reports."""
         ...
 
     @property
     def digest(self) -> str:
-        """What tells it from any other."""
+        """Identity of the plan."""
         ...
 
     @property
@@ -40,13 +40,13 @@ _PARTS = {"varied": ("", "together", "quantiles"), "stimuli": ("", "parameters")
 
 
 def as_json(identity: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an identity as it is kept: of nothing but what JSON has."""
+    """Return an identity with JSON types only, as it is stored."""
     kept: dict[str, Any] = json.loads(json.dumps(identity, sort_keys=True, default=str))
     return kept
 
 
 def digest_of(identity: Mapping[str, Any]) -> str:
-    """Return what tells an identity from any other."""
+    """Return the digest of an identity."""
     text = json.dumps(identity, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -97,7 +97,7 @@ def _shown(value: Any) -> str:
 
 
 def _entries(identity: Mapping[str, Any], group: str = "") -> list[tuple[str, Any]]:
-    """Return the entries with those of groups in words of their own."""
+    """Return the entries, with readable names for those of groups."""
     entries: list[tuple[str, Any]] = []
     for key, value in identity.items():
         name = f"{group} {key}".strip()

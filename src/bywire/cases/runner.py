@@ -25,14 +25,14 @@ def complete(
     workers: int | None = None,
     pool: Callable[[int], AbstractContextManager[Executor]] = thread_pool,
 ) -> dict[K, T]:
-    """Return what all pieces give, computed as far as it is not kept.
+    """Return the results of all pieces; kept results are not computed again.
 
     Parameters
     ----------
     pieces
-        What tells each piece from the others.
+        Keys of the pieces.
     kept
-        What finished ones gave.
+        Results of finished pieces.
     compute
         Computes a piece, in a thread or process of the pool; here where one worker is enough.
     keep
@@ -70,7 +70,7 @@ def complete(
 def as_completed(
     pool: Executor, compute: Callable[[K], T], pieces: Iterable[K], ahead: int | None = None
 ) -> Iterator[tuple[K, T]]:
-    """Return what a pool finishes, in any order; the first pieces are begun at once.
+    """Return the results of a pool in the order in which pieces finish; the first start at once.
 
     Parameters
     ----------

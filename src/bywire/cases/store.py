@@ -1,4 +1,4 @@
-"""Finished pieces of a long piece of work: an interrupted run goes on from what is there.
+"""Store of finished pieces of long work, from which an interrupted run continues.
 
 Large pieces are files of a folder, with a record that says whose they are (`PieceFolder`); small
 ones are lines of one file (`PieceLines`). A killed process loses the pieces that it was at. A
@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 def json_object(text: bytes | str) -> dict[str, Any]:
-    """Return the JSON object of a file that anybody may have written.
+    """Return the JSON object of an untrusted file.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def json_object(text: bytes | str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class PieceFolder(ABC):
-    """A folder with a record of whose pieces it holds, and a file for each finished piece.
+    """Folder with a record of the work, and a file for each finished piece.
 
     A piece's file appears whole or not at all. Two commands may work at one folder: they lose time
     where both compute a piece, and nothing else.
@@ -112,8 +112,9 @@ class PieceFolder(ABC):
         if known["digest"] != plan.digest:
             differs = differing(known[self.NOUN], plan.identity)
             raise FileError(
-                f"{self.folder} holds another {self.NOUN}{differs and f' ({differs})'}: "
-                f"{self.elsewhere}"
+                f"{self.folder} contains another {self.NOUN}{differs and f' ({differs})'}: "
+                f"{self.elsewhere}",
+                name=str(self.folder),
             )
         return known
 
@@ -132,13 +133,15 @@ class PieceFolder(ABC):
                 return said
         except OSError as error:
             raise FileError(
-                f"{self.folder} holds no {self.NOUN} ({path.name}: {error.strerror}): name the "
-                f"folder that '{self.COMMAND}' has written"
+                f"{self.folder} does not contain a {self.NOUN} ({path.name}: {error.strerror}): "
+                f"name the folder that '{self.COMMAND}' has written",
+                name=str(self.folder),
             ) from None
         except (ValueError, KeyError):
             pass
         raise FileError(
-            f"{path} is damaged, or not of a {self.KIND}: run the {self.NOUN} into another folder"
+            f"{path} is damaged, or not of a {self.KIND}: run the {self.NOUN} into another folder",
+            name=str(path),
         )
 
     def holds(self, plan: Plan) -> bool:
@@ -182,7 +185,8 @@ class PieceFolder(ABC):
     def _unwritable(self, path: Path, error: OSError) -> FileError:
         return FileError(
             f"cannot write {path}: {error.strerror or error}: make room there and resume the "
-            f"{self.NOUN}; what is finished stays"
+            f"{self.NOUN}; finished pieces are kept",
+            name=str(path),
         )
 
 
@@ -220,7 +224,8 @@ class PieceLines:
             lines = self.path.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError) as error:
             raise FileError(
-                f"{self.path} cannot be read: {error}; delete it to start anew"
+                f"{self.path} cannot be read: {error}; delete it to start again",
+                name=str(self.path),
             ) from None
         for line in lines:
             try:
@@ -251,5 +256,6 @@ class PieceLines:
         except OSError as error:
             raise FileError(
                 f"cannot write {self.path}: {error.strerror}: make room there, or name another "
-                "folder"
+                "folder",
+                name=str(self.path),
             ) from None

@@ -81,7 +81,7 @@ def folder(text: str) -> Path:
         When it names nothing.
     """
     if not text.strip():
-        raise FileError("--out '': name a folder; '.' is the one that you are in")
+        raise FileError("--out '': name a folder; '.' is the current folder", name="--out")
     return Path(text)
 
 

@@ -1,1 +1,1 @@
-"""What every element, law, parameter set and model must keep, whoever wrote it."""
+"""Contracts of every element, law, parameter set and model, checked by ``bywire check``."""

@@ -1,4 +1,4 @@
-"""Numbers that carry their unit through the equations and refuse sums of unlike quantities."""
+"""Numbers with units, which pass through the equations and reject sums of unlike quantities."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class Dimensioned:
         return Condition(operator.eq, self, other)
 
     def has_unit(self, unit: str) -> bool:
-        """Tell whether the dimension is that of a unit."""
+        """Return whether the dimension is that of a unit."""
         return self.powers == base_powers(unit, BASE)
 
     def _bywire_op(self, name: str, *args: Any) -> Any:
@@ -100,17 +100,17 @@ class Dimensioned:
         if name in ("fmax", "fmin"):
             x, y, powers = _alike(*args)
             return Dimensioned.of(max(x, y) if name == "fmax" else min(x, y), powers)
-        raise TypeError(f"ops.{name} says no dimension: give it one in Dimensioned._bywire_op")
+        raise TypeError(f"ops.{name} has no dimension: define it in Dimensioned._bywire_op")
 
 
 class Condition:
-    """Outcome of a comparison: chooses in ``ops.where``, refuses to steer an ``if``."""
+    """Result of a comparison: valid in ``ops.where``, rejected in an ``if``."""
 
     def __init__(self, compare: Callable[[Any, Any], bool], left: Any, right: Any) -> None:
         self.holds = bool(compare(*_alike(left, right)[:2]))
 
     def __bool__(self) -> bool:
-        raise TypeError("the flow of an equation must not hang on a value: use ops.where")
+        raise TypeError("an equation must not branch on a value: use ops.where")
 
     def _bywire_op(self, name: str, *args: Any) -> Any:
         condition, then, otherwise = args  # of ops.where, the only one that takes a condition
@@ -119,7 +119,7 @@ class Condition:
 
 
 def fits(value: Any, unit: str) -> bool:
-    """Tell whether a result has the dimension of a unit; a plain zero has that of any."""
+    """Return whether a result has the dimension of a unit; a plain zero has any dimension."""
     if isinstance(value, Dimensioned):
         return value.has_unit(unit)
     plain = _is_nothing(value) or _is_unknown(value)
@@ -167,5 +167,5 @@ def _alike(left: Any, right: Any) -> tuple[float, float, tuple[float, ...]]:
     if _is_nothing(left) or _is_unknown(left):
         return x, y, others
     if powers != others and not (_is_nothing(right) or _is_unknown(right)):
-        raise DimensionError(f"{left!r} and {right!r} measure different quantities")
+        raise DimensionError(f"{left!r} and {right!r} have different dimensions")
     return x, y, powers

@@ -111,7 +111,7 @@ class Sampler:
         return {name: self._argument(name, note) for name, note in self.annotations.items()}
 
     def known(self, name: str) -> Number:
-        """Return what is known of a flattened number; the nodes of a table share it."""
+        """Return the description of a flattened number; the nodes of a table share it."""
         return self._known[name if name in self._known else name.rsplit(".", 1)[0]]
 
     def _argument(self, name: str, annotation: Any) -> Any:
@@ -132,7 +132,9 @@ class Sampler:
                 return cls.create(drawn | chosen)
             except ParameterError as error:
                 refusal = error
-        raise ParameterError(f"{cls.__module__}: no sample of {chosen} passes: {refusal}")
+        raise ParameterError(
+            f"{cls.__module__}: no sample of {chosen} is valid: {refusal}", name=cls.__module__
+        )
 
     def _leaf(self, cls: type[ParameterSet], name: str, number: Number) -> Any:
         if not is_table(cls, name):
@@ -175,7 +177,7 @@ def _samples(
 
 @lru_cache(maxsize=4096)
 def is_table(cls: type[ParameterSet], name: str) -> bool:
-    """Tell whether the leaf of a parameter class is a table."""
+    """Return whether the leaf of a parameter class is a table."""
     *groups, last = name.split(".")
     for group in groups:
         cls = typing.cast(Any, cls.model_fields[group].annotation)
@@ -270,13 +272,13 @@ def samples(cls: Class) -> Iterator[ParameterSet]:
 
 
 def survives_json(cls: Class) -> Iterator[Evidence]:
-    """Find whether the JSON of samples of a class gives the same sets back."""
+    """Check that samples of a class survive JSON."""
     for par in samples(cls):
         yield set_survives_json(par)
 
 
 def set_survives_json(par: ParameterSet) -> Evidence:
-    """Find whether the JSON of a set gives the same set back."""
+    """Check that a set survives JSON."""
     again = type(par).model_validate_json(par.model_dump_json())
     before, after = par.flat(), again.flat()
     lost = [name for name in before if before[name] != after.get(name)]
@@ -286,14 +288,14 @@ def set_survives_json(par: ParameterSet) -> Evidence:
 
 
 def keeps_its_ranges(cls: Class) -> Iterator[Evidence]:
-    """Find whether samples of a class refuse what lies outside the range of any number."""
+    """Check that samples of a class reject values outside the range of each number."""
     for par in samples(cls):
         for name in leaf_fields(cls):
             yield from refuses_outside(par, name, _says_both)
 
 
 def set_keeps_its_ranges(par: ParameterSet) -> Iterator[Evidence]:
-    """Find whether a set refuses what lies outside the range of any of its numbers."""
+    """Check that a set rejects values outside the range of each of its numbers."""
     for name in leaf_fields(type(par)):
         if not is_table(type(par), name) or par.flat()[name]:
             yield from refuses_outside(par, name, _says_which)
@@ -315,7 +317,7 @@ def _says_both(leaf: Leaf, value: float) -> tuple[str, ...]:
 def refuses_outside(
     par: ParameterSet, name: str, wanted: Callable[[Leaf, float], tuple[str, ...]]
 ) -> Iterator[Evidence]:
-    """Find whether a set refuses every value nearest to the range of a number but not in it.
+    """Check that a set rejects the values just outside the range of a number.
 
     Parameters
     ----------
@@ -330,7 +332,7 @@ def refuses_outside(
         wrong = (*par.flat()[name][:-1], value) if is_table(type(par), name) else value
         message = refusal(par, name, wrong)
         if message is None:
-            text = f"{name} = {value!r} was taken; admissible is {leaf.range_text}"
+            text = f"{name} = {value!r} was accepted, but it must be {leaf.range_text}"
             if not math.isfinite(value):
                 text += ": write allow_inf_nan=False in its Field"
             yield Evidence(False, text, place=place)
@@ -341,7 +343,7 @@ def refuses_outside(
 
 
 def outside(leaf: Leaf) -> Iterator[float]:
-    """Yield what is no number, and the values nearest to the range that are not in it."""
+    """Yield values that are not numbers, and the values just outside the range."""
     yield from (math.nan, math.inf, -math.inf)
     if math.isfinite(leaf.low):
         yield leaf.low if leaf.low_open else math.nextafter(leaf.low, -math.inf)
@@ -350,7 +352,7 @@ def outside(leaf: Leaf) -> Iterator[float]:
 
 
 def refusal(par: ParameterSet, name: str, value: Any) -> str | None:
-    """Return the message with which a set refuses a value; None where it takes it."""
+    """Return the message with which a set rejects a value; None if it accepts the value."""
     try:
         par.replace({name: value})
     except ParameterError as error:
@@ -374,13 +376,13 @@ Function = Callable[..., Any]
 
 SAMPLES = 30
 BACK_ENDS = 1e-12
-"""by how much floats, arrays and symbols may differ, of the largest value"""
+"""largest difference of floats, arrays and symbols, relative to the largest value"""
 DIFFERENCE = 1e-6
 """step of the differences, of the nominal value"""
 SLOPE = 1e-7
-"""by how much a derivative may differ from them"""
+"""largest deviation of a derivative from the differences"""
 PREFIX = 1e-12
-"""by how much the factor of a unit to SI may differ from one"""
+"""largest deviation of the factor of a unit to SI from one"""
 
 
 def with_units(sampler: Sampler) -> Arguments:
@@ -391,18 +393,18 @@ def with_units(sampler: Sampler) -> Arguments:
 
 
 def has_annotated_units(function: Function) -> Iterator[Evidence]:
-    """Find whether results have the dimension that the annotation says, whatever the choices."""
+    """Check that results have the dimension of their annotation, for all choices."""
     arguments, returns = signature_of(function)
     expected = numbers("result", returns)
     for choices in combinations(arguments):
         got = flat(call(function, with_units(Sampler(arguments, choices))))
         for (name, number), value in zip(expected.items(), got, strict=True):
-            text = f"{name} is {value}, wanted {number.unit}{described(choices)}"
+            text = f"{name} is {value}, not {number.unit}{described(choices)}"
             yield Evidence(fits(value, number.unit), text)
 
 
 def is_in_SI(function: Function) -> Iterator[Evidence]:
-    """Find whether all units are SI: a prefix is a factor that nobody applies."""
+    """Check that all units are SI: no code applies the factor of a prefix."""
     arguments, returns = signature_of(function)
     for argument, annotation in (*arguments.items(), ("result", returns)):
         for name, number in numbers(argument, annotation).items():
@@ -411,7 +413,7 @@ def is_in_SI(function: Function) -> Iterator[Evidence]:
 
 
 def has_agreeing_back_ends(function: Function) -> Iterator[Evidence]:
-    """Find whether floats, NumPy arrays and CasADi symbols give one result."""
+    """Check that floats, NumPy arrays and CasADi symbols give the same result."""
     arguments, _ = signature_of(function)
     for choices in combinations(arguments):
         structure, samples = samples_of(arguments, choices, SAMPLES)
@@ -431,7 +433,7 @@ def has_agreeing_back_ends(function: Function) -> Iterator[Evidence]:
 
 
 def has_its_slopes(function: Function) -> Iterator[Evidence]:
-    """Find whether the symbolic Jacobian is the slope of the function, away from kinks."""
+    """Check that the symbolic Jacobian is the slope of the function, away from kinks."""
     arguments, _ = signature_of(function)
     for choices in combinations(arguments):
         sampler = Sampler(arguments, choices)
@@ -485,7 +487,7 @@ def _relative(off: Array, scale: Array) -> float:
     return float(share.max())
 
 
-# --- Energy: what an element stores is what comes in minus what it loses
+# --- Energy: the stored energy changes by the power in minus the losses
 # An element with ``energy`` also has ``power_in``; where the energy depends on a ``State`` it has
 # ``mass`` and ``balance``; with inputs that its energy depends on it has ``input_rate``, a tuple
 # of their derivatives under their names; without ``power_loss`` it is lossless. An argument whose
@@ -497,7 +499,7 @@ ENERGETIC = ("energy", "power_in", "power_loss", "mass", "balance", "input_rate"
 
 
 def has_rates_of_its_states(module: ModuleType) -> Iterator[Evidence]:
-    """Find whether balance over mass has the dimension of the derivative of the state."""
+    """Check that balance over mass has the dimension of the derivative of the state."""
     mass, balance = (functions(module)[name] for name in ("mass", "balance"))
     arguments = merged((mass, balance))
     states = numbers("state", module.State)
@@ -508,13 +510,13 @@ def has_rates_of_its_states(module: ModuleType) -> Iterator[Evidence]:
             rate, unit = top / bottom, f"({number.unit})/s"
             yield Evidence(
                 fits(rate, unit),
-                f"rate of {name} is {rate}, wanted {unit}{described(choices)}",
+                f"rate of {name} is {rate}, not {unit}{described(choices)}",
                 place=place_of(balance),
             )
 
 
 def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
-    """Find whether an element makes or hides energy."""
+    """Check that an element neither creates nor hides energy."""
     laws = {k: f for k, f in functions(module).items() if k in ENERGETIC}
     powers = [law for name, law in laws.items() if name in ("energy", "power_in", "power_loss")]
     moving = getattr(module, "State", None) in merged(powers).values()
@@ -522,7 +524,7 @@ def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
     place = place_of(laws["energy"])
     if needed - laws.keys():
         missing = ", ".join(sorted(needed - laws.keys()))
-        yield Evidence(False, f"it stores energy: it needs {missing} too", place=place)
+        yield Evidence(False, f"it stores energy, so it also needs {missing}", place=place)
         return
     arguments = merged(laws.values())
     is_alive = False
@@ -561,7 +563,7 @@ def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
 
 
 def loses_what_it_says(module: ModuleType) -> Iterator[Evidence]:
-    """Find whether a loss gives energy, unless its docstring calls it signed."""
+    """Check that a loss does not deliver energy, unless its docstring calls it signed."""
     loss = functions(module)["power_loss"]
     claim, place = loss.__doc__ or "", place_of(loss)
     if (">= 0" in claim) == ("signed" in claim):
@@ -620,13 +622,13 @@ OF_A_FUNCTION: dict[str, Contract] = {
     "back ends": has_agreeing_back_ends,
     "derivatives": has_its_slopes,
 }
-"""what every public function has to keep"""
+"""contracts of every public function"""
 
 OF_A_CLASS: dict[str, Contract] = {
     "round trip": survives_json,
     "refusals": keeps_its_ranges,
 }
-"""what every class of parameters has to keep"""
+"""contracts of every class of parameters"""
 
 
 def demands_on(element: Element) -> Demands:

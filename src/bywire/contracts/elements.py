@@ -19,7 +19,7 @@ from bywire.core.signals import signal_in
 
 @dataclass(frozen=True)
 class Number:
-    """What is known of one number that goes into or comes out of a function."""
+    """Description of one number among the arguments or results of a function."""
 
     unit: str
     nominal: float
@@ -44,7 +44,7 @@ class Element:
 
     @property
     def summary(self) -> str:
-        """The first line of what its file says of it."""
+        """First line of the docstring of its file."""
         return (self.module.__doc__ or "").strip().partition("\n")[0]
 
     @property
@@ -54,7 +54,7 @@ class Element:
 
 
 def _declared(module: ModuleType) -> Iterator[Element]:
-    """Yield the element that a module is; packages and the files of whole brakes are none."""
+    """Yield the element of a module; packages and files of whole brakes have none."""
     if not hasattr(module, "__path__") and not hasattr(module, "BRAKE") and functions(module):
         yield Element(module.__name__.removeprefix("bywire."), module)
 
@@ -146,12 +146,12 @@ def merged(members: Iterable[Callable[..., Any]]) -> dict[str, Any]:
 
 
 def is_parameters(annotation: Any) -> bool:
-    """Tell whether an annotation is a parameter set."""
+    """Return whether an annotation is a parameter set."""
     return isinstance(annotation, type) and issubclass(annotation, ParameterSet)
 
 
 def is_signals(annotation: Any) -> bool:
-    """Tell whether an annotation is a NamedTuple."""
+    """Return whether an annotation is a NamedTuple."""
     return isinstance(annotation, type) and hasattr(annotation, "_fields")
 
 
@@ -179,7 +179,7 @@ def numbers(name: str, annotation: Any) -> dict[str, Number]:
 def _signal(name: str, annotation: Any) -> Number:
     signal = signal_in(annotation)
     if signal is None:
-        raise TypeError(f"{name}: {annotation} says no unit: Annotated[float, Signal(...)] does")
+        raise TypeError(f"{name}: {annotation} has no unit: use Annotated[float, Signal(...)]")
     return Number(signal.unit, signal.nominal, signal.low, signal.high)
 
 

@@ -1,4 +1,4 @@
-"""What a contract finds: whether it holds, by which measure, and where to look."""
+"""Evidence on a contract: whether it holds, by which measure, and where in the code."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ class Place:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a contract found.
+    """Evidence on a contract.
 
     Parameters
     ----------
     holds
         Whether the contract is kept.
     text
-        What was found, and with which choices or of which signal.
+        Text of the finding, with its choices or signal.
     figure, limit
-        Measure and the largest that is admissible; None where the contract has none.
+        Measure and its limit; None if the contract has none.
     place
         Line to look at, where it is another than that of the subject.
     is_error
@@ -56,12 +56,12 @@ class Evidence:
 
 
 def measured(figure: float, limit: float, text: str, place: Place | None = None) -> Evidence:
-    """Return evidence that holds where a figure is at most its limit; nan never is."""
+    """Return evidence that holds if a figure is at most its limit; NaN never is."""
     return Evidence(bool(figure <= limit), text, float(figure), limit, place)
 
 
 def worst(evidence: Iterable[Evidence]) -> Evidence:
-    """Return the first evidence that does not hold, else that which is nearest to its limit."""
+    """Return the first evidence that does not hold, else the one nearest to its limit."""
     nearest: Evidence | None = None
     for each in evidence:
         if not each.holds:
@@ -82,7 +82,7 @@ Contract = Callable[[Any], Evidence | Iterator[Evidence]]
 
 
 def examine(contract: Contract, subject: Any, place: Place | None = None) -> Evidence:
-    """Return what a contract finds; an error in the subject's equations breaks it.
+    """Return the evidence on a contract; an error in the subject's equations breaks it.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def examine(contract: Contract, subject: Any, place: Place | None = None) -> Evi
 
 
 def place_of(subject: Any) -> Place:
-    """Return where a function, a class or a module stands."""
+    """Return the place of a function, a class or a module in the code."""
     if isinstance(subject, ModuleType):
         return Place(subject.__file__ or subject.__name__, 0)
     subject = inspect.unwrap(subject) if callable(subject) else type(subject)
@@ -154,20 +154,20 @@ Outcome = Literal["holds", "broken", "not checked"]
 
 @dataclass(frozen=True)
 class Finding:
-    """What came out of one contract on one subject.
+    """Finding on one contract of one subject.
 
     Parameters
     ----------
     subject
         Function, class, parameter set or model, for instance ``"plant.dc_motor.balance"``.
     contract
-        What it has to keep, for instance ``"units"``.
+        Name of the contract, for instance ``"units"``.
     outcome
         ``holds``, ``broken``, or ``not checked``.
     text
-        What was found, or why it was not checked.
+        Text of the finding, or the reason why it was not checked.
     figure, limit
-        Measure and the largest that is admissible; None where the contract has none.
+        Measure and its limit; None if the contract has none.
     place
         Line to look at.
     is_error

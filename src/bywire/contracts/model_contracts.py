@@ -78,7 +78,7 @@ def rests_exactly(trial: Trial) -> Iterator[Evidence]:
 
 
 def _holds_at_start(trial: Trial) -> dict[str, float]:
-    """Return for all that stands how much of its dry friction the start takes."""
+    """Return the share of its dry friction that holds each resting velocity at the start."""
     start, model = trial.start, trial.model
     x, shares = start.state, {}
     contact = _forces(trial, SX(ca.DM(list(x))))
@@ -123,7 +123,7 @@ def _contain_zero(trial: Trial) -> Iterator[Evidence]:
         low, high = (float(ca.evalf(SX(value))) for value in pair)
         text = f"the friction of {name} is between {low:.3g} and {high:.3g}"
         if not low <= 0.0 <= high:
-            text += ": wanted is low <= 0 <= high"
+            text += ": it must be low <= 0 <= high"
         yield Evidence(low <= 0.0 <= high, text, place=trial.place("bounds", "friction"))
 
 
@@ -150,7 +150,7 @@ def _bounds_at(trial: Trial, name: str, speed: float) -> float:
 
 
 def _change(trial: Trial, contact: tuple[float, ...], name: str, speed: float) -> float:
-    """Return by how much the balance of a velocity differs between both directions."""
+    """Return the difference of a velocity's balance between both directions."""
     start, forces = trial.start, []
     for sign in (1.0, -1.0):
         x = start.state._replace(**{name: sign * speed})
@@ -173,7 +173,7 @@ OFF = 0.37
 
 
 def has_its_units(trial: Trial) -> Iterator[Evidence]:
-    """Find whether the model's members give the dimensions of its signals."""
+    """Check that the model's functions have the dimensions of its signals."""
     model, start = trial.model, trial.start
     par = with_units(start.par)
     x, m = _moved_signals(start.state), _moved_signals(start.memory)
@@ -252,11 +252,11 @@ def _all_fit(
 
 
 def _fits(what: str, value: Any, unit: str, trial: Trial, *members: str) -> Evidence:
-    text = f"{what} is {value}, wanted {unit}"
+    text = f"{what} is {value}, not {unit}"
     return Evidence(fits(value, unit), text, place=trial.place(*members))
 
 
-# --- Energies: a run gives what was put in, to losses and to what is stored
+# --- Energy balance: the energy input of a run goes to losses and to storage
 
 RESIDUAL = 1e-6
 """of the energy that is turned over: what may be left once the step's own error is taken off"""
@@ -264,7 +264,7 @@ ENERGY_SHARES = (LARGE, 0.05)
 
 
 def closes_its_energy(trial: Trial) -> Iterator[Evidence]:
-    """Find whether the recorded energies of a large and of a small run close, book by book.
+    """Check that the energy balances of a large and of a small run close.
 
     The step's own error falls with its square: of the residuals at two steps the difference tells
     it, and it is taken off.
@@ -283,7 +283,7 @@ def closes_its_energy(trial: Trial) -> Iterator[Evidence]:
         for book, each in turned.items():
             before = coarse[book].closing_error if book in coarse else each.closing_error
             left = (4.0 * each.closing_error - before) / 3.0 / each.turnover
-            where = f", in the book {book!r}" if book else ""
+            where = f", in the balance {book!r}" if book else ""
             text = (
                 f"{abs(left):.1e} of the {each.turnover:.3g} J of a {size} run are unexplained"
                 + where
@@ -292,7 +292,7 @@ def closes_its_energy(trial: Trial) -> Iterator[Evidence]:
 
 
 def _ledgers(run: Run) -> dict[str, Ledger]:
-    """Return the books of a run by name, the first one's empty."""
+    """Return the energy balances of a run by name; the first one has an empty name."""
     recording = record(run, simulate(run), 0.0, 0.0, {})
     first = actuator_ledger(recording)
     return {"": first, **further_ledgers(recording)}
@@ -301,7 +301,7 @@ def _ledgers(run: Run) -> dict[str, Ledger]:
 # --- Sensitivities: the exact derivatives of a run are its differences
 
 PARAMETERS = 8
-"""how many parameters are tried: those that move the states most"""
+"""number of tested parameters: those that move the states most"""
 INFLUENCE = 1e-3
 """relative change of a parameter by which its influence is judged"""
 DIFFERENCE = 1e-6
@@ -388,7 +388,7 @@ def _moved(run: Run, name: str, share: float) -> float:
 
 ORDER = 2.0
 SHORTFALL = 0.3
-"""by how much the observed order may fall short of two; a model of first order is off by one"""
+"""largest deviation of the observed order below two; a model of first order is at one"""
 HALVINGS = 4
 SMOOTH_SHARES = (1.0, 0.3, 0.1)
 SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03)
@@ -410,14 +410,14 @@ def is_of_second_order(trial: Trial) -> Iterator[Evidence]:
     """
     orders = list(_orders(trial, False, ORDER))
     if not orders:
-        raise NotCheckedError(f"from {trial.start.known} no state moves enough to tell it")
+        raise NotCheckedError(f"from {trial.start.known} no state moves enough for a check")
     yield from orders
     if trial.model.frictions:
         yield from _orders(trial, True, ORDER)
 
 
 def _orders(trial: Trial, frictions: bool, wanted: float) -> Iterator[Evidence]:
-    """Yield what is found of every state that moves enough to tell it."""
+    """Yield the evidence for every state that moves enough for a check."""
     start = trial.start
     steps = [start.step / 2**k for k in range(HALVINGS + 1)]
     names = start.state._fields
@@ -481,7 +481,7 @@ def has_agreeing_engines(trial: Trial) -> Iterator[Evidence]:
 
 
 def has_agreeing_lanes(trial: Trial) -> Iterator[Evidence]:
-    """Find whether an ensemble's lanes compute what the single run does."""
+    """Check that an ensemble's lanes compute the same as the single run."""
     if find_compiler() is None:
         raise NotCheckedError("there is no C compiler: install the extra bywire[compiler]")
     run = trial.large_run(frictions=True)
@@ -511,21 +511,21 @@ OF_A_SET: dict[str, Contract] = {
     "round trip": set_survives_json,
     "refusals": set_keeps_its_ranges,
 }
-"""what every parameter set has to keep"""
+"""contracts of every parameter set"""
 
 
 def has_faults_of_what_is_there(trial: Trial) -> Iterator[Evidence]:
-    """Find whether what may fail in a model names signals, tasks and parameters that it has."""
+    """Check that the failure modes of a model name known signals, tasks and parameters."""
     start = trial.start
     modes = modes_of(start.model, start.par)
-    yield Evidence(True, f"{len(modes)} ways to fail name what is there")
+    yield Evidence(True, f"{len(modes)} failure modes name known things")
     for mode in modes.values():
         if mode.changes is not None and not mode.lacks(start.par):
             for name in mode.changes(start.par, mode.value):
                 try:
                     start.par.value(name)
                 except (AttributeError, LookupError, ValueError):
-                    text = f"the fault {mode.name} changes {name}, which is no parameter here"
+                    text = f"the fault {mode.name} changes {name}, which is not a parameter here"
                     yield Evidence(False, text)
 
 
@@ -542,7 +542,7 @@ OF_A_MODEL: dict[str, Contract] = {
     "derivatives of a run": has_its_derivatives,
     "faults": has_faults_of_what_is_there,
 }
-"""what every model has to keep, where it starts with a parameter set"""
+"""contracts of every model with a start and a parameter set"""
 
 
 def demands_on_set(name: str, par: ParameterSet) -> Demands:
@@ -552,11 +552,11 @@ def demands_on_set(name: str, par: ParameterSet) -> Demands:
 
 
 OF_ITS_NUMBERS = ("exact rest", "hidden friction", "energy of a run")
-"""which of these hang on the numbers of a parameter set"""
+"""those of them that depend on the numbers of a parameter set"""
 
 
 def demands_on_model(name: str, trial: Trial, of_numbers: bool = False) -> Demands:
-    """Yield every contract that a model has to keep, or those alone that hang on its numbers."""
+    """Yield every contract of a model, or only those that depend on its numbers."""
     for contract, test in OF_A_MODEL.items():
         if not of_numbers or contract in OF_ITS_NUMBERS:
             yield Demand(contract, name, trial, test, trial.place())

@@ -1,4 +1,4 @@
-"""Contract of a model's linear model: it is what small motions of the plant do."""
+"""Contract of a model's linear model: it describes small motions of the plant."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ AT_REST = 1e-3
 
 
 def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
-    """Find whether the linear model of the plant gives its response to small moves.
+    """Check that the linear model of the plant gives its response to small motions.
 
     Loops of the model are not on a corner at their usual operating point.
 
@@ -82,7 +82,7 @@ def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
 
 
 def _require_loops_off_corners(trial: Trial) -> None:
-    """Refuse loops of the model whose usual operating point is on a corner of plant or law."""
+    """Reject loops of the model whose usual operating point is on a corner of plant or law."""
     for loop in LOOPS.all().values():
         if loop.assembly == trial.model.name:
             try:
@@ -146,7 +146,7 @@ _NEWTON = 8
 
 
 def is_linear_beside_its_corners(trial: Trial) -> Iterator[Evidence]:
-    """Find whether linear models hold, or are refused, where operations are on their corners.
+    """Check that linear models are valid, or rejected, where operations are on their corners.
 
     The plant's operating point is driven to the corner of each limit, choice and magnitude in its
     equations. There, a model that is returned without a word must hold on both sides; where it is
@@ -206,7 +206,7 @@ def _kink(kinks: list[Kink], order: int) -> Kink | None:
 
 
 def _beside(trial: Trial, at: SmoothPoint, free: NDArray[np.bool_], place: str) -> Evidence:
-    """Return whether the linear models at a corner are what the equations do beside it."""
+    """Return whether the linear models at a corner match the equations next to it."""
     model = trial.model
     n, m = at.state.size, at.memory.size
     state = cast(NamedTuple, cast(Any, model.State)(*at.state.tolist()))

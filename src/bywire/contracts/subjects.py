@@ -1,4 +1,4 @@
-"""What can be checked by name: brakes, models, experiments, elements, laws, parameter sets."""
+"""Subjects of checks by name: brakes, models, experiments, elements, laws, parameter sets."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def demands_on(name: str | None, figures: Collection[str]) -> Iterator[Demand]:
     ----------
     name
         Of a brake, a model, an experiment, an element, a control law or a parameter set;
-        everything installed where there is none.
+        everything installed by default.
     figures
         Names of the figures that experiments may ask for.
 
@@ -153,7 +153,7 @@ class Rehearsal:
         return (experiment.preview or experiment.cases)(self.par, options, stimulus)
 
     def recordings(self) -> Mapping[str, xr.Dataset]:
-        """Return what would be recorded of brakes at rest, zero everywhere."""
+        """Return recordings of brakes at rest, zero everywhere."""
         experiment, options = self.experiment, self.experiment.defaults
         recordings = {} if experiment.static is None else experiment.static(self.par, options)
         for case in self.cases:
@@ -197,7 +197,7 @@ def drives_stimuli(rehearsal: Rehearsal) -> Iterator[Evidence]:
 
 
 def judges_what_is_recorded(rehearsal: Rehearsal) -> Evidence:
-    """Return whether the key figures that it gives are those that it declares.
+    """Return whether the computed key figures are the declared ones.
 
     Raises
     ------
@@ -210,15 +210,15 @@ def judges_what_is_recorded(rehearsal: Rehearsal) -> Evidence:
     except (KeyError, AttributeError, UnknownNameError):
         raise  # it names what is not there
     except Exception as error:
-        raise NotCheckedError(f"nothing is recorded that moves: {error}") from error
+        raise NotCheckedError(f"no recorded signal moves: {error}") from error
     declared = experiment.kpis_with(options)
     missing = [name for name in declared if name not in given]
     if missing:
-        return Evidence(False, f"declared key figures that it never gives: {', '.join(missing)}")
+        return Evidence(False, f"it never computes the declared key figures {', '.join(missing)}")
     other = [name for name, unit in given.items() if declared.get(name) != unit]
     if other:
         texts = [f"{name} in {given[name]}" for name in other]
-        return Evidence(False, f"key figures that it gives undeclared: {', '.join(texts)}")
+        return Evidence(False, f"it does not declare the key figures {', '.join(texts)}")
     return Evidence(True, f"{len(given)} key figures")
 
 
@@ -233,7 +233,7 @@ OF_AN_EXPERIMENT: dict[str, Contract] = {
     "stimuli": drives_stimuli,
     "key figures": judges_what_is_recorded,
 }
-"""what every experiment has to keep"""
+"""contracts of every experiment"""
 
 
 def demands_on_experiment(experiment: Experiment, figures: Collection[str]) -> Demands:

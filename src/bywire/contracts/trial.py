@@ -1,4 +1,4 @@
-"""One model with one parameter set on trial: where its runs start, and what they share."""
+"""Trial of one model with one parameter set: start of its runs, and what they share."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def start_of(model: Model, par: ParameterSet) -> Start:
 
 
 def start_of_a_rig(model: Model, sets: Iterable[ParameterSet], module: str) -> Start:
-    """Return where an experiment starts a model that has no parameter set of its own.
+    """Return the start of a model without parameter set in an experiment.
 
     Parameters
     ----------
@@ -134,8 +134,9 @@ def start_of_a_rig(model: Model, sets: Iterable[ParameterSet], module: str) -> S
         for start in _cases(model, par, module):
             return start
     raise ParameterError(
-        f"there is no parameter set for a {model.name}, and no experiment starts one with those of "
-        "its brake: declare a bywire.CitedSet of that assembly"
+        f"there is no parameter set for a {model.name}, and no experiment starts one with the sets "
+        "of its brake: declare a bywire.CitedSet of that assembly",
+        name=model.name,
     )
 
 
@@ -339,7 +340,7 @@ LARGE = 0.5
 
 
 class Trial:
-    """A model where it starts, with what runs from there have in common.
+    """Model at its start, with results that its runs share.
 
     Parameters
     ----------

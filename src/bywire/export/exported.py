@@ -112,8 +112,10 @@ def cases_of(bench: Bench) -> tuple[Case, ...]:
     cases = bench.cases()
     if not cases:
         raise ParameterError(
-            f"experiment {bench.experiment!r} computes a characteristic without any run, and "
-            "there is nothing to export: take another experiment, for instance 'open-loop'"
+            f"experiment {bench.experiment!r} computes a characteristic without any run, so that "
+            "there is nothing to export: take another experiment, for instance 'open-loop'",
+            name="experiment",
+            value=repr(bench.experiment),
         )
     return cases
 
@@ -139,15 +141,18 @@ def exported(bench: Bench, label: str = "") -> Exported:
         raise unknown_name("run", label, labels)
     if not label and len(cases) > 1:
         raise ParameterError(
-            f"the bench makes {len(cases)} runs, and one is exported: choose it, "
-            f"case = {' or '.join(map(repr, labels))}"
+            f"the bench makes {len(cases)} runs, but only one is exported: choose it, "
+            f"case = {' or '.join(map(repr, labels))}",
+            name="case",
+            valid=", ".join(labels),
         )
     number = labels.index(label) if label else 0
     run = run_of(bench, cases[number], number)
     if run.changes:
         raise ParameterError(
             "parameters of this bench change during the run, which cannot be exported: leave out "
-            "its [[faults]], or export it with the changed parameters"
+            "its [[faults]], or export it with the changed parameters",
+            name="[[faults]]",
         )
     return Exported(bench, number, cases[number], run)
 

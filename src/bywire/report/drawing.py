@@ -312,7 +312,7 @@ def figure_bytes(figure: Figure | Picture, kind: str = "png") -> bytes:
         For any other kind.
     """
     if kind not in _KINDS:
-        raise FileError(f"figures are written as .png or .svg, not as {kind!r}: change the ending")
+        raise FileError(f"figures are not written as {kind!r}: change the ending to .png or .svg")
     if isinstance(figure, Picture):
         return figure.png if kind == "png" else figure.svg
     if figure.stale or figure not in _drawn:

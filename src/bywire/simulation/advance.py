@@ -107,8 +107,8 @@ def require_work(work: Any, most: Any) -> None:
         raise WorkLimitError(
             f"the run takes more work than {np.min(most):.3g} substeps: contacts or frictions "
             "rarely settle; look for an extreme parameter",
-            name="most_work",
-            value=f"{np.min(most):.3g}",
+            name="work",
+            value=f"{np.min(most):.3g} substeps",
         )
 
 

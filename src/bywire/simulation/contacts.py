@@ -150,7 +150,7 @@ def overlaps(model: Model, par: ParameterSet) -> Callable[[Any, Any], Any]:
     gap = column([d for group in groups for d in group])
     if any(nonlinear(gap, state)):
         raise SolverError(
-            f"{model.name}: the overlaps of contacts must be affine in the state", name="gap"
+            f"{model.name}: the overlaps of contacts must be affine in the state", name="overlaps"
         )
     slope = ca.jacobian(gap, state)
     rest = ca.substitute(gap, state, SX.zeros(n))

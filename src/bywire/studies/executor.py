@@ -161,7 +161,7 @@ def _client(address: str) -> Iterator[Any]:
     except (OSError, ValueError, TimeoutError) as error:
         raise RunError(
             f"no cluster answers at {address!r} ({error}): start one with 'dask scheduler' and "
-            "'dask worker', and give the address that the scheduler says"
+            "'dask worker', and give the address that the scheduler prints"
         ) from None
     log = logging.getLogger("distributed.client")  # it would print how a connection is lost
     before = log.level
@@ -342,10 +342,14 @@ def require_workers(workers: int | None, cluster: str, engine: str) -> None:
     if engine == CUDA and (workers is not None or cluster):
         raise ParameterError(
             "engine = 'cuda' computes all cases on one graphics processor: leave out "
-            f"{option('cluster' if cluster else 'workers')}"
+            f"{option('cluster' if cluster else 'workers')}",
+            name=option("cluster" if cluster else "workers"),
         )
     if cluster and workers is not None:
-        raise ParameterError("workers of a cluster are the cluster's own: leave one out")
+        raise ParameterError(
+            f"a cluster has its own workers: leave out {option('workers')} or {option('cluster')}",
+            name=option("workers"),
+        )
 
 
 # What a process of a pool computes: given once, and not with every job.

@@ -418,7 +418,7 @@ def design(
     """
     if not tunables:
         raise ParameterError(
-            "there is nothing to tune: set fewer of the loop's parameters", name="overrides"
+            "there is nothing to tune: set fewer of the loop's parameters", name="parameters"
         )
     floors = linear_floors(requirements, largest_error(cases, start))
     problem = Problem(tunables, (*requirements, *floors), tuple(cases))

@@ -244,7 +244,7 @@ def cases_of(
         raise ParameterError(
             f"the ranges have {len(combinations)} combinations, more than {_MOST}: take fewer "
             "values",
-            name="over",
+            name="ranges",
             value=str(len(combinations)),
             valid=f"<= {_MOST}",
         )

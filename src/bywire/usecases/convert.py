@@ -101,8 +101,10 @@ def convert(
     for name, value in {"method": method, "exclude": left_out, "max_gap": max_gap}.items():
         if value and rate is None:
             raise ParameterError(
-                f"{option(name)} {value}: it says how to resample: give the rate too, as "
-                f"{option('rate')} '1 kHz'"
+                f"{option(name)} {value} is only for resampling: also give the rate, as "
+                f"{option('rate')} '1 kHz'",
+                name=option(name),
+                value=str(value),
             )
     dataset, notes = read_wanted(source, mapping_of(mapping), signals, time, shown)
     report = None

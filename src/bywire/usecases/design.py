@@ -149,7 +149,10 @@ def design(
 
     whole_number("seed", seed, 0, 2**63 - 1)
     if schedule and vary:
-        raise ParameterError("schedule and vary: gains by region are not chosen for drawn models")
+        raise ParameterError(
+            "schedule and vary exclude each other: gains by region are not chosen for drawn models",
+            name="schedule",
+        )
     sizes = None if linear_only else amplitudes
     if schedule:
         return designed_by_region(

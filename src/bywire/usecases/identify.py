@@ -193,11 +193,14 @@ def _asked(
     if measurements or synthetic is not None:
         raise ParameterError(
             f"{method}: give only one of measurement files, {option('synthetic')} SEED, "
-            f"{option('study')} COUNT"
+            f"{option('study')} COUNT",
+            name=option("study"),
         )
     for name, value in {"mapping": mapping, "time": time or None, "holdout": holdout}.items():
         if value is not None:
-            raise ParameterError(f"{option(name)} is for measurement files: leave it out")
+            raise ParameterError(
+                f"{option(name)} is for measurement files: leave it out", name=option(name)
+            )
     return trust(method, study, starts=starts or 1, **shared)
 
 

@@ -9,6 +9,7 @@ import pytest
 from analysis.small_linear_models import model_of
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.core.errors import ParameterError, UnknownNameError
+from raising import raises
 
 
 def chain(gain: float = 2.0, slow: float = 3.0, fast: float = 40.0) -> LinearModel:
@@ -78,5 +79,5 @@ def test_state_space_has_names_and_the_same_response(period: float) -> None:
 
 def test_a_sample_time_of_ages_is_one_error():
     """Numbers of an unstable model overflow."""
-    with pytest.raises(ParameterError, match=r"sampled every 1\.3e\+19 s has no finite numbers"):
+    with raises(ParameterError, name="sample time", value="1.3e+19 s"):
         model_of(1.0, 1.0, 1.0).sampled(1.3e19)

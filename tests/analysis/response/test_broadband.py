@@ -80,7 +80,7 @@ def test_phases_are_drawn_from_the_seed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("frequencies", "count", "text"), [((5.0, 3.0), 1, "ascending"), ((3.0,), 0, "at least 1")]
+    ("frequencies", "count", "text"), [((5.0, 3.0), 1, "ascending"), ((3.0,), 0, ">= 1")]
 )
 def test_bad_requests(frequencies, count, text) -> None:
     sweep = Sweep(("u",), "y", frequencies, (1.0,), flags=())

@@ -127,8 +127,8 @@ def test_wrong_values_are_refused(kind, changes, error, text):
     [
         ("step", {"start": 0, "end": 1}, "stimulus 'step': t_step is missing"),
         ("table", {"times": [0, 1, 1], "values": [0, 1, 2], "between": "hold"}, "must increase"),
-        ("table", {"times": [0, 1], "values": [0], "between": "hold"}, "of one length"),
-        ("table", {"times": [], "values": [], "between": "hold"}, "of one length >= 1"),
+        ("table", {"times": [0, 1], "values": [0], "between": "hold"}, "the same length"),
+        ("table", {"times": [], "values": [], "between": "hold"}, "the same length >= 1"),
         (
             "multisine",
             {"mean": 0, "amplitude": 1, "f_base": 1, "n": 2.5, "t_start": 0},

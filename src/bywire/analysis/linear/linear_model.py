@@ -269,7 +269,7 @@ class LinearModel:
             raise ParameterError(
                 f"a model with the sample time {period:g} s has no finite numbers: take a shorter "
                 "sample time",
-                name="period",
+                name="sample time",
                 value=f"{period:g} s",
             )
         B = np.zeros_like(self.B)

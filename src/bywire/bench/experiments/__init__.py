@@ -1,1 +1,1 @@
-"""Virtual tests, one per file."""
+"""Generic experiments, one per file."""

@@ -1,4 +1,4 @@
-"""Duty: an input is held, or comes again and again, until the motor is warm."""
+"""Duty: an input is held, or applied periodically, until the motor is warm."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Options(ParameterSet):
     """The applications, from time zero on."""
 
     input: str
-    """stimulus of the model that is applied; its only one unless given"""
+    """applied stimulus of the model; by default its only one"""
     output: str
-    """recorded signal that answers; the first one of the input's unit unless given"""
+    """recorded signal that responds; by default the first one with the input's unit"""
     start: InputLevel
     """input between the applications"""
     end: InputLevel
@@ -32,7 +32,7 @@ class Options(ParameterSet):
     period: Duration
     """time from one application to the next"""
     share: Share
-    """share of it in which the input is applied; 1 holds it"""
+    """share of the period in which the input is applied; 1 holds it"""
     duration: Duration
     """time recorded"""
     record: Duration
@@ -41,8 +41,8 @@ class Options(ParameterSet):
     """time before the first application"""
 
 
-def build(subject: TestedModel) -> Experiment:
-    """Return the experiment of a model, judged by how warm it gets and what is left then."""
+def build(tested: TestedModel) -> Experiment:
+    """Return the experiment of a model, judged by its temperatures and its output when warm."""
 
     def course(options: Any, _: Mapping[str, Stimulus]) -> Course:
         def applied(t: Any) -> Any:
@@ -52,7 +52,7 @@ def build(subject: TestedModel) -> Experiment:
 
         return applied
 
-    return subject.experiment(course, {"warming": lambda _: warming.Setting(subject.output)})
+    return tested.experiment(course, {"warming": lambda _: warming.Setting(tested.output)})
 
 
 GENERIC = GenericExperiment(

@@ -1,4 +1,4 @@
-"""Open loop: any course of any input."""
+"""Open loop: any stimulus at any input."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from bywire.core.quantities import Duration, TimeConstant
 
 
 class Options(ParameterSet):
-    """What is driven, and what is looked at."""
+    """Driven input and judged output."""
 
     input: str
-    """stimulus of the model that [stimulus] drives; its only one unless given"""
+    """stimulus of the model that [stimulus] drives; by default its only one"""
     output: str
-    """recorded signal that is judged; the first one of the input's unit unless given"""
+    """judged signal of the recording; by default the first one with the input's unit"""
     duration: Duration
     """length of the run"""
     record: Duration
@@ -25,12 +25,12 @@ class Options(ParameterSet):
     """time before zero, at the stimulus' first value"""
 
 
-def build(subject: TestedModel) -> Experiment:
+def build(tested: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by the extremes of the output."""
-    return subject.experiment(
+    return tested.experiment(
         lambda options, stimuli: required_stimulus(stimuli.get(""), "open-loop").sample,
-        {"extremes": lambda options: extremes.Setting(subject.output)},
-        driven_unit=lambda _: subject.units["input"],
+        {"extremes": lambda options: extremes.Setting(tested.output)},
+        driven_unit=lambda _: tested.units["input"],
     )
 
 

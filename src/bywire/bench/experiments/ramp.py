@@ -1,4 +1,4 @@
-"""Ramp: an input goes slowly up and down again, for the loop that friction and play open."""
+"""Ramp: an input moves slowly up and down, for the loop that friction and backlash cause."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class Options(ParameterSet):
     """The ramp, from time zero on."""
 
     input: str
-    """stimulus of the model that is ramped; its only one unless given"""
+    """ramped stimulus of the model; by default its only one"""
     output: str
-    """recorded signal that answers; the first one of the input's unit unless given"""
+    """recorded signal that responds; by default the first one with the input's unit"""
     drive: str
-    """input or recorded signal that drives the loop, such as a current; the input unless given"""
+    """input or recorded signal that drives the loop, such as a current; by default the input"""
     start: InputLevel
     """input at the beginning and at the end"""
     end: InputLevel
@@ -46,14 +46,17 @@ class Options(ParameterSet):
     """moving average for the loop's key figures, 0 for the raw signals"""
 
 
-def build(subject: TestedModel) -> Experiment:
+def build(tested: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by its loop and the extremes of the output."""
-    drive, unit = subject.units["drive"], subject.units["input"]
+    drive, unit = tested.units["drive"], tested.units["input"]
 
     def course(options: Any, _: Mapping[str, Stimulus]) -> Course:
         if options.start == options.end:
             raise ParameterError(
-                f"options.start and options.end are both {options.end:g} {unit}: that is no ramp"
+                f"options.start and options.end are both {options.end:g} {unit}: a ramp needs "
+                "different levels",
+                name="options.end",
+                value=f"{options.end:g} {unit}",
             )
         shape = ramp.Parameters(
             start=options.start,
@@ -70,15 +73,15 @@ def build(subject: TestedModel) -> Experiment:
 
     def loop(options: Any) -> hysteresis.Setting:
         return hysteresis.Setting(
-            subject.names["drive"], subject.output, options.smoothing, demand=subject.input
+            tested.names["drive"], tested.output, options.smoothing, demand=tested.input
         )
 
-    return subject.experiment(
+    return tested.experiment(
         course,
-        {"hysteresis": loop, "extremes": lambda options: extremes.Setting(subject.output)},
+        {"hysteresis": loop, "extremes": lambda options: extremes.Setting(tested.output)},
         "hysteresis-loop",
         duration=duration,
-        resolved={"drive": drive, "drive*response": f"{drive}*{subject.units['output']}"},
+        resolved={"drive": drive, "drive*response": f"{drive}*{tested.units['output']}"},
         loop=loop,
     )
 

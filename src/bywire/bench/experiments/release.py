@@ -25,9 +25,9 @@ class Options(ParameterSet):
     """The release, from time zero on."""
 
     input: str
-    """stimulus of the model that falls; its only one unless given"""
+    """falling stimulus of the model; by default its only one"""
     output: str
-    """recorded signal that is released; the first one of the input's unit unless given"""
+    """released signal of the recording; by default the first one with the input's unit"""
     start: InputLevel
     """input before the release"""
     end: InputLevel
@@ -35,24 +35,24 @@ class Options(ParameterSet):
     t_ramp: TimeConstant
     """time in which the input falls, 0 for at once"""
     empty: OutputLevel
-    """output below which it counts as released"""
+    """level of the output below which it counts as released"""
     duration: Duration
     """time recorded after the release begins"""
     record: Duration
     """recording interval"""
     settle: TimeConstant
-    """time before the release in which the output builds up"""
+    """time before the release, in which the output builds up"""
 
 
-def build(subject: TestedModel) -> Experiment:
-    """Return the experiment of a model, judged by the time to empty and what is left."""
+def build(tested: TestedModel) -> Experiment:
+    """Return the experiment of a model, judged by the time to empty and the residual."""
 
     def course(options: Any, _: Mapping[str, Stimulus]) -> Course:
         ramp, fall = max(options.t_ramp, 1e-9), options.end - options.start
         return lambda t: options.start + fall * np.clip(t / ramp, 0.0, 1.0)
 
-    return subject.experiment(
-        course, {"release": lambda options: release.Setting(subject.output, options.empty)}
+    return tested.experiment(
+        course, {"release": lambda options: release.Setting(tested.output, options.empty)}
     )
 
 

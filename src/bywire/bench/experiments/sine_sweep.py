@@ -1,4 +1,4 @@
-"""Sine sweep: sines of rising frequency at an input, one after the other, in whole periods."""
+"""Sine sweep: sines with increasing frequency at an input, each over whole periods."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from bywire.bench.generic_experiment import (
 )
 from bywire.bench.kpis import sine_sweep
 from bywire.bench.stimulus import Stimulus
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, TimeConstant, Unit
 from bywire.core.typing import Array
 
 Count = Annotated[int, Unit("1", 5.0), Field(ge=1, le=1000)]
 
-_LEAST_ROWS = 8  # of the recording in the shortest period
+_LEAST_ROWS = 8  # least rows of the recording in the shortest period
 
 
 class Options(ParameterSet):
     """The sines, from time zero on."""
 
     input: str
-    """stimulus of the model that is shaken; its only one unless given"""
+    """excited stimulus of the model; by default its only one"""
     output: str
-    """recorded signal that answers; the first one of the input's unit unless given"""
+    """recorded signal that responds; by default the first one with the input's unit"""
     mean: InputLevel
     """mean of the input"""
     amplitude: InputAmplitude
@@ -45,18 +45,18 @@ class Options(ParameterSet):
     f_end: Frequency
     """highest frequency"""
     n: Count
-    """how many frequencies, evenly over the logarithm"""
+    """number of frequencies, with logarithmic spacing"""
     n_settle: Count
-    """periods at each frequency before its response is looked at"""
+    """settling periods at each frequency"""
     n_periods: Count
-    """periods over which it is looked at"""
+    """evaluated periods at each frequency"""
     record: Duration
     """recording interval"""
     settle: TimeConstant
     """time before the first sine, at the mean"""
 
 
-def build(subject: TestedModel) -> Experiment:
+def build(tested: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by gain, bandwidth and lag."""
 
     def driven(options: Any, _: Mapping[str, Stimulus]) -> Course:
@@ -64,10 +64,10 @@ def build(subject: TestedModel) -> Experiment:
         return lambda t: course(t, options)
 
     def sweep(options: Any) -> sine_sweep.Setting:
-        return sine_sweep.Setting(subject.input, subject.output, windows(options))
+        return sine_sweep.Setting(tested.input, tested.output, windows(options))
 
-    gain = sine_sweep.gain_unit(subject.units["input"], subject.units["output"])
-    return subject.experiment(
+    gain = sine_sweep.gain_unit(tested.units["input"], tested.units["output"])
+    return tested.experiment(
         driven,
         {"sine_sweep": sweep},
         "sine-sweep",
@@ -78,17 +78,17 @@ def build(subject: TestedModel) -> Experiment:
 
 
 def windows(options: Any) -> tuple[tuple[float, float, float], ...]:
-    """Return frequency [Hz], beginning and end [s] of what is looked at, of every sine."""
+    """Return frequency [Hz], and start and end [s] of the evaluated periods, of every sine."""
     spans, begin = [], 0.0
     for f in np.geomspace(options.f_start, options.f_end, options.n):
-        looked = begin + options.n_settle / f
-        begin = looked + options.n_periods / f
-        spans.append((float(f), float(looked), float(begin)))
+        settled = begin + options.n_settle / f
+        begin = settled + options.n_periods / f
+        spans.append((float(f), float(settled), float(begin)))
     return tuple(spans)
 
 
 def course(t: Array, options: Any) -> Array:
-    """Return the input [SI] at times [s]: each sine begins and ends at its mean."""
+    """Return the input [SI] at times [s]: each sine starts and ends at its mean."""
     phase, begin = np.zeros(t.shape), 0.0
     for f, _, end in windows(options):
         inside = (t >= begin) & (t < end)
@@ -98,17 +98,18 @@ def course(t: Array, options: Any) -> Array:
 
 
 def _require_rows(options: Any) -> None:
-    """Refuse a recording that cannot show the highest frequency, and frequencies that fall."""
+    """Reject recordings that are too coarse for the highest frequency, and falling frequencies."""
     if options.f_end < options.f_start:
-        raise ParameterError(
-            f"options.f_end = {options.f_end:g} Hz is below options.f_start = "
-            f"{options.f_start:g} Hz: a sweep rises"
-        )
+        start = f">= options.f_start = {options.f_start:g} Hz"
+        raise not_valid("options.f_end", f"{options.f_end:g} Hz", start)
     longest = 1.0 / (_LEAST_ROWS * options.f_end)
     if options.record > longest:
         raise ParameterError(
             f"options.record = {options.record:g} s is too long for sines of {options.f_end:g} Hz: "
-            f"it must be <= {longest:g} s"
+            f"it must be <= {longest:g} s",
+            name="options.record",
+            value=f"{options.record:g} s",
+            valid=f"<= {longest:g} s",
         )
 
 

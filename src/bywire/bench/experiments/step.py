@@ -18,9 +18,9 @@ class Options(ParameterSet):
     """The step, at time zero."""
 
     input: str
-    """stimulus of the model that steps; its only one unless given"""
+    """stepped stimulus of the model; by default its only one"""
     output: str
-    """recorded signal that answers; the first one of the input's unit unless given"""
+    """recorded signal that responds; by default the first one with the input's unit"""
     start: InputLevel
     """input before the step"""
     end: InputLevel
@@ -35,23 +35,23 @@ class Options(ParameterSet):
     """moving average for the step's key figures, 0 for the raw output"""
 
 
-def build(subject: TestedModel) -> Experiment:
+def build(tested: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by its step response."""
 
     def step(options: Any) -> step_response.Setting:
-        """Return the step; without a set point its levels are those of the response."""
-        if not subject.is_set_point:
-            return step_response.Setting(subject.output, 0.0, smoothing=options.smoothing)
+        """Return the step's setting; without a set point, its levels are those of the response."""
+        if not tested.is_set_point:
+            return step_response.Setting(tested.output, 0.0, smoothing=options.smoothing)
         return step_response.Setting(
-            subject.output,
+            tested.output,
             0.0,
             options.start,
             options.end,
             smoothing=options.smoothing,
-            set_point=subject.input,
+            set_point=tested.input,
         )
 
-    return subject.experiment(
+    return tested.experiment(
         lambda options, _: lambda t: np.where(reached(t, 0.0), options.end, options.start),
         {"step_response": step},
         "step-response",

@@ -1,7 +1,7 @@
 """Stribeck curve: dry friction of a model over speed, at several values of another state.
 
-Nothing runs: the bounds of the friction are evaluated where the model rests, with contacts pressed
-as its overlaps say.
+Nothing is simulated: the bounds of the friction are evaluated with the model at rest, with contact
+forces from its overlaps.
 """
 
 from __future__ import annotations
@@ -28,28 +28,28 @@ Levels = Annotated[
 ]
 
 _FORCES = {"rad/s": "N*m", "m/s": "N", "m**3/s": "Pa"}
-"""what acts against a velocity: its product with it is a power"""
-_SIDE = 401  # speeds in each direction
-_SWEEPS, _SETTLED = 500, 1e-12  # of the contact forces; their change, of the largest
+"""unit of the force against a velocity: their product is a power"""
+_SIDE = 401  # number of speeds in each direction
+_SWEEPS, _SETTLED = 500, 1e-12  # largest number of sweeps; relative change of settled forces
 
 
 class Options(ParameterSet):
-    """Where the curves are drawn."""
+    """Speeds and levels of the curves."""
 
     friction: str
-    """velocity with dry friction; the model's first one unless given"""
+    """velocity with dry friction; by default the model's first one"""
     along: str
-    """state that the friction depends on, one curve for each level; the velocity: one curve"""
+    """state that affects the friction, with one curve per level; the velocity: a single curve"""
     levels: Levels
     """levels of that state"""
     speed_max: Speed
     """largest speed, both directions"""
 
 
-def build(subject: TestedModel) -> Experiment:
+def build(tested: TestedModel) -> Experiment:
     """Return the experiment of a model."""
-    velocity, along = subject.names["friction"], subject.names["along"]
-    force = _FORCES.get(subject.units["friction"], f"W/({subject.units['friction']})")
+    velocity, along = tested.names["friction"], tested.names["along"]
+    force = _FORCES.get(tested.units["friction"], f"W/({tested.units['friction']})")
 
     figures = Figures(
         breakaway_forward=(
@@ -64,13 +64,13 @@ def build(subject: TestedModel) -> Experiment:
     )
 
     def static(par: Any, options: Any) -> dict[str, xr.Dataset]:
-        """Return friction over level and speed; at rest the breakaway force of each side."""
+        """Return friction over level and speed; at rest the breakaway force in each direction."""
         side = np.linspace(0.0, options.speed_max, _SIDE)
         speeds = np.concatenate((-side[::-1], side))
         values = np.array(
-            [_curve(subject.model, par, velocity, along, level, side) for level in options.levels]
+            [_curve(tested.model, par, velocity, along, level, side) for level in options.levels]
         )
-        states = signals_of(subject.model.State)
+        states = signals_of(tested.model.State)
         dims = (f"{along}_level" if along == velocity else along, velocity)
         labels = (states[along].label, states[velocity].label)
         axes = (np.array(options.levels), speeds)
@@ -95,10 +95,10 @@ def build(subject: TestedModel) -> Experiment:
 
     return Experiment(
         name=GENERIC.name,
-        assembly=subject.model.name,
+        assembly=tested.model.name,
         summary=GENERIC.summary,
-        options=subject.options,
-        defaults=subject.defaults,
+        options=tested.options,
+        defaults=tested.defaults,
         cases=lambda *_: (),
         judge=judge,
         kpis=figures.units,
@@ -108,7 +108,7 @@ def build(subject: TestedModel) -> Experiment:
 
 
 def _curve(model: Model, par: Any, velocity: str, along: str, level: float, side: Array) -> Array:
-    """Return the friction at speeds of both signs: -0 and +0 are both ends of the rest."""
+    """Return the friction at speeds of both signs; -0 and +0 give both breakaway forces."""
     rest, memory = at_rest(model, par)
     place = model.frictions.index(velocity)
 
@@ -131,7 +131,7 @@ def contact_forces(model: Model, x: Any, par: Any) -> tuple[float, ...]:
     Raises
     ------
     ParameterError
-        When they do not settle.
+        When the forces do not settle.
     """
     forces: list[float] = []
     for matrix, overlaps in zip(model.compliance(par), model.gap(x, x, par), strict=True):
@@ -144,7 +144,9 @@ def contact_forces(model: Model, x: Any, par: Any) -> tuple[float, ...]:
             if np.max(np.abs(F - before), initial=0.0) <= _SETTLED * np.max(F, initial=0.0):
                 break
         else:
-            raise ParameterError(f"{model.name}: the contacts do not settle at this state")
+            raise ParameterError(
+                f"{model.name}: the contacts do not settle at this state", name=model.name
+            )
         forces += F.tolist()
     return tuple(forces)
 

@@ -14,12 +14,12 @@ from bywire.core.quantities import Duration, TimeConstant
 
 
 class Options(ParameterSet):
-    """What follows what."""
+    """Set point and output."""
 
     input: str
-    """stimulus of the model that [stimulus] drives, the set point; its only one unless given"""
+    """stimulus of the model that [stimulus] drives, the set point; by default its only one"""
     output: str
-    """recorded signal that follows, of the same unit; the first one of that unit unless given"""
+    """recorded signal that follows, in the same unit; by default the first one in that unit"""
     duration: Duration
     """length of the run"""
     record: Duration
@@ -30,29 +30,32 @@ class Options(ParameterSet):
     """moving average for the tracking's key figures, 0 for the raw output"""
 
 
-def build(subject: TestedModel) -> Experiment:
+def build(tested: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by how well the output follows.
 
     Raises
     ------
     ParameterError
-        When the output is of another unit than the input.
+        When the output has another unit than the input.
     """
-    if not subject.is_set_point:
+    if not tested.is_set_point:
         raise ParameterError(
-            f"options.output: {subject.output} is in {subject.units['output']}, and the set point "
-            f"{subject.input} in {subject.units['input']}: name an output of that unit"
+            f"options.output: {tested.output} is in {tested.units['output']}, and the set point "
+            f"{tested.input} in {tested.units['input']}: name an output in that unit",
+            name="options.output",
+            value=tested.output,
+            valid=f"an output in {tested.units['input']}",
         )
 
     def followed(options: Any) -> tracking.Setting:
-        return tracking.Setting(subject.output, subject.input, options.smoothing)
+        return tracking.Setting(tested.output, tested.input, options.smoothing)
 
-    return subject.experiment(
+    return tested.experiment(
         lambda options, stimuli: required_stimulus(stimuli.get(""), "tracking").sample,
         {"tracking": followed},
         "tracking",
         followed=followed,
-        driven_unit=lambda _: subject.units["input"],
+        driven_unit=lambda _: tested.units["input"],
     )
 
 

@@ -14,7 +14,7 @@ from bywire.core.quantities import Duration, Frequency, TimeConstant
 
 
 class Parameters(ParameterSet):
-    """Mean, amplitude and course of the frequency."""
+    """Mean, amplitude and frequencies."""
 
     mean: Level
     """mean value, and the value before ``t_start``"""
@@ -29,7 +29,7 @@ class Parameters(ParameterSet):
     t_start: TimeConstant = 0.0
     """instant at which the sweep begins, with phase zero"""
     sweep: Literal["linear", "logarithmic"]
-    """course of the frequency: equal Hz or equal octaves in equal times"""
+    """course of the frequency: linear in time, or logarithmic"""
 
 
 def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ from bywire.core.quantities import Frequency, TimeConstant
 
 
 class Parameters(ParameterSet):
-    """Mean, amplitude and harmonics."""
+    """Mean, amplitude and number of harmonics."""
 
     mean: Level
     """mean value, and the value before ``t_start``"""

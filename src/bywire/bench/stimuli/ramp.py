@@ -1,4 +1,4 @@
-"""A ramp from one level to another, a hold there, and, if wanted, the ramp back."""
+"""A ramp from one level to another, a hold there, and optionally the ramp back."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class Parameters(ParameterSet):
     start: Level
     """value before the ramp"""
     end: Level
-    """value that the ramp leads to, above or below ``start``"""
+    """value at the end of the ramp, above or below ``start``"""
     slope: LevelRate
-    """magnitude of the slope, there and back"""
+    """magnitude of the slope, in both directions"""
     t_start: TimeConstant = 0.0
     """instant at which the ramp begins"""
     t_hold: TimeConstant
-    """time spent at ``end`` before the way back"""
+    """time at ``end`` before the ramp back"""
     after: Literal["stay", "return"]
     """what follows the hold: ``stay`` at ``end`` or ``return`` to ``start``"""
 

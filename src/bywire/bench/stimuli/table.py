@@ -17,7 +17,7 @@ Numbers = tuple[Annotated[float, Field(allow_inf_nan=False)], ...]
 
 
 class Parameters(ParameterSet):
-    """Nodes and what happens between them."""
+    """Nodes and interpolation."""
 
     times: Annotated[Numbers, Unit("s")]
     """instants of the nodes, increasing"""
@@ -31,7 +31,7 @@ class Parameters(ParameterSet):
         t, u = self.times, self.values
         if len(t) != len(u) or not t:
             raise ValueError(
-                f"a table needs times and values of one length >= 1, got {len(t)} and {len(u)}"
+                f"times and values must have the same length >= 1, got {len(t)} and {len(u)}"
             )
         for a, b in pairwise(t):
             if a >= b:
@@ -40,7 +40,7 @@ class Parameters(ParameterSet):
 
 
 def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
-    """Return the table's values; outside its range the nearest end holds."""
+    """Return the table's values, constant beyond its ends."""
     if par.between == "linear":
         return np.interp(t, par.times, par.values)
     passed = np.searchsorted(np.asarray(par.times), t + TOLERANCE, side="right") - 1

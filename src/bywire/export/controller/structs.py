@@ -235,7 +235,7 @@ def literal(value: Known, structs: Structs) -> Expr:
     if isinstance(value.value, bool):
         return Expr("true" if value.value else "false", truth=True)
     if not is_number(value):
-        raise TypeError(f"{value.value!r} is no number")
+        raise TypeError(f"{value.value!r} is not a number")
     if value.name:
         return Expr(value.name, uses=frozenset({("constant", value.name, float(value.value))}))
     text = structs.precision.literal(value.value)
