@@ -23,7 +23,6 @@ from bywire.vehicle import ideal_stop
 from bywire.vehicle.surfaces import laid
 from bywire.vehicle.two_wheeler import VehicleParameters
 
-RidingSpeed = ideal_stop.RidingSpeed
 Course = Callable[[Array], Array]
 Vehicle = tuple[type[Any], Callable[..., tuple[Any, Any]]]
 Demand = Annotated[float, Unit("Pa", 4e6), Field(ge=0, allow_inf_nan=False)]

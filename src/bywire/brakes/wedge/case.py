@@ -148,22 +148,19 @@ FRICTIONLESS = {
 counts of an encoder would keep the shafts moving"""
 
 
-def _distinct(values: tuple[float, ...]) -> tuple[float, ...]:
-    tags = [tag(value) for value in values]
-    for k, value in enumerate(values):
-        if tags[k] in tags[:k]:
-            raise ValueError(f"{value:g} is given twice: leave one out")
-    return values
+def distinct(
+    name: Callable[[float], str], unit: str = ""
+) -> Callable[[tuple[float, ...]], tuple[float, ...]]:
+    """Return a validator of values whose names in labels must differ."""
 
+    def check(values: tuple[float, ...]) -> tuple[float, ...]:
+        names = [name(value) for value in values]
+        for k, value in enumerate(values):
+            if names[k] in names[:k]:
+                raise ValueError(f"{value:g}{unit} is given twice: leave one out")
+        return values
 
-Coefficient = Annotated[float, Field(gt=0, le=2, allow_inf_nan=False)]
-Coefficients = Annotated[
-    tuple[Coefficient, ...],
-    Unit("1", 0.35),
-    Field(min_length=1, max_length=100),
-    AfterValidator(_distinct),
-]
-"""friction coefficients of the pads, in any order, each once"""
+    return check
 
 
 def tag(mu_B: float) -> str:
@@ -175,6 +172,15 @@ def tag(mu_B: float) -> str:
     ('mu35', 'mu35p5')
     """
     return f"mu{100.0 * mu_B:.10g}".replace(".", "p")
+
+
+Coefficients = Annotated[
+    tuple[Annotated[float, Field(gt=0, le=2, allow_inf_nan=False)], ...],
+    Unit("1", 0.35),
+    Field(min_length=1, max_length=100),
+    AfterValidator(distinct(tag)),
+]
+"""friction coefficients of the pads, in any order, each once"""
 
 
 def with_friction(par: WedgeParameters, mu_B: float, known: bool) -> dict[str, Any]:

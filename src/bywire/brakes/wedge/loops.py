@@ -61,7 +61,7 @@ def beyond(name: str, value: str, need: str, limit: str) -> InputError:
     name, value
         Quantity that gives the operating point, and its value with its unit.
     need
-        What the brake would need, with its unit.
+        Quantity that the brake would need, with its unit.
     limit
         Parameter that limits it, with its value.
     """

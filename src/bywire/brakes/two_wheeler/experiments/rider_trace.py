@@ -14,12 +14,13 @@ from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.families import units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.bench.stimulus import Stimulus
-from bywire.brakes.two_wheeler.case import JUDGE, Course, RidingSpeed, on_surface, rolling_case
+from bywire.brakes.two_wheeler.case import JUDGE, Course, on_surface, rolling_case
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.plant import brake_disc
 from bywire.plant.road import SurfaceName
+from bywire.vehicle.ideal_stop import RidingSpeed
 
 # Built-in ride, our choice: a light pull, a short hesitation, then the full force of the hand.
 _TIMES = (0.0, 0.25, 0.9, 1.1, 1.3, 1.5, 3.0)  # s

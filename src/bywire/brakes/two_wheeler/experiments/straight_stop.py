@@ -18,14 +18,7 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.families import units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.two_wheeler.case import (
-    JUDGE,
-    Demand,
-    RidingSpeed,
-    on_surface,
-    rolling_case,
-    vehicle_of,
-)
+from bywire.brakes.two_wheeler.case import JUDGE, Demand, on_surface, rolling_case, vehicle_of
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters, WholeRearParameters
 from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear, at_speed
 from bywire.core.errors import not_valid
@@ -33,6 +26,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Nodes, TimeConstant, Unit
 from bywire.plant import adhesion, road
 from bywire.plant.road import Distance, SurfaceName
+from bywire.vehicle.ideal_stop import RidingSpeed
 from bywire.vehicle.two_wheeler import VehicleParameters
 
 

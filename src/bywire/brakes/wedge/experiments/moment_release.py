@@ -144,7 +144,7 @@ MOMENT_RELEASE = Experiment(
 )
 
 
-# --- Power off: what dry friction holds, for how long
+# --- Power off: dry friction holds the brake
 
 POWER_OFF_FIGURES = Figures(
     time_to_rest=("s", "Time from power off until shafts and wedge stick permanently."),
@@ -204,7 +204,7 @@ def judge_power_off(recordings: Recordings, options: PowerOffOptions) -> tuple[K
 POWER_OFF_HOLD = Experiment(
     name="power-off-hold",
     assembly="wedge-brake",
-    summary="power off at {M_hold}: what dry friction holds, for how long",
+    summary="power off at {M_hold}: moment held by dry friction, and its duration",
     options=PowerOffOptions,
     defaults=PowerOffOptions(M_hold=500.0, settle=0.6, duration=2.0),
     cases=power_off,

@@ -182,8 +182,6 @@ def tick(x: Any, m: Memory, u: Stimulus, par: Par) -> Memory:
 
 
 # --- One shaft alone: known current, known axial force
-# The drive, its current loop and the other shaft are left out: where current and force are
-# measured, nothing of them is needed. For identification.
 
 
 class Load(NamedTuple):
@@ -194,7 +192,7 @@ class Load(NamedTuple):
 
 
 class DrivenShaft(Assembly[WedgeParameters, Load]):
-    """Model of one shaft.
+    """Model of one shaft, for identification: with measured current and force, no drive is needed.
 
     One dry friction: bearings and screw together. ``rig.load`` determines whether the dummy
     shaft's inertia counts. There is no cogging where ``motor_1.T_cog`` is zero.
