@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from random import Random
 
-from bywire.bench.bench import Bench
-from bywire.bench.effects import switches_of
+from bywire.bench.bench import Bench, switches_of
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.core.catalog import PARAMETER_SETS, parameters
 from bywire.core.leaf import Leaf

@@ -18,8 +18,7 @@ from bywire.bench.energy_ledger import are_surely_sound, energy_doubts_of_cases,
 from bywire.bench.experiment import Case, check_memory
 from bywire.bench.kpis.families import FamilyJudge, of_cases
 from bywire.bench.kpis.kpi import Kpi, KpiOfCases
-from bywire.bench.recording import ends_of_group, rows_of_group, watch_cases
-from bywire.bench.rows import Rows
+from bywire.bench.recording import Rows, ends_of_group, rows_of_group, watch_cases
 from bywire.bench.running import (
     Progress,
     Result,

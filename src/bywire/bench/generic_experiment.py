@@ -33,9 +33,6 @@ from bywire.core.typing import Array
 Course = Callable[[Array], Array]
 
 InputLevel = Annotated[float, Unit("input"), Field(allow_inf_nan=False)]
-InputAmplitude = Annotated[float, Unit("input"), Field(gt=0, allow_inf_nan=False)]
-InputRate = Annotated[float, Unit("input/s"), Field(gt=0, allow_inf_nan=False)]
-OutputLevel = Annotated[float, Unit("output"), Field(allow_inf_nan=False)]
 
 _TOTALS = {"effort": effort.Setting(), "occupation": occupation.Setting()}
 

@@ -26,9 +26,6 @@ from bywire.core.values import nodes, number
 
 Level = Annotated[float, Unit("level"), Field(allow_inf_nan=False)]
 Amplitude = Annotated[float, Unit("level"), Field(ge=0, allow_inf_nan=False)]
-LevelRate = Annotated[float, Unit("level/s"), Field(gt=0, allow_inf_nan=False)]
-Phase = Annotated[float, Unit("rad"), Field(allow_inf_nan=False)]
-Count = Annotated[int, Unit("1", 16.0), Field(ge=1, le=10_000)]
 
 TOLERANCE = 1e-9  # s: the rounding errors of ticks at k * T are far smaller
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bywire.bench.kpis.families import FAMILIES, evaluate, evaluate_cases
-from bywire.bench.rows import Rows
+from bywire.bench.recording import Rows
 from bywire.core.errors import ModelError
 from systems.loading import loaded
 

@@ -14,7 +14,7 @@ import xarray as xr
 from bywire.bench.kpis.kpi import Kpi, KpiOfCases, Measure
 from bywire.bench.kpis.loop_family import LoopFamily
 from bywire.bench.kpis.samples import signal
-from bywire.bench.rows import Rows
+from bywire.bench.recording import Rows
 from bywire.core.errors import ModelError
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind
