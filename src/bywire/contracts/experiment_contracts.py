@@ -14,7 +14,7 @@ from bywire.bench.experiment import EXPERIMENTS, Case, Experiment
 from bywire.bench.stimuli.registry import create
 from bywire.contracts.evidence import Contract, Demand, Demands, Evidence, NotCheckedError, Place
 from bywire.core.catalog import PARAMETER_SETS, main_set
-from bywire.core.errors import BywireError, UnknownNameError, unknown_name
+from bywire.core.errors import BywireError, ModelError, UnknownNameError, unknown_name
 from bywire.core.model import ASSEMBLIES
 from bywire.core.signals import signals_of
 
@@ -117,8 +117,8 @@ def judges_what_is_recorded(rehearsal: Rehearsal) -> Evidence:
     experiment, options = rehearsal.experiment, rehearsal.experiment.defaults
     try:
         given = {kpi.name: kpi.unit for kpi in experiment.judge(rehearsal.recordings(), options)}
-    except (KeyError, AttributeError, UnknownNameError):
-        raise  # it names what is not there
+    except (KeyError, AttributeError, UnknownNameError, ModelError):
+        raise  # it names something that is missing, or a key figure that has no translation to C
     except Exception as error:
         raise NotCheckedError(f"nothing is recorded that moves: {error}") from error
     declared = experiment.kpis_with(options)

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
 from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.kpis.registry import FAMILIES
 from bywire.contracts import element_contracts, experiment_contracts, model_contracts
 from bywire.contracts.elements import Element, elements_of, every_element
 from bywire.contracts.evidence import Demand
@@ -66,6 +67,7 @@ def _on_elements(elements: Iterable[Element]) -> Iterator[Demand]:
 
 
 def _on_brake(brake: Brake, figures: Collection[str]) -> Iterator[Demand]:
+    FAMILIES.of(brake.module)  # rejects a key figure that has no translation to C
     for entry in PARAMETER_SETS.of(brake.module).values():
         yield from _on_set(entry)
     for model in ASSEMBLIES.of(brake.module).values():
