@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from bywire.core.catalog import chosen, paper
 from bywire.core.parameters import ParameterSet
-from bywire.core.provenance import chosen, paper
 from bywire.core.quantities import Fraction, Length, Resistance
 from bywire.report.answer import frame_of
 from bywire.report.page import table_html

@@ -38,9 +38,8 @@ from bywire.core.arguments import checked
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.catalog import CitedSet as Set
 from bywire.core.errors import UnknownNameError, quoted, unknown_name
-from bywire.core.field_notes import field_notes
 from bywire.core.model import ASSEMBLIES
-from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.parameters import ParameterSet, field_notes, leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.identification.fitting.question import BENCH_METHODS, BenchMethod
 from bywire.identification.method import METHODS, Method

@@ -15,10 +15,8 @@ from bywire.analysis.loop import LOOPS, Loop
 from bywire.bench.experiment import EXPERIMENTS, Case, Experiment
 from bywire.bench.faults.modes import Mode, modes_of
 from bywire.core.catalog import PARAMETER_SETS, main_set
-from bywire.core.field_notes import field_notes
-from bywire.core.leaf import Leaf
 from bywire.core.model import ASSEMBLIES
-from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.parameters import Leaf, ParameterSet, field_notes, leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.core.signals import merged_signals, places_of, signals_of
 from bywire.identification.method import METHODS

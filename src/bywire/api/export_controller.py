@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
+from bywire.core.catalog import Cited
 from bywire.core.errors import CompilerError, ModelError
-from bywire.core.provenance import Cited
 from bywire.export.controller.c_text import PRECISIONS
 from bywire.export.controller.files import files
 from bywire.export.controller.program import program

@@ -14,7 +14,7 @@ from bywire.bench.running import Progress
 from bywire.core.brake import loaded_files
 from bywire.core.callers import is_command_line
 from bywire.core.errors import FileError, InputError
-from bywire.core.field_notes import field_notes
+from bywire.core.parameters import field_notes
 from bywire.core.typing import silent
 from bywire.studies.designs import SPANNED, WORST
 from bywire.studies.findings import Findings

@@ -12,7 +12,7 @@ from typing import Any
 
 from bywire.api import identification
 from bywire.api.identify import ChosenMethod, choose
-from bywire.core.blas import on_one_thread
+from bywire.core.libraries import on_one_thread
 from bywire.data.file_format import Progress, no_progress
 from bywire.identification import trust as trusted
 from bywire.identification.fitting.question import Question

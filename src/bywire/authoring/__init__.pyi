@@ -57,10 +57,10 @@ from bywire.core.parts import Part as Part
 from bywire.core.parts import Port as Port
 from bywire.core.parts import Shown as Shown
 from bywire.core.parts import Wire as Wire
-from bywire.core.provenance import calibrated as calibrated
-from bywire.core.provenance import chosen as chosen
-from bywire.core.provenance import derived as derived
-from bywire.core.provenance import paper as paper
+from bywire.core.catalog import calibrated as calibrated
+from bywire.core.catalog import chosen as chosen
+from bywire.core.catalog import derived as derived
+from bywire.core.catalog import paper as paper
 from bywire.core.quantities import Area as Area
 from bywire.core.quantities import BreakawayFactor as BreakawayFactor
 from bywire.core.quantities import Conductance as Conductance
@@ -105,7 +105,7 @@ from bywire.core.signals import Role as Role
 from bywire.core.signals import Signal as Signal
 from bywire.core.signals import Speed as Speed
 from bywire.core.signals import zeros as zeros
-from bywire.core.subassembly import Sub as Sub
+from bywire.core.parts import Sub as Sub
 from bywire.core.typing import Array as Array
 from bywire.core.typing import Progress as Progress
 from bywire.identification.differentiation import differentiated as differentiated

@@ -8,7 +8,7 @@ from typing import Any
 from bywire.bench.experiment import Case
 from bywire.core import units
 from bywire.core.errors import ParameterError, StepError, quoted
-from bywire.core.machine_memory import machine_memory as _memory
+from bywire.core.machine import machine_memory as _memory
 from bywire.simulation.run import Run
 
 SHORTEST_STEP = 1e-9

@@ -9,8 +9,7 @@ from typing import Any
 from bywire.contracts.evidence import Evidence, Place, field_place, place_of
 from bywire.contracts.sampling import Sampler, combinations, is_table
 from bywire.core.errors import ParameterError
-from bywire.core.leaf import Leaf
-from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
 
 Class = type[ParameterSet]
 

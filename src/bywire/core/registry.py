@@ -19,7 +19,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, Protocol, TypeVar
 
-from bywire.core.author_lines import warn_at_line
 from bywire.core.brake import (
     Brake,
     BrakeWarning,
@@ -28,6 +27,7 @@ from bywire.core.brake import (
     loaded_files,
     modules_below,
     modules_of,
+    warn_at_line,
 )
 from bywire.core.callers import is_command_line
 from bywire.core.errors import ModelError, UnknownNameError, unknown_name

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import FileError
-from bywire.core.extras import how_to_install
+from bywire.core.libraries import how_to_install
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -25,11 +25,10 @@ from typing import IO, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.blas import one_thread_variables
 from bywire.core.child_process import start_python
 from bywire.core.errors import FileError
-from bywire.core.extras import how_to_install
-from bywire.core.machine_memory import address_space, machine_memory
+from bywire.core.libraries import how_to_install, one_thread_variables
+from bywire.core.machine import address_space, machine_memory
 from bywire.core.scratch import process_folder
 from bywire.data.file_format import Column, FileFormat, Progress
 from bywire.data.reading_child import NUMBERS, fill, receive, send

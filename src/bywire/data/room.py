@@ -6,7 +6,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from bywire.core.errors import FileError
-from bywire.core.machine_memory import machine_memory
+from bywire.core.machine import machine_memory
 from bywire.data.file_format import Source
 
 _MOST = 8 * 2**30  # bytes

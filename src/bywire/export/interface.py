@@ -10,9 +10,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal, get_args
 
-from bywire.core.field_notes import field_notes
-from bywire.core.leaf import Leaf
-from bywire.core.parameters import leaf_fields
+from bywire.core.parameters import Leaf, field_notes, leaf_fields
 from bywire.core.signals import ranges_of, signals_of
 from bywire.export.exported import Exported
 from bywire.simulation.graph import Graph, Node

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from bywire.core.copies import may_copy, processes
-from bywire.core.workers import worker_count
+from bywire.core.machine import worker_count
 from bywire.report.document import Picture
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from bywire.core.errors import CompilerError, DeviceError, ParameterError, quoted
-from bywire.core.extras import how_to_install
+from bywire.core.libraries import how_to_install
 from bywire.core.pairs import read_count
 from bywire.core.scratch import scratch_folder
 from bywire.simulation.c_runtime import CUDA

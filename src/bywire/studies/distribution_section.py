@@ -10,7 +10,7 @@ from typing import Any
 
 from bywire.bench.relative_changes import refuse_share_of_temperature, share_of
 from bywire.core.errors import ParameterError, quoted, unknown_name
-from bywire.core.leaf import Leaf
+from bywire.core.parameters import Leaf
 from bywire.core.quantities import Unit
 from bywire.core.units import difference_unit, parse, shown
 from bywire.core.values import written

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bywire.core.blas import on_one_thread
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError
+from bywire.core.libraries import on_one_thread
 from bywire.usecases.asks import (
     CaseName,
     Changes,

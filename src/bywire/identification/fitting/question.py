@@ -17,8 +17,7 @@ from bywire.bench.experiment import Case
 from bywire.core.arguments import checked
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError, quoted, unknown_name
-from bywire.core.leaf import Leaf
-from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
 from bywire.core.quantities import Factor, Unit
 from bywire.core.registry import Kind, instances
 from bywire.core.signals import signals_of, without_noise

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from bywire.brakes.two_wheeler.rigs.wheel_on_drum import WheelOnDrumParameters
 from bywire.brakes.two_wheeler.sets import sport600
-from bywire.core.catalog import CitedSet
-from bywire.core.provenance import chosen, derived
+from bywire.core.catalog import CitedSet, chosen, derived
 from bywire.plant.road import SURFACES
 
 _FROM = {

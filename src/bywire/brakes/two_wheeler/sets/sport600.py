@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
-from bywire.core.provenance import Formula, derived
+from bywire.core.catalog import Formula, derived
 from bywire.plant.road import SURFACES
 from bywire.reproduction.source_file import SourceFile
 
