@@ -306,6 +306,16 @@ class Wrapping(_Protocol):
         """Memory of the model inside."""
         return self.inner.Memory
 
+    @property
+    def Flow(self) -> type[NamedTuple]:
+        """Integrals of the model inside."""
+        return self.inner.Flow
+
+    @property
+    def Output(self) -> type[NamedTuple]:
+        """Recorded signals of the model inside."""
+        return self.inner.Output
+
     def mass(self, xe: Any, par: Any) -> Any:
         """Return the masses of the model inside."""
         return self.inner.mass(xe, par)
