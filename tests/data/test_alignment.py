@@ -8,7 +8,7 @@ from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.data import alignment
 from bywire.data.alignment import METHODS, resample
 from bywire.data.channel_quality import quality
-from bywire.data.lag import estimate_lag
+from bywire.identification.replay_fit import estimate_lag
 
 
 def measurement(**channels):

@@ -41,8 +41,8 @@ from bywire.core.errors import UnknownNameError, quoted, unknown_name
 from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import ParameterSet, field_notes, leaf_fields
 from bywire.core.quantities import display_unit
-from bywire.identification.fitting.question import BENCH_METHODS, BenchMethod
 from bywire.identification.method import METHODS, Method
+from bywire.identification.question import BENCH_METHODS, BenchMethod
 from bywire.life.declaration import LIVES, Life
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Flat, Paragraph, Section, TableBlock

@@ -18,9 +18,9 @@ from bywire.core.errors import InputError, ParameterError, unknown_name, unknown
 from bywire.core.values import parsed
 from bywire.data.file_format import Progress, no_progress
 from bywire.data.named_columns import NamedColumns
-from bywire.identification.fitting.question import BENCH_METHODS, BenchMethod, Question, find_method
 from bywire.identification.measured import Measured, measured, name_of, require_signals
 from bywire.identification.method import Effort, Identified
+from bywire.identification.question import BENCH_METHODS, BenchMethod, Question, find_method
 from bywire.identification.trust import displaced
 from bywire.report.document import Change
 from bywire.report.subject import Subject, defaults_of, value_changes

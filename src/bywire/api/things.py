@@ -20,8 +20,8 @@ from bywire.core.errors import unknown_name
 from bywire.core.model import ASSEMBLIES
 from bywire.core.quantities import display_unit
 from bywire.core.registry import Kind
-from bywire.identification.fitting.question import BENCH_METHODS
 from bywire.identification.method import METHODS, Method
+from bywire.identification.question import BENCH_METHODS
 from bywire.life.declaration import LIVES
 from bywire.synthesis.study import STUDIES
 

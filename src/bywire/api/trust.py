@@ -15,8 +15,8 @@ from bywire.api.identify import ChosenMethod, choose
 from bywire.core.libraries import on_one_thread
 from bywire.data.file_format import Progress, no_progress
 from bywire.identification import trust as trusted
-from bywire.identification.fitting.question import Question
 from bywire.identification.method import Effort
+from bywire.identification.question import Question
 from bywire.identification.trust import Trust
 from bywire.report.answer import Answer
 from bywire.report.answering import answering

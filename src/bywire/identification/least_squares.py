@@ -19,13 +19,13 @@ from bywire.core.units import difference_unit, shown
 from bywire.identification.confidence import (
     MisfitWarning,
     advice,
+    between_records,
     misfit,
     notes_of,
     uncertainty,
     untold,
 )
 from bywire.identification.estimate import Estimate, Kept, Part
-from bywire.identification.homogeneity import between_records
 from bywire.identification.unknown import Unknown
 
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]

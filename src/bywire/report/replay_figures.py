@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bywire.core.units import display_factor
-from bywire.identification.replaying.fit import SegmentFit
-from bywire.identification.replaying.tracking import Track
+from bywire.identification.replay_fit import SegmentFit
+from bywire.identification.tracking import Track
 from bywire.report import style
 from bywire.report.channel import channel
 from bywire.report.decimation import decimate

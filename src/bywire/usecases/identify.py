@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bywire.api.identification import Identification
     from bywire.api.trust import TrustStudy
     from bywire.core.typing import Progress
-    from bywire.identification.fitting.question import Question
+    from bywire.identification.question import Question
 
 _ANY_BENCH = "Methods of any bench"
 MethodName = Annotated[str, Ask("Method, see 'bywire list'.", "Method", known=("methods",))]
@@ -168,7 +168,7 @@ def _asked(
     A command names what a `Question` holds one by one.
     """
     from bywire.api.trust import trust
-    from bywire.identification.fitting.question import Question
+    from bywire.identification.question import Question
 
     question = Question(bench, inputs, outputs, unknowns, priors, states, case, holdout, loss)
     shared: dict[str, Any] = {
@@ -317,8 +317,8 @@ def identify(
         start_of,
     )
     from bywire.data.file_format import no_progress
-    from bywire.identification.fitting.question import Question
     from bywire.identification.method import Effort
+    from bywire.identification.question import Question
     from bywire.identification.trust import put_in
 
     question = Question() if question is None else question

@@ -146,11 +146,10 @@ def replay(
     """
     from bywire.api.replay import Replay, columns_of_bench, driven_bench, stretches_of, units_of
     from bywire.data.file_format import no_progress
+    from bywire.identification import bench_replay, tracking
+    from bywire.identification.bench_replay import case_of
     from bywire.identification.measured import measured, name_of
-    from bywire.identification.replaying import bench_replay, tracking
-    from bywire.identification.replaying.bench_replay import case_of
-    from bywire.identification.replaying.fit import judged
-    from bywire.identification.replaying.tolerances import read_tolerances
+    from bywire.identification.replay_fit import judged, read_tolerances
 
     shown = no_progress if progress is None else progress
     driven = driven_bench(bench, overrides)

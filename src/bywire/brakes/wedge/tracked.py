@@ -11,7 +11,7 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.data.recursive_filter import filtered
-from bywire.identification.replaying.tracking import Relation, Rows
+from bywire.identification.tracking import Relation, Rows
 
 _PRESSED = 0.1  # of the largest force: below it, the relation tells little
 _STEADY = 0.02  # of the largest force per sensor's time constant: faster, its lag would show

@@ -11,7 +11,7 @@ from bywire.brakes.wedge.experiments import load_sweep, run_down
 from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft, Load
 from bywire.core.catalog import parameters
 from bywire.identification.output_error import trial
-from bywire.identification.sensed import Sensor, sensed
+from bywire.identification.trust import Sensor, sensed
 from bywire.simulation.run import simulate
 
 STEP = 20e-6

@@ -30,7 +30,7 @@ from bywire.data.labeled import at_own_places, over
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.residuals import lack_of_fit
-from bywire.identification.sensed import sensed
+from bywire.identification.trust import sensed
 from bywire.plant import roller_screw, servo_motor
 
 _GAP = np.full((2, 1), np.nan)

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
-from bywire.identification.sensed import Sensor
+from bywire.identification.trust import Sensor
 from bywire.plant.axial_bearing import AngularSpeed
 
 SIGNALS: Mapping[str, str] = {"i_1": "A", "i_2": "A", "q_1": "rad", "q_2": "rad", "y_F": "N"}

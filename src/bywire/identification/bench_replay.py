@@ -368,7 +368,7 @@ def replay(
     Parameters
     ----------
     bench, data, inputs, outputs, case
-        See ``bywire.identification.replaying.bench_replay``.
+        See ``bywire.identification.bench_replay``.
     estimate_error
         Whether the model runs in other steps too; see `bywire.bench.running.run`.
 

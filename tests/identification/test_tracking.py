@@ -9,7 +9,7 @@ import xarray as xr
 import bywire
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.identification.replaying.tracking import track
+from bywire.identification.tracking import track
 from run_once import run_once
 
 NOISE = {"y_M": 2.0, "F_N": 10.0, "F_M": 5.0, "x": 2e-6, "Omega": 0.1}

@@ -11,10 +11,16 @@ import xarray as xr
 
 import bywire
 from bywire.core.errors import ParameterError, UnitError, UnknownNameError
-from bywire.identification.replaying.bench_replay import replay
-from bywire.identification.replaying.fit import fit_figures, judged, undefined
-from bywire.identification.replaying.segments import Segment, found_in, read_segments
-from bywire.identification.replaying.tolerances import judge_fit
+from bywire.identification.bench_replay import replay
+from bywire.identification.replay_fit import (
+    Segment,
+    fit_figures,
+    found_in,
+    judge_fit,
+    judged,
+    read_segments,
+    undefined,
+)
 from run_once import run_once
 
 STOP = bywire.Bench("moment-pulses", "roberts2003", options={"t_hold": 0.2, "pulses": 1})

@@ -10,14 +10,13 @@ import xarray as xr
 
 import bywire
 from bywire.core.errors import InputError
-from bywire.identification.fitting.bench_fit import BenchFit
-from bywire.identification.fitting.question import Question, starts_of, unknowns_of
-from bywire.identification.fitting.worth import starts_check
+from bywire.identification.bench_fit import BenchFit, starts_check
+from bywire.identification.bench_replay import case_of
 from bywire.identification.measured import joined
 from bywire.identification.method import Effort, Identified
 from bywire.identification.methods.output_error import METHOD
 from bywire.identification.output_error import output_error
-from bywire.identification.replaying.bench_replay import case_of
+from bywire.identification.question import Question, starts_of, unknowns_of
 from bywire.identification.trust import trust
 
 SINE = {"kind": "sine", "mean": "0 V", "amplitude": "2 V", "f": "4 Hz", "phase": 0, "t_start": 0}
