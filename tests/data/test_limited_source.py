@@ -12,8 +12,8 @@ from measurement_files import NEEDS, file_of, measurement
 from misbehaving_format import FORMAT
 
 from bywire.core.errors import FileError, UnitError
+from bywire.core.typing import silent
 from bywire.data import limited_source
-from bywire.data.file_format import no_progress
 from bywire.data.limited_source import limited
 from bywire.data.measurement import read_measurement
 
@@ -23,7 +23,7 @@ def read(tmp_path):
     """Return a function that reads a file by a reader that misbehaves as it says."""
     path = tmp_path / "a.odd"
 
-    def run(wish, seconds=20.0, progress=no_progress):
+    def run(wish, seconds=20.0, progress=silent):
         path.write_text(wish)
         with limited(path, FORMAT, seconds) as source:
             return source.read(["y", "t"], progress)

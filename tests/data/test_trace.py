@@ -7,7 +7,7 @@ import pytest
 from measurement_files import FORMATS, NEEDS, file_of, measurement
 
 from bywire.core.errors import FileError, ParameterError, UnitError
-from bywire.data.trace import read_trace, trace_names
+from bywire.data.measurement import read_trace, trace_names
 
 HEADER = "time [s], pedal [mm]\n"
 ROWS = "".join(f"{k / 100:.2f},1\n" for k in range(20))

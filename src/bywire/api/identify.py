@@ -15,8 +15,8 @@ from bywire.api.replay import columns_of_bench, driven_bench
 from bywire.bench.relative_changes import settled
 from bywire.core.callers import is_command_line, option
 from bywire.core.errors import InputError, ParameterError, unknown_name, unknown_of_few
+from bywire.core.typing import Progress, silent
 from bywire.core.values import parsed
-from bywire.data.file_format import Progress, no_progress
 from bywire.data.named_columns import NamedColumns
 from bywire.identification.measured import Measured, measured, name_of, require_signals
 from bywire.identification.method import Effort, Identified
@@ -89,7 +89,7 @@ def choose(
     measurements: Sequence[Source] = (),
     mapping: str | Path | None = None,
     time: str = "",
-    progress: Progress = no_progress,
+    progress: Progress = silent,
 ) -> ChosenMethod:
     """Return the method of a name with what it needs.
 

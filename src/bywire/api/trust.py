@@ -13,7 +13,7 @@ from typing import Any
 from bywire.api import identification
 from bywire.api.identify import ChosenMethod, choose
 from bywire.core.libraries import on_one_thread
-from bywire.data.file_format import Progress, no_progress
+from bywire.core.typing import Progress, silent
 from bywire.identification import trust as trusted
 from bywire.identification.method import Effort
 from bywire.identification.question import Question
@@ -150,7 +150,7 @@ def trust(
     KeyboardInterrupt
         When interrupted.
     """
-    shown = no_progress if progress is None else progress
+    shown = silent if progress is None else progress
     chosen = choose(method, parameters, overrides, options, question, progress=shown)
     store = None
     if folder is not None:

@@ -121,8 +121,8 @@ from bywire.identification.method import Effort as Effort
 from bywire.identification.method import Identified as Identified
 from bywire.identification.method import Method as Method
 from bywire.identification.output_error import moved_run as moved_run
-from bywire.identification.tracking import track as track
 from bywire.identification.residuals import lack_of_fit as lack_of_fit
+from bywire.identification.tracking import track as track
 from bywire.identification.unknown import Unknown as Unknown
 from bywire.identification.unknown import parameters_of as parameters_of
 from bywire.life.declaration import Effects as Effects

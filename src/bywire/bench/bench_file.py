@@ -23,8 +23,7 @@ from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.section import Hint, Section, Table, table_of
 from bywire.core.values import parsed, require_unit, require_units
-from bywire.data.file_kinds import BENCH, require_kind
-from bywire.data.toml_file import read_toml
+from bywire.data.toml_file import BENCH, read_toml, require_kind
 
 PATHS = ("trace", "trace_map", "file")
 """keys of options and stimuli that name files: written down, they must hold from any folder"""

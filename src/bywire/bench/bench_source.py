@@ -15,7 +15,7 @@ from bywire.core.catalog import PARAMETER_SETS, main_set, sets_of_loaded
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import ASSEMBLIES
 from bywire.core.registry import pick
-from bywire.data.file_kinds import BENCH, first_there, near_files
+from bywire.data.toml_file import BENCH, first_there, near_files
 
 
 def experiment_of(

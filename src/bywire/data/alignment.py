@@ -21,7 +21,7 @@ from bywire.data.channel_quality import (
     Stretch,
     quality,
 )
-from bywire.data.room import room
+from bywire.data.file_format import room
 
 METHODS = ("linear", "previous", "nearest", "average")
 """how values between samples are found"""

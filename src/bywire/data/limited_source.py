@@ -30,7 +30,8 @@ from bywire.core.errors import FileError
 from bywire.core.libraries import how_to_install, one_thread_variables
 from bywire.core.machine import address_space, machine_memory
 from bywire.core.scratch import process_folder
-from bywire.data.file_format import Column, FileFormat, Progress
+from bywire.core.typing import Progress
+from bywire.data.file_format import Column, FileFormat
 from bywire.data.reading_child import NUMBERS, fill, receive, send
 
 SECONDS = 60.0

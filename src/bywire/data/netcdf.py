@@ -19,11 +19,11 @@ from bywire.core.arguments import checked
 from bywire.core.errors import FileError
 from bywire.core.interrupts import interrupts_deferred
 from bywire.core.scratch import replacing
-from bywire.data.file_format import Column, FileFormat, ReadOptions, no_progress
+from bywire.core.typing import silent
+from bywire.data.file_format import Column, FileFormat, ReadOptions, require_room
 from bywire.data.format_registry import head_of
 from bywire.data.formats.netcdf import FORMAT as NETCDF
 from bywire.data.limited_source import limited
-from bywire.data.room import require_room
 
 if TYPE_CHECKING:
     from bywire.data.limited_source import LimitedSource
@@ -164,7 +164,7 @@ def _attributes(plain: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _dataset(source: LimitedSource) -> xr.Dataset:
-    columns = source.read(list(source.columns), no_progress)
+    columns = source.read(list(source.columns), silent)
     variables = {}
     for name, said in source.notes["variables"].items():
         kind = np.dtype(said["kind"])

@@ -14,7 +14,8 @@ from bywire.core.arguments import checked
 from bywire.core.callers import option
 from bywire.core.errors import FileError, InputError
 from bywire.core.scratch import replacing
-from bywire.data.file_format import FileFormat, Progress, no_progress
+from bywire.core.typing import Progress, silent
+from bywire.data.file_format import FileFormat
 from bywire.data.format_registry import format_to_write
 
 
@@ -25,7 +26,7 @@ def write_measurement(
     *,
     format: str = "",
     overwrite: bool = False,
-    progress: Progress = no_progress,
+    progress: Progress = silent,
 ) -> Path:
     """Write signals as a measurement file, in SI, every number exactly.
 

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from bywire.core.arguments import checked
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError, UnitError, unknown_name
-from bywire.core.typing import Array
+from bywire.core.typing import Array, Progress, silent
 from bywire.data.alignment import resample
 from bywire.data.channel_quality import AlignmentReport
 from bywire.data.column_units import measures, unit_of_symbol
-from bywire.data.file_format import Progress, no_progress
 from bywire.data.mapping import MeasurementMapping, read_mapping
 from bywire.data.named_columns import NamedColumns, read_named, renamed
 
@@ -244,7 +243,7 @@ def measured(
     multiple: float | None = None,
     gaps: bool = False,
     named: NamedColumns = _NOT_NAMED,
-    progress: Progress = no_progress,
+    progress: Progress = silent,
 ) -> Measured:
     """Read one measurement, or several records of it.
 

@@ -316,14 +316,14 @@ def identify(
         search,
         start_of,
     )
-    from bywire.data.file_format import no_progress
+    from bywire.core.typing import silent
     from bywire.identification.method import Effort
     from bywire.identification.question import Question
     from bywire.identification.trust import put_in
 
     question = Question() if question is None else question
     sources = [measurements] if isinstance(measurements, Source) else list(measurements)
-    shown = no_progress if progress is None else progress
+    shown = silent if progress is None else progress
     chosen = choose(
         method,
         parameters,
