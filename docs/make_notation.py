@@ -16,12 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from bywire import control, plant
-from bywire.analysis.linear.plant import PLANTS
-from bywire.analysis.loop import LOOPS
+from bywire.analysis.loop import LOOPS, PLANTS
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
-from bywire.bench.kpis.registry import FAMILIES
-from bywire.bench.stimuli.registry import STIMULI
+from bywire.bench.kpis.families import FAMILIES
+from bywire.bench.stimulus import STIMULI
 from bywire.brakes.wedge import elements, laws
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES

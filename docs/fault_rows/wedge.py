@@ -10,8 +10,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.result import Result
-from bywire.bench.running import run
+from bywire.bench.running import Result, run
 from bywire.plant import roller_screw
 from fault_rows.row import Row
 

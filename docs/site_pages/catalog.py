@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from bywire.analysis.linear.plant import PLANTS
-from bywire.analysis.loop import LOOPS
+from bywire.analysis.loop import LOOPS, PLANTS
 from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.api.describe import Description, described
 from bywire.api.described import fault_summaries
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
-from bywire.bench.kpis.registry import definitions
-from bywire.bench.stimuli.registry import STIMULI
-from bywire.campaigns.declared import CAMPAIGNS
+from bywire.bench.kpis.families import definitions
+from bywire.bench.stimulus import STIMULI
+from bywire.campaigns.residual import CAMPAIGNS
 from bywire.core.brake import brakes
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES

@@ -11,8 +11,8 @@ import pytest
 
 import bywire
 from bywire.bench import ensemble
+from bywire.bench.ensemble import key_figures_of
 from bywire.bench.running import run
-from bywire.bench.side_by_side import key_figures_of
 from bywire.core.errors import ParameterError, UnknownNameError
 
 OPTIONS = {"duration": "60 ms", "settle": "10 ms"}
@@ -79,7 +79,7 @@ def test_an_experiment_of_several_runs():
 def test_what_cannot_run_side_by_side_runs_one_by_one(bench, monkeypatch):
     found = bywire.simulate_ensemble(bench, {"options.duration": [0.05, 0.06]})
     assert [r.recording.sizes["time"] for r in found.results] == [61, 71]
-    monkeypatch.setattr("bywire.bench.side_by_side.fit_lanes", lambda runs: False)
+    monkeypatch.setattr("bywire.bench.ensemble.fit_lanes", lambda runs: False)
     alone = bywire.simulate_ensemble(bench, {"motor.R_m": [0.25]})
     assert "lanes" not in alone.results[0].recording.attrs["engine"]
 

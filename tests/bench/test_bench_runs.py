@@ -13,12 +13,11 @@ import bywire
 from bywire.bench import ensemble, running, step_error
 from bywire.bench.ensemble import run_benches
 from bywire.bench.experiment import as_run
-from bywire.bench.result import Result
-from bywire.bench.running import run
+from bywire.bench.running import Result, run
 from bywire.brakes.motorcycle.operating_point import settled_start
 from bywire.core.errors import WorkLimitError
+from bywire.simulation.ensemble import simulate_group
 from bywire.simulation.run import simulate
-from bywire.simulation.run_group import simulate_group
 from run_once import run_once
 
 SET = "dardanelli2010"

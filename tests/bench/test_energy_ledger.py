@@ -18,9 +18,8 @@ from bywire.bench.energy_ledger import (
     further_ledgers,
     role_attributes,
 )
-from bywire.bench.ensemble import simulate_ensemble
+from bywire.bench.ensemble import key_figures_of, simulate_ensemble
 from bywire.bench.running import run as run_bench
-from bywire.bench.side_by_side import key_figures_of
 from bywire.core.signals import Role
 from bywire.usecases.run import run
 from systems.loading import SPRING_AXIS, loaded

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import bywire
+from bywire.bench.ensemble import key_figures_of
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
-from bywire.bench.side_by_side import key_figures_of
 from bywire.core.brake import load_system
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import (

@@ -7,8 +7,7 @@ from collections.abc import Callable
 import pytest
 from command_line import Outcome, refused
 
-from bywire.analysis.linear.plant import PLANTS
-from bywire.analysis.loop import LOOPS
+from bywire.analysis.loop import LOOPS, PLANTS
 from bywire.api.described import described_drive, described_loop, described_plant
 from bywire.api.overview import overview
 from bywire.bench.experiment import EXPERIMENTS
@@ -16,7 +15,7 @@ from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import FileError, UnknownNameError
 from bywire.core.model import ASSEMBLIES
 from bywire.identification.method import METHODS
-from bywire.simulation import kernel_cache
+from bywire.simulation import compiler
 from bywire.synthesis.study import STUDIES
 
 Bywire = Callable[..., Outcome]
@@ -217,5 +216,5 @@ def test_a_list_is_made_where_nothing_can_be_kept(monkeypatch):
         raise FileError("a temporary folder cannot be made")
 
     before = overview()
-    monkeypatch.setattr(kernel_cache, "usable_folder", refused)
+    monkeypatch.setattr(compiler, "usable_folder", refused)
     assert overview().things == before.things

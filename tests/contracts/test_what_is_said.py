@@ -10,10 +10,10 @@ import pytest
 from annotated_types import Ge
 
 from bywire.api.new import write_package
+from bywire.contracts.element_contracts import Sampler, combinations, described
 from bywire.contracts.elements import elements_by_name, numbers
 from bywire.contracts.evidence import examine, one_by_cause
 from bywire.contracts.model_contracts import OF_A_MODEL
-from bywire.contracts.sampling import Sampler, combinations, described
 from bywire.contracts.subjects import demands_on
 from bywire.contracts.trial import Start, start_of
 from bywire.core.catalog import parameters

@@ -12,8 +12,8 @@ from bywire.bench.energy_ledger import actuator_ledger
 from bywire.bench.running import run as run_bench
 from bywire.core.errors import ParameterError
 from bywire.simulation.advance import Change
+from bywire.simulation.ensemble import fit_lanes, simulate_group
 from bywire.simulation.run import Run, simulate
-from bywire.simulation.run_group import fit_lanes, simulate_group
 from bywire.simulation.sensitivity import simulate_with_sensitivities
 from systems.sampled_lag import LAG, Memory, SampledLag, State
 

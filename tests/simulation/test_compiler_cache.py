@@ -18,7 +18,6 @@ from bywire.core import scratch
 from bywire.core.errors import CompilerError
 from bywire.simulation import compiler as compiler_module
 from bywire.simulation import engine as engine_module
-from bywire.simulation import kernel_cache
 from bywire.simulation.compiler import (
     PLAIN,
     VECTOR,
@@ -244,7 +243,7 @@ def test_a_library_that_is_none_is_rebuilt_and_not_loaded(cache, monkeypatch, co
         made = compile_library("int other;", PLAIN, compiler).read_bytes()
     library.unlink()
     library.write_bytes(made)
-    kernel_cache.digest_of(library).write_text(kernel_cache.sha256(library))
+    compiler_module.digest_of(library).write_text(compiler_module.sha256(library))
     loaded, again = load_library(SOURCE, PLAIN, compiler, "twice")
     assert again == library
     assert loaded.twice

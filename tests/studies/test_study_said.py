@@ -17,7 +17,7 @@ from bywire.api.study_run import StudyRun
 from bywire.api.study_surrogate import StudySurrogates
 from bywire.api.study_tables import influence_tables, spread_table
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.report.document import FigureBlock, TableBlock
 from bywire.report.readable_axis import scale_of
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS

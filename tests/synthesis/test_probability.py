@@ -10,9 +10,8 @@ import bywire
 from bywire.api.design_drawn import probability_of
 from bywire.api.loop_case import loop_case
 from bywire.core.errors import ParameterError
-from bywire.synthesis.linear_case import cases_of
+from bywire.synthesis.linear_case import cases_of, read
 from bywire.synthesis.outcome import judged_over
-from bywire.synthesis.requirement import read
 from few_starts import few_starts
 
 STUDY = """

@@ -1,9 +1,10 @@
-"""A control loop of a brake: where it works, what shakes it, where it can be cut open."""
+"""Control loops and plants of a brake: operating points, excitation, and cuts."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from bywire.analysis.linear.corners import taking
 from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.linearize import Friction
 from bywire.analysis.linear.sampled_loops import (
     analog_gain,
     closed_again,
@@ -363,3 +365,89 @@ class Loop:
 
 LOOPS = Kind("loop", ("loops",), instances(Loop), declared="a Loop")
 """every control loop"""
+
+
+# --- Plants
+
+
+@dataclass(frozen=True)
+class PlantPoint:
+    """Where a plant is linearized, and what its dry friction does there.
+
+    Parameters
+    ----------
+    quantity, value
+        What the operating point is given by, and its value [SI].
+    friction
+        As in `bywire.analysis.linear.linearize.linearize`.
+    speed
+        Motor speed [rad/s], positive toward clamping; nonzero for sliding friction only.
+    """
+
+    quantity: Quantity
+    value: float
+    friction: Friction = "removed"
+    speed: float = 0.0
+
+    @contextmanager
+    def named(self, unless: Quantity) -> Iterator[None]:
+        """Name the value in errors of what follows from it; ``unless``: whose errors name it."""
+        try:
+            yield
+        except ParameterError as error:
+            if self.quantity is unless:
+                raise
+            raise self.quantity.refused(self.value, error) from None
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A plant.
+
+    Parameters
+    ----------
+    name
+        What the command line calls it.
+    assembly
+        What it is the plant of.
+    summary
+        One line for listings.
+    at
+        What its operating point may be given by; the first one is usual.
+    model
+        ``model(par, point) -> LinearModel``.
+    band
+        Frequency [Hz] up to which it is usually looked at.
+    whole
+        The model that this one simplifies, of the same inputs and outputs; None for the exact one.
+    side
+        As of `bywire.analysis.loop.Loop`.
+    """
+
+    name: str
+    assembly: str
+    summary: str
+    at: tuple[Quantity, ...]
+    model: Callable[[ParameterSet, PlantPoint], LinearModel]
+    band: float
+    whole: Callable[[ParameterSet, PlantPoint], LinearModel] | None = None
+    side: str = ""
+
+    def linear(self, par: ParameterSet, point: PlantPoint) -> LinearModel:
+        """Return `model` on the plant's side of corners."""
+        with taking(self.side):
+            return self.model(par, point)
+
+    def exact(self, par: ParameterSet, point: PlantPoint) -> LinearModel | None:
+        """Return the model that this one simplifies, likewise; None for the exact one."""
+        with taking(self.side):
+            return None if self.whole is None else self.whole(par, point)
+
+    @property
+    def usual(self) -> PlantPoint:
+        """Where it is usually looked at."""
+        return PlantPoint(self.at[0], self.at[0].default)
+
+
+PLANTS = Kind("plant", ("plants",), instances(Plant), declared="a Plant")
+"""every plant and simplified model of one"""

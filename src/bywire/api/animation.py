@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from bywire.bench.bench import Bench
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.core.errors import ParameterError
 from bywire.report.animation.page import scene_page
 from bywire.report.animation.scene import SCENES

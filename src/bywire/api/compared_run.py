@@ -14,14 +14,14 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench_file import flattened
-from bywire.bench.bench_source import experiment_of
+from bywire.bench.changes import OPTION
 from bywire.bench.experiment import Experiment
+from bywire.bench.generic_experiment import experiment_of
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.option_names import OPTION
 from bywire.bench.requirements import Verdict
-from bywire.bench.result import Result
 from bywire.bench.result_folder import read_result
-from bywire.bench.stimuli.registry import STIMULI
+from bywire.bench.running import Result
+from bywire.bench.stimulus import STIMULI
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError
 from bywire.core.parameters import ParameterSet, leaf_fields

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from bywire.api.compared_run import ComparedRun, Setting, ran
 from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
-from bywire.bench.bench_source import names_experiment
-from bywire.bench.result import Result
+from bywire.bench.bench_file import names_experiment
 from bywire.bench.result_folder import is_result_folder, verdict_record
-from bywire.bench.running import Progress
+from bywire.bench.running import Progress, Result
 from bywire.bench.step_error import are_distinct
 from bywire.core.callers import is_command_line
 from bywire.core.errors import ParameterError

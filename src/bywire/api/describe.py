@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
-from bywire.analysis.linear.plant import PLANTS
-from bywire.analysis.loop import LOOPS
+from bywire.analysis.loop import LOOPS, PLANTS
 from bywire.api.described import (
     described_drive,
     described_fault,
@@ -30,9 +29,9 @@ from bywire.api.described import (
 )
 from bywire.bench.experiment import EXPERIMENTS, Experiment
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
-from bywire.bench.kpis.registry import definitions
-from bywire.bench.stimuli.registry import STIMULI, StimulusKind
-from bywire.campaigns.declared import CAMPAIGNS, DeclaredCampaign
+from bywire.bench.kpis.families import definitions
+from bywire.bench.stimulus import STIMULI, StimulusKind
+from bywire.campaigns.residual import CAMPAIGNS, DeclaredCampaign
 from bywire.contracts.elements import Element, elements_by_name, parameter_classes
 from bywire.core.arguments import checked
 from bywire.core.catalog import PARAMETER_SETS, main_set

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 import numpy as np
 
 from bywire.analysis.linear.corners import ABOVE, taking
-from bywire.analysis.linear.plant import PLANTS, Plant
-from bywire.analysis.loop import LOOPS, Loop
+from bywire.analysis.loop import LOOPS, PLANTS, Loop, Plant
 from bywire.bench.experiment import EXPERIMENTS, Case, Experiment
 from bywire.bench.faults.modes import Mode, modes_of
 from bywire.core.catalog import PARAMETER_SETS, main_set

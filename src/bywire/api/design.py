@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.loop_curves import loop_curve
-from bywire.analysis.margins import NO_LOOP, figures_at
+from bywire.analysis.margins import NO_LOOP, figures_at, loop_curve
 from bywire.api import design_parts
 from bywire.api.design_drawn import Probability
 from bywire.api.design_parts import Part, judged_on, verdict_text
@@ -40,8 +39,8 @@ from bywire.report.document import (
     Section,
     TableBlock,
 )
+from bywire.synthesis.linear_case import read
 from bywire.synthesis.outcome import Across, Design, ScheduleDesign, Status, bench_text
-from bywire.synthesis.requirement import read
 from bywire.synthesis.schedules import (
     design_schedule,
     frozen,

@@ -10,7 +10,7 @@ from typing import Any
 from bywire.api.design_parts import Part, figure_cell
 from bywire.api.loop_case import LoopCase
 from bywire.api.study_tables import percent
-from bywire.bench.option_names import OPTION
+from bywire.bench.changes import OPTION
 from bywire.bench.requirements import Limit
 from bywire.core.errors import InputError, ParameterError, quoted
 from bywire.core.typing import Progress, silent

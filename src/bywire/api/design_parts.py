@@ -16,10 +16,9 @@ from bywire.report.document import Flat, Listing, TableBlock
 from bywire.report.tables import Cell, Table, amount_cell, text_table
 from bywire.report.wording import amount
 from bywire.synthesis.bench_figures import BenchFigures
-from bywire.synthesis.bench_tuning import Candidate
 from bywire.synthesis.outcome import Across, Design, ScheduleDesign
 from bywire.synthesis.schedules import scheduled
-from bywire.synthesis.verification import Verification
+from bywire.synthesis.verification import Candidate, Verification
 
 Part = str | Table
 """a sentence or a table of a result"""

@@ -13,8 +13,13 @@ from numpy.typing import NDArray
 
 from bywire.analysis.margins import NO_LOOP
 from bywire.analysis.response import frequency_response as by_sines
-from bywire.analysis.response.broadband import Broadband, broadband_response
-from bywire.analysis.response.frequency_response import largest, require_stable, with_step_errors
+from bywire.analysis.response.frequency_response import (
+    Broadband,
+    broadband_response,
+    largest,
+    require_stable,
+    with_step_errors,
+)
 from bywire.analysis.response.large_signal import (
     Variant,
     leaving,

@@ -12,7 +12,7 @@ import xarray as xr
 
 from bywire.api.parameter_choice import set_for
 from bywire.api.replay import columns_of_bench, driven_bench
-from bywire.bench.relative_changes import settled
+from bywire.bench.changes import settled
 from bywire.core.callers import is_command_line, option
 from bywire.core.errors import InputError, ParameterError, unknown_name, unknown_of_few
 from bywire.core.typing import Progress, silent

@@ -12,9 +12,8 @@ import numpy as np
 
 from bywire.analysis.crossings import bandwidth
 from bywire.analysis.linear.linear_model import LinearModel, rates
-from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.locus import Locus, locus
-from bywire.analysis.loop import LOOPS
+from bywire.analysis.loop import LOOPS, PLANTS
 from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.margins import NO_LOOP
 from bywire.analysis.periodic import PeriodicModel, dithered_loop

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any, get_args
 from bywire.analysis.linear.corners import read_sides
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import Friction
-from bywire.analysis.linear.plant import PLANTS, Plant, PlantPoint
 from bywire.analysis.locus import Locus, locus_of
-from bywire.analysis.loop import Quantity
+from bywire.analysis.loop import PLANTS, Plant, PlantPoint, Quantity
 from bywire.analysis.reduction import Reduced, ReductionError, reduction_error
 from bywire.api import linear_texts as texts
 from bywire.api.loop_case import range_of

@@ -134,7 +134,7 @@ def _plain(topic: str) -> str:
 
 def _things() -> tuple[Mapping[str, Any], list[str]]:
     """Return what there is, and what is doubtful of it."""
-    from bywire.simulation.kernel_cache import keep_text, usable_folder
+    from bywire.simulation.compiler import keep_text, usable_folder
 
     names = hashlib.sha256(" ".join(brakes()).encode()).hexdigest()[:8]
     index: Path | None = None

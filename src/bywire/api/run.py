@@ -19,8 +19,8 @@ from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
 from bywire.bench.faults.fault_section import from_text
 from bywire.bench.requirements import Verdict
-from bywire.bench.result import Result
 from bywire.bench.result_folder import kpi_record, verdict_record
+from bywire.bench.running import Result
 from bywire.bench.stated import stated_figures
 from bywire.report.answer import Answer
 from bywire.report.document import (

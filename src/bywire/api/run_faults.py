@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bywire.api.run_sections import varied_texts
-from bywire.campaigns.findings import CampaignFindings, FaultFinding
 from bywire.campaigns.residual import NEVER
+from bywire.campaigns.running import CampaignFindings, FaultFinding
 from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array

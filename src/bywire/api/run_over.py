@@ -17,9 +17,8 @@ from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed, run_benches, varied_leaf
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
-from bywire.bench.result import Result
 from bywire.bench.result_folder import kpi_record, verdict_record
-from bywire.bench.running import Progress
+from bywire.bench.running import Progress, Result
 from bywire.bench.step_error import are_distinct
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array

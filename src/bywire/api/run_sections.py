@@ -10,8 +10,8 @@ from typing import Any
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger
 from bywire.bench.experiment import Recordings
-from bywire.bench.kpis.registry import FAMILIES
-from bywire.bench.result import Result
+from bywire.bench.kpis.families import FAMILIES
+from bywire.bench.running import Result
 from bywire.bench.stated import stated_for
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES

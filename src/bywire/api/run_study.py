@@ -9,8 +9,7 @@ from bywire.api.study_figures import load_drawing
 from bywire.api.study_run import StudyRun
 from bywire.bench import running
 from bywire.bench.requirements import status_of
-from bywire.bench.result import Result
-from bywire.bench.running import Progress
+from bywire.bench.running import Progress, Result
 from bywire.core.brake import loaded_files
 from bywire.core.callers import is_command_line
 from bywire.core.errors import FileError, InputError

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.api.parameter_choice import set_for
-from bywire.bench.relative_changes import settled
+from bywire.bench.changes import settled
 from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.values import parsed

@@ -16,7 +16,7 @@ from bywire.api.study_tables import figure_text
 from bywire.bench import running
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import bench_text
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.report.document import Attachment, recording_file
 from bywire.report.wording import amount
 from bywire.studies.chunk import case_bench

@@ -36,7 +36,7 @@ from bywire.api.study_tables import (
     varied_table,
 )
 from bywire.bench.bench import Bench
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.units import shown
 from bywire.report.answer import Answer

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from bywire.analysis.linear.plant import PLANTS
-from bywire.analysis.loop import LOOPS
+from bywire.analysis.loop import LOOPS, PLANTS
 from bywire.api.described import fault_summaries
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
-from bywire.bench.kpis.registry import definitions
-from bywire.bench.stimuli.registry import STIMULI
-from bywire.campaigns.declared import CAMPAIGNS
-from bywire.campaigns.residual import RESIDUALS
+from bywire.bench.kpis.families import definitions
+from bywire.bench.stimulus import STIMULI
+from bywire.campaigns.residual import CAMPAIGNS, RESIDUALS
 from bywire.contracts.elements import every_element
 from bywire.core.brake import brakes, loaded_files
 from bywire.core.catalog import PARAMETER_SETS

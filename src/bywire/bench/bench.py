@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -9,17 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from bywire.bench.bench_source import experiment_of, usual_set
+from bywire.bench.changes import OPTION, settled, split_options
 from bywire.bench.effects import are_alike, refuse_without_effect, switches_of
-from bywire.bench.experiment import Case, Cases, Experiment, as_run
-from bywire.bench.extent import check_seed, checked_interval, checked_step
+from bywire.bench.experiment import (
+    Case,
+    Cases,
+    Experiment,
+    as_run,
+    check_seed,
+    checked_interval,
+    checked_step,
+)
 from bywire.bench.faults.fault_section import Injection, injections
 from bywire.bench.faults.injected import checked_sections, with_faults
-from bywire.bench.option_names import OPTION, split_options
-from bywire.bench.relative_changes import settled
+from bywire.bench.generic_experiment import experiment_of, usual_set
 from bywire.bench.requirements import Limit, read_limits
-from bywire.bench.stimuli.registry import Stimulus
-from bywire.bench.stimulus_sections import stimulus_of, stimulus_sections
+from bywire.bench.stimulus import Stimulus, stimulus_of, stimulus_sections
 from bywire.core.catalog import PARAMETER_SETS, outdated_values
 from bywire.core.errors import (
     InputError,
@@ -233,7 +239,8 @@ class Bench:
         texts = []
         for each in outdated_values(cited, self.par, self.overrides):
             unit = leaves[each.name].unit.symbol
-            now, then = (shown(value, unit) for value in (each.now, each.formula))
+            now = shown(each.now, unit)
+            then = shown(each.formula, unit) if math.isfinite(each.formula) else "no finite value"
             texts.append(
                 f"{each.name} = {now} is derived ({each.where}) from {', '.join(each.changed)}, "
                 f"which was changed, and no longer matches: its formula gives {then}, so set it "

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
 from bywire.bench.bench import Bench
-from bywire.bench.bench_source import content_of_experiment, experiment_of, meant_by
-from bywire.bench.faults.course import Course
-from bywire.bench.faults.fault_section import with_units_wanted
+from bywire.bench.changes import is_relative, settled
+from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.faults.fault_section import Course, with_units_wanted
 from bywire.bench.faults.injected import checked_sections
-from bywire.bench.relative_changes import is_relative, settled
-from bywire.bench.stimuli.registry import STIMULI
-from bywire.bench.stimulus_sections import stimulus_sections
+from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, experiment_of, usual_set
+from bywire.bench.stimulus import STIMULI, stimulus_sections
 from bywire.core.arguments import checked
 from bywire.core.callers import option
 from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
@@ -23,7 +23,7 @@ from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.section import Hint, Section, Table, table_of
 from bywire.core.values import parsed, require_unit, require_units
-from bywire.data.toml_file import BENCH, read_toml, require_kind
+from bywire.data.toml_file import BENCH, first_there, near_files, read_toml, require_kind
 
 PATHS = ("trace", "trace_map", "file")
 """keys of options and stimuli that name files: written down, they must hold from any folder"""
@@ -333,3 +333,65 @@ def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str
             overrides[name] = value
             changed["set"] = overrides
     return changed
+
+
+# --- A name in place of a file
+
+_NAME = re.compile(r"[a-z][a-z0-9-]*")
+
+
+_FOLDER = "benches"  # where bench files usually are
+
+
+_NEAR, _NEAR_EXPERIMENT = 0.5, 0.7  # resemblance of what was meant
+
+
+def names_experiment(source: str | Path) -> bool:
+    """Return whether a text is the bare name of an experiment, of a brake or of any."""
+    name = str(source)
+    if not _NAME.fullmatch(name):
+        return False
+    return EXPERIMENTS.get(name) is not None or name in GENERIC_EXPERIMENTS.all()
+
+
+def content_of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, str]:
+    """Return the shortest bench file of an experiment; nothing where there is a file instead.
+
+    Raises
+    ------
+    ParameterError
+        For an experiment of any brake, where ``changes`` do not say for which.
+    """
+    name = str(file)
+    if file.is_file() or not names_experiment(name):
+        return {}
+    chosen = {} if "parameters" in changes else {"parameters": usual_set(name)}
+    return {"experiment": name, **chosen}
+
+
+def meant_by(file: Path) -> str:
+    """Return what to do about a bench file that is not there.
+
+    The nearest is named, of the bench files beside it and of experiments; a file of its very name
+    in a folder of benches goes before.
+    """
+    folders = (file.parent / _FOLDER, file.parent / ".." / _FOLDER)
+    there = first_there(folder / file.name for folder in folders)
+    if there is not None:
+        return f"did you mean {there}?"
+    near = max(_near(file), default=None)
+    if near is not None:
+        return f"did you mean {near[1]}?"
+    return "check the path, or name an experiment of 'bywire list'"
+
+
+def _near(file: Path) -> Iterator[tuple[float, str]]:
+    """Yield bench files and experiments that a file resembles, each with how much it does."""
+    kinds = ("", BENCH)
+    files = near_files(file, kinds, [file.parent], _NEAR, with_ending=True)
+    yield from ((likeness, str(path)) for likeness, path in files)
+    if _NAME.fullmatch(file.name):
+        for name in {**EXPERIMENTS.all(), **GENERIC_EXPERIMENTS.all()}:
+            likeness = SequenceMatcher(None, name, file.name).ratio()
+            if likeness >= _NEAR_EXPERIMENT:
+                yield likeness, name

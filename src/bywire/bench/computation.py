@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from bywire.bench.bench import Bench
-from bywire.bench.kpis.registry import FAMILIES, Family
-from bywire.bench.option_names import split_options
-from bywire.bench.stimuli.registry import STIMULI
+from bywire.bench.changes import split_options
+from bywire.bench.kpis.families import FAMILIES, Family
+from bywire.bench.stimulus import STIMULI
 from bywire.core.brake import brakes
 from bywire.core.definitions import definitions_digest
 from bywire.core.errors import InputError
@@ -20,6 +20,7 @@ _ROOMS = (
     "bywire.bench.generic_experiment",
     "bywire.bench.kpis",
     "bywire.bench.stimuli",
+    "bywire.bench.stimulus",
     "bywire.control",
     "bywire.plant",
     "bywire.vehicle",

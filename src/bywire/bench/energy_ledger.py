@@ -7,7 +7,7 @@ other ``E_...`` is taken.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any
@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from bywire.core.signals import Role
+from bywire.core.signals import Role, signals_of
+from bywire.simulation.run import Run
 
 _PREFIX = "energy_"
 _ROLE = tuple(each.name for each in fields(Role))
@@ -278,3 +279,109 @@ def _split(recording: xr.Dataset) -> dict[str, float]:
         changes[f"{name}_moving"] = _plain(whole - holding)
         changes[f"{name}_holding"] = _plain(holding)
     return changes
+
+
+_OPEN = 1e-5  # of the energies, that the balance of a run may leave open, and a loss may give
+
+
+_NOTHING = 1e-9  # J, that nobody misses: rounding of what is stored while nothing moves
+
+
+def energy_doubts(recording: xr.Dataset, runs: Sequence[Run] = ()) -> list[str]:
+    """Return warnings where the energies of a recording cannot be true.
+
+    The energy balance is open by more than the step can explain, or a loss gives energy. The scheme
+    closes the balance to a few parts in 1e8, the remainder of nonlinear elements, and a loss grows
+    in every substep. Where parameters are so extreme that numbers cancel, or an element's equations
+    leave their range, they do not.
+
+    ``runs``: the one whose recording it is, where that is known.
+    """
+    return energy_doubts_of_cases(recording, 1, runs)[0]
+
+
+def energy_doubts_of_cases(
+    recording: xr.Dataset, cases: int, runs: Sequence[Run] = ()
+) -> list[list[str]]:
+    """Return what `energy_doubts` says of each of several runs, of the rows of all."""
+    doubts: list[list[str]] = [[] for _ in range(cases)]
+    for each in deliveries(recording, _losses(runs)):
+        if not np.any(_is_delivered(each)):
+            continue
+        where = f" of the book {each.book!r}" if each.book else ""
+        energies, totals = (np.broadcast_to(e, cases) for e in (each.energy, each.turnover))
+        is_said = np.broadcast_to(_is_delivered(each), cases)
+        for k in np.flatnonzero(is_said).tolist():
+            doubts[k].append(
+                f"the loss {each.label!r}{where} ({each.name}) gives {energies[k]:.3g} J of "
+                f"{totals[k]:.3g} J that were turned over, and a loss cannot give energy: do not "
+                "believe this run, take a smaller step, and look for a parameter that is extreme"
+            )
+    if _are_surely_closed(recording):
+        return doubts
+    books = actuator_ledger(recording)
+    error, turned = (np.broadcast_to(each, cases) for each in (books.closing_error, books.turnover))
+    for k, (left, total) in enumerate(zip(error.tolist(), turned.tolist(), strict=True)):
+        if abs(left) > _OPEN * total + _NOTHING:
+            doubts[k].append(
+                f"the energy balance is open by {abs(left):.3g} J of {total:.3g} J that were "
+                "turned over: do not believe this run, take a smaller step, and look for a "
+                "parameter that is extreme"
+            )
+    return doubts
+
+
+def _losses(runs: Sequence[Run]) -> Collection[str] | None:
+    """Return the losses that grow whatever happens; None for all.
+
+    In the loss of a contact stands what a change of its parameters does, see `simulation.advance`.
+    """
+    return runs[0].model.Flow._fields if any(run.changes for run in runs) else None
+
+
+def _is_delivered(delivery: Delivery) -> Any:
+    """Return whether a loss gave more than numbers explain, of several runs in which of them."""
+    return np.greater(delivery.energy, _OPEN * delivery.turnover + _NOTHING)
+
+
+def are_surely_sound(recording: xr.Dataset, runs: Sequence[Run] = ()) -> bool:
+    """Return whether the ends of a recording, or of several runs', tell of no `energy_doubts`."""
+    given = deliveries(recording, _losses(runs))
+    is_quiet = not any(np.any(_is_delivered(each)) for each in given)
+    return is_quiet and _are_surely_closed(recording)
+
+
+def _are_surely_closed(recording: xr.Dataset) -> bool:
+    """Return whether the ends of a recording, or of several runs', tell that no books are open."""
+    books = actuator_ledger(recording, is_split=False)
+    if not (books.sources and books.sinks):
+        return True
+    # What is split turns over no less: where the whole is far from open, so are its parts.
+    return bool(np.all(2.0 * np.abs(books.closing_error) <= _OPEN * books.turnover + _NOTHING))
+
+
+def energy_signals(run: Run) -> tuple[str, ...]:
+    """Return the outputs of a run's model that stand in the books of its energy."""
+    return tuple(
+        name
+        for name, signal in signals_of(run.model.Output).items()
+        if name.startswith(("E_", "W_")) or signal.role is not None
+    )
+
+
+def energy_residual(recording: xr.Dataset) -> xr.DataArray:
+    """Return energy in, less losses, less the change of stored energy [J]; 0 but for the step.
+
+    Of the actuator's own book; what stands in further ones is left out.
+    """
+    losses = sum(
+        values
+        for name, values in recording.items()
+        if str(name).startswith("E_")
+        and name not in ("E_source", "E_stored")
+        and "energy_book" not in values.attrs
+    )
+    balance = recording["E_source"] - losses - recording["E_stored"]
+    residual: xr.DataArray = balance - float(balance.values[0])
+    residual.attrs = {"units": "J", "long_name": "residual of the energy balance"}
+    return residual

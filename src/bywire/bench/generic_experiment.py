@@ -16,16 +16,17 @@ from typing import Annotated, Any
 from pydantic import Field, create_model
 from pydantic.fields import FieldInfo
 
-from bywire.bench.experiment import Case, Experiment
+from bywire.bench.experiment import EXPERIMENTS, Case, Experiment
 from bywire.bench.kpis import effort, occupation
-from bywire.bench.kpis.cases import FamilyJudge
-from bywire.bench.kpis.registry import recorded, units_of
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.kpis.families import FamilyJudge, recorded, units_of
+from bywire.bench.stimulus import Stimulus
+from bywire.core.callers import option
+from bywire.core.catalog import PARAMETER_SETS, main_set, sets_of_loaded
 from bywire.core.errors import ModelError, ParameterError, quoted, unknown_name
-from bywire.core.model import Model
+from bywire.core.model import ASSEMBLIES, Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.quantities import Unit
-from bywire.core.registry import Kind, instances
+from bywire.core.registry import Kind, instances, pick
 from bywire.core.signals import Signal, signals_of, without_noise, zeros
 from bywire.core.typing import Array
 
@@ -40,7 +41,7 @@ _TOTALS = {"effort": effort.Setting(), "occupation": occupation.Setting()}
 
 
 @dataclass(frozen=True)
-class Subject:
+class TestedModel:
     """What a generic experiment is bound to.
 
     Parameters
@@ -189,7 +190,7 @@ class GenericExperiment:
     options: type[ParameterSet]
     signals: Mapping[str, str]
     defaults: Mapping[str, Any]
-    build: Callable[[Subject], Experiment]
+    build: Callable[[TestedModel], Experiment]
 
     def bound(self, model: Model, given: Mapping[str, Any]) -> Experiment:
         """Return the experiment of a model.
@@ -207,14 +208,14 @@ class GenericExperiment:
             When a name is missing and the model leaves a choice.
         """
         known: dict[str, tuple[str, Signal]] = {}
-        for option, place in self.signals.items():
-            known[option] = _signal(model, self.name, option, place, given.get(option), known)
-        places = tuple((option, s.unit, s.nominal) for option, (_, s) in known.items())
+        for key, place in self.signals.items():
+            known[key] = _signal(model, self.name, key, place, given.get(key), known)
+        places = tuple((key, s.unit, s.nominal) for key, (_, s) in known.items())
         options = with_units(self.options, places)
-        names = {option: name for option, (name, _) in known.items()}
+        names = {key: name for key, (name, _) in known.items()}
         defaults = options.create({**self._levels(options), **names})
-        units = {option: signal.unit for option, (_, signal) in known.items()}
-        return self.build(Subject(self, model, names, units, options, defaults))
+        units = {key: signal.unit for key, (_, signal) in known.items()}
+        return self.build(TestedModel(self, model, names, units, options, defaults))
 
     def _levels(self, options: type[ParameterSet]) -> dict[str, Any]:
         """Return the defaults, levels in SI."""
@@ -335,3 +336,115 @@ def at_rest(model: Model, par: Any) -> tuple[Any, Any]:
             f"{model.name}: rest(par) must return (State, Memory), got {quoted(start)}"
         )
     return start
+
+
+# --- Experiments by name, of a brake or of any
+
+
+def experiment_of(
+    name: str, parameters: str, assembly: str = "", options: Mapping[str, Any] | None = None
+) -> Experiment:
+    """Return the experiment of a name for a parameter set.
+
+    Parameters
+    ----------
+    name
+        Name of the experiment.
+    parameters
+        Name of the parameter set.
+    assembly
+        Model of the set's brake; that of the set where empty.
+    options
+        Options as the user gave them: they name signals.
+
+    Raises
+    ------
+    InputError
+        When there is no such experiment, when its options name signals that the model lacks, and
+        when an earlier name of a brake's own experiment leaves open which one is meant.
+    """
+    cited = PARAMETER_SETS.find(parameters)
+    system = assembly or cited.assembly
+    likely = EXPERIMENTS.guess(name)
+    if likely is not None and likely.assembly == system:
+        return likely
+    brake = PARAMETER_SETS.owner(parameters)
+    its_own = EXPERIMENTS.own(brake, name)
+    if its_own is not None and its_own.assembly == system:
+        return its_own
+    known = GENERIC_EXPERIMENTS.all()
+    if name in known:
+        former = _former(name, brake, system, options or {}, known[name])
+        if former is not None:
+            return former
+        models = ASSEMBLIES.of(brake)
+        return known[name].bound(pick(models, system, "assembly")(), options or {})
+    every = EXPERIMENTS.all()
+    if name not in every:
+        raise unknown_name("experiment", name, {*every, *known}, first=EXPERIMENTS.of(brake))
+    return every[name]
+
+
+def former_names(name: str) -> dict[str, str]:
+    """Return the experiments that once had a name, each with its assembly."""
+    every = EXPERIMENTS.all().values()
+    return {each.name: each.assembly for each in every if each.formerly == name}
+
+
+def _former(
+    name: str, brake: str, system: str, options: Mapping[str, Any], generic: GenericExperiment
+) -> Experiment | None:
+    """Return a brake's own experiment that once had this name, if the options show it is meant.
+
+    Raises
+    ------
+    ParameterError
+        When they show neither.
+    """
+    each = (e for e in EXPERIMENTS.of(brake).values() if e.formerly == name)
+    former = next((e for e in each if e.assembly == system), None)
+    if former is None:
+        return None
+    given = set(options)
+    own, others = set(former.options.model_fields), set(generic.options.model_fields)
+    if given & (others - own):
+        return None
+    if given & (own - others):
+        return former
+    example = next(iter(generic.signals))
+    raise ParameterError(
+        f"experiment {name!r} is for any brake, and that of the {system} is called "
+        f"{former.name!r} now: write {former.name}, or say which signal {name} is about, for "
+        f"instance {option('overrides', {f'options.{example}': 'NAME'})}"
+    )
+
+
+def usual_set(name: str) -> str:
+    """Return the parameter set with which an experiment runs unless another one is named.
+
+    That is the main set of its brake. An experiment of any brake takes the only set of the brakes
+    that were loaded by path.
+
+    Raises
+    ------
+    UnknownNameError
+        When there is no experiment of that name.
+    ParameterError
+        For an experiment of any brake where there are several sets to choose from.
+    """
+    definition, sets = EXPERIMENTS.get(name), sets_of_loaded()
+    if len(sets) == 1 and name in GENERIC_EXPERIMENTS.all():
+        return sets[0]
+    if definition is not None:
+        return main_set(definition.assembly, beside=type(definition.defaults))
+    if name not in GENERIC_EXPERIMENTS.all():
+        raise EXPERIMENTS.unknown(name, GENERIC_EXPERIMENTS)
+    known = ", ".join(sets or PARAMETER_SETS.all())
+    former = "".join(
+        f"; that of the {assembly} is called {now!r} now"
+        for now, assembly in former_names(name).items()
+    )
+    raise ParameterError(
+        f"experiment {name!r} is for any brake: say for which, with "
+        f"{option('overrides', {'parameters': 'NAME'})} ({known}){former}"
+    )

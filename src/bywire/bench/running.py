@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any, cast
@@ -13,12 +13,10 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.experiment import Case, as_run
-from bywire.bench.extent import check_extent
+from bywire.bench.experiment import Case, as_run, check_extent, check_recordings
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.recording import record, rows_of, run_notes, watch
-from bywire.bench.requirements import judge, status_of
-from bywire.bench.result import Result
+from bywire.bench.requirements import Verdict, judge, status_of
 from bywire.bench.rows import Rows
 from bywire.bench.step_error import (
     MOST_WORK,
@@ -29,11 +27,71 @@ from bywire.bench.step_error import (
     unestimated,
     with_step_errors,
 )
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.stimulus import Stimulus
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.interrupts import interrupt_heard, interrupts_deferred
 from bywire.core.signals import signals_of
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, Trajectory, simulate
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a bench gave.
+
+    Parameters
+    ----------
+    recordings
+        One dataset per run of the experiment, by label.
+    status
+        ``done`` (nothing was required), ``passed``, ``failed`` (a requirement was not met),
+        ``undecided`` (one is no further from its limit than its error from the step) or
+        ``interrupted``.
+    unestimated
+        Why the error from the step is not known although it was asked for; empty where it is.
+    """
+
+    bench: Bench
+    recordings: Mapping[str, xr.Dataset]
+    kpis: tuple[Kpi, ...]
+    verdicts: tuple[Verdict, ...]
+    status: str
+    unestimated: str = ""
+
+    @property
+    def recording(self) -> xr.Dataset:
+        """The recording of an experiment that makes one run."""
+        if len(self.recordings) != 1:
+            labels = ", ".join(self.recordings)
+            raise ParameterError(f"this experiment made several recordings: take one of {labels}")
+        return next(iter(self.recordings.values()))
+
+    def kpi(self, name: str) -> Kpi:
+        """Return one KPI by name.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest known names.
+        """
+        by_name = {kpi.name: kpi for kpi in self.kpis}
+        if name not in by_name:
+            raise unknown_name("KPI", name, by_name)
+        return by_name[name]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the user should know of the runs."""
+        said = [
+            f"{label}: {text}" if len(self.recordings) > 1 else text
+            for label, recording in self.recordings.items()
+            for text in str(recording.attrs.get("warnings", "")).split("; ")
+            if text
+        ]
+        return said + ([self.unestimated] if self.unestimated else [])
+
+
+# --- Runs
 
 Progress = Callable[[str, float], None]
 
@@ -81,7 +139,9 @@ def run(
             try:
                 other = replace(bench, step=factor * bench.step)
                 made: dict[str, xr.Dataset] = {}
-                _make_runs(other, made, progress, engine, {}, f", {factor:g} of the step", work)
+                held = _bytes_of(recordings, *others.values())
+                remark = f", {factor:g} of the step"
+                _make_runs(other, made, progress, engine, {}, remark, work, held)
                 others[factor] = made
             except NO_ESTIMATE as error:
                 failures[factor] = error
@@ -102,15 +162,18 @@ def _make_runs(
     work: dict[str, float],
     remark: str = "",
     compared: Mapping[str, float] | None = None,
+    held: float = 0.0,
 ) -> None:
     """Make all recordings of a bench, each kept as soon as it is there, and what work they took.
 
-    ``compared``: the work of the same runs in the bench's own step, of which these may take some.
+    ``compared``: the work of the same runs in the bench's own step, of which these may take some;
+    ``held``: bytes of the recordings that are in memory already.
     """
     engine = bench.engine if engine == "auto" else engine
     recordings |= static_recordings(bench)
-    for number, case in enumerate(bench.cases()):
-        computed = run_of(bench, case, number)
+    runs = [(case, run_of(bench, case, k)) for k, case in enumerate(bench.cases())]
+    check_recordings([computed for _, computed in runs], held)
+    for case, computed in runs:
         if compared is not None:
             computed = replace(computed, most_work=MOST_WORK * compared[case.label])
         report = None if progress is None else partial(progress, case.label + remark)
@@ -124,6 +187,10 @@ def _make_runs(
             recordings[case.label] = recording_of(bench, case, computed, trajectory)
         if not is_complete:
             raise KeyboardInterrupt
+
+
+def _bytes_of(*made: Mapping[str, xr.Dataset]) -> float:
+    return float(sum(each.nbytes for recordings in made for each in recordings.values()))
 
 
 def static_recordings(bench: Bench) -> dict[str, xr.Dataset]:

@@ -46,7 +46,9 @@ class Cited:
     moved: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def computed(self, values: Mapping[str, Any]) -> tuple[Any, frozenset[str]]:
-        """Return what the formula gives with values by dotted name, and the names that it reads.
+        """Return the result of the formula with values by dotted name, and the names that it reads.
+
+        The result is NaN where these values are so far off that it has no finite one.
 
         Raises
         ------
@@ -55,7 +57,10 @@ class Cited:
         """
         assert self.formula is not None
         read: set[str] = set()
-        value = self.formula(_Values(values, self.moved, read))
+        try:
+            value = self.formula(_Values(values, self.moved, read))
+        except (ArithmeticError, ValueError):  # overflow, division by zero, root of a negative
+            value = math.nan
         return value, frozenset(read)
 
     def moved_to(self, places: Mapping[str, str]) -> Cited:

@@ -12,16 +12,21 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.bench.running import run_of
 from bywire.core.errors import BywireError, ParameterError, unknown_name
-from bywire.simulation.emission import indented, layout_of, leaf_namer, statements
 from bywire.simulation.emit_single import EXPORTED, emit_single
 from bywire.simulation.engine import prepare
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph, Node
-from bywire.simulation.layout import Layout
 from bywire.simulation.program import Program
 from bywire.simulation.run import Run, initial_vector
-from bywire.simulation.schedule import Schedule
-from bywire.simulation.stages import Stages, build_stages
+from bywire.simulation.schedule import Layout, Schedule
+from bywire.simulation.stages import (
+    Stages,
+    build_stages,
+    indented,
+    layout_of,
+    leaf_namer,
+    statements,
+)
 from bywire.simulation.symbols import SX, column, scalars
 
 

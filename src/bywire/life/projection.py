@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bywire.bench.bench import Bench
-from bywire.bench.ensemble import changed
-from bywire.bench.side_by_side import key_figures_of
+from bywire.bench.ensemble import changed, key_figures_of
 from bywire.core.errors import ParameterError, RunError
 from bywire.core.typing import Array, Progress, silent
 from bywire.core.units import shown

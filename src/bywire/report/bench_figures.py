@@ -11,7 +11,7 @@ import xarray as xr
 
 from bywire.bench.energy_ledger import actuator_ledger, further_ledgers
 from bywire.bench.kpis import sine_sweep
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.bench.stated import stated_for
 from bywire.core.errors import ParameterError
 from bywire.core.registry import Kind, instances

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator, NullFormatter
 
-from bywire.analysis.loop_curves import LoopCurve
+from bywire.analysis.margins import LoopCurve
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.loop_curves import MOST_S, MOST_T

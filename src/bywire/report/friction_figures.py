@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis.samples import smoothed
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.report import style

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bywire.bench.bench import Bench
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.panels import Role

@@ -13,8 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
 from matplotlib.ticker import MultipleLocator, NullFormatter
 
-from bywire.analysis.loop_curves import Family, LoopCurve, disk
-from bywire.analysis.margins import LoopMargins
+from bywire.analysis.margins import Family, LoopCurve, LoopMargins, disk
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.legend import legend_outside

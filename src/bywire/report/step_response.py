@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 import numpy as np
 
 from bywire.bench.experiment import Experiment
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis.samples import smoothed
 from bywire.bench.requirements import Verdict
 from bywire.core.errors import ParameterError
 from bywire.core.units import convert

@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields
 
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import flattened
-from bywire.bench.bench_source import experiment_of
-from bywire.bench.option_names import OPTION
+from bywire.bench.changes import OPTION
+from bywire.bench.generic_experiment import experiment_of
 from bywire.core.catalog import PARAMETER_SETS, Cited
 from bywire.core.errors import InputError
 from bywire.core.parameters import ParameterSet, field_notes, leaf_fields

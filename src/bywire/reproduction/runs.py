@@ -11,8 +11,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.result import Result
-from bywire.bench.running import Progress, run
+from bywire.bench.running import Progress, Result, run
 from bywire.core.arguments import checked
 from bywire.core.interrupts import raise_if_stopped
 

@@ -17,9 +17,8 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Role, Signal, signals_of
 from bywire.core.typing import Array
 from bywire.simulation.engine import Engine
-from bywire.simulation.layout import Layout
 from bywire.simulation.native import CHUNK, Request
-from bywire.simulation.schedule import Schedule
+from bywire.simulation.schedule import Layout, Schedule
 
 Progress = Callable[[float], None]
 

@@ -9,8 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
+from bywire.simulation.branches import modes
 from bywire.simulation.c_runtime import LANES
-from bywire.simulation.emission import (
+from bywire.simulation.emit_rare import most_tries, rare_roots, rare_substep
+from bywire.simulation.expressions import VECTOR_C, as_number, condition, needed
+from bywire.simulation.graph import Node
+from bywire.simulation.schedule import Layout
+from bywire.simulation.stages import (
+    STATE,
+    Stages,
     branching_statements,
     indented,
     layout_of,
@@ -20,12 +27,6 @@ from bywire.simulation.emission import (
     statements,
     unread,
 )
-from bywire.simulation.emit_rare import most_tries, rare_roots, rare_substep
-from bywire.simulation.expressions import VECTOR_C, as_number, condition, needed
-from bywire.simulation.graph import Node
-from bywire.simulation.layout import Layout
-from bywire.simulation.modes import modes
-from bywire.simulation.stages import STATE, Stages
 
 
 class Lanes:

@@ -10,16 +10,24 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from bywire.simulation.branches import (
+    Modes,
     Remembered,
     branch,
     branched,
     declarations,
+    modes,
     remembered,
     renewal,
 )
 from bywire.simulation.c_runtime import SCALAR
-from bywire.simulation.emission import (
+from bywire.simulation.emit_rare import most_tries, rare_substep
+from bywire.simulation.expressions import Namer, as_number, condition, needed
+from bywire.simulation.graph import Graph, Node
+from bywire.simulation.schedule import Layout
+from bywire.simulation.stages import (
     PLAN,
+    STATE,
+    Stages,
     branching_statements,
     indented,
     layout_of,
@@ -29,12 +37,6 @@ from bywire.simulation.emission import (
     statements,
     unread,
 )
-from bywire.simulation.emit_rare import most_tries, rare_substep
-from bywire.simulation.expressions import Namer, as_number, condition, needed
-from bywire.simulation.graph import Graph, Node
-from bywire.simulation.layout import Layout
-from bywire.simulation.modes import Modes, modes
-from bywire.simulation.stages import STATE, Stages
 
 SIGNATURE = """{} bw_run(const double *restrict p, double h, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,

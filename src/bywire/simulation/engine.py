@@ -34,10 +34,18 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
 from bywire.core.sources import source_state
-from bywire.simulation.compiler import Compiler, find_compiler, processor
-from bywire.simulation.kernel_cache import is_intact, keep_text, load, sha256, usable_folder
-from bywire.simulation.layout import Layout
+from bywire.simulation.compiler import (
+    Compiler,
+    find_compiler,
+    is_intact,
+    keep_text,
+    load,
+    processor,
+    sha256,
+    usable_folder,
+)
 from bywire.simulation.native import Request, SingleKernel, text_digest
+from bywire.simulation.schedule import Layout
 from bywire.simulation.virtual_machine import VirtualMachine
 
 if TYPE_CHECKING:
@@ -360,7 +368,7 @@ class Prepared:
 
     def _build(self, kind: str) -> Engine:
         if kind == CUDA:
-            from bywire.simulation.cuda_kernel import CudaEngine
+            from bywire.simulation.cuda import CudaEngine
 
             return CudaEngine(self.program)
         compiler = None if kind == "virtual-machine" else find_compiler()

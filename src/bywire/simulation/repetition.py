@@ -18,10 +18,9 @@ from bywire.simulation.advance import require_finite
 from bywire.simulation.case_kernels import lane_kernel
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.engine import prepare
-from bywire.simulation.layout import Layout
 from bywire.simulation.native import Request
 from bywire.simulation.run import Run, initial_vector, selected
-from bywire.simulation.schedule import Schedule
+from bywire.simulation.schedule import Layout, Schedule
 
 Stimuli = Callable[[NDArray[np.int64], int, int], Array]
 """``stimuli(cases, first, last)``: these rows of some cases, shape (cases, last - first, nu)"""

@@ -28,12 +28,10 @@ from bywire.simulation.advance import (
     put_in_signals,
     work_of,
 )
-from bywire.simulation.buffered_call import BufferedCall
 from bywire.simulation.contacts import unresolved
 from bywire.simulation.engine import Engine, prepare
-from bywire.simulation.layout import Layout
-from bywire.simulation.native import Request
-from bywire.simulation.schedule import Schedule, plan
+from bywire.simulation.native import BufferedCall, Request
+from bywire.simulation.schedule import Layout, Schedule, plan
 
 Status = Literal["done", "interrupted", "unsettled"]
 

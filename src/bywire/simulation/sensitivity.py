@@ -16,11 +16,9 @@ from bywire.core.errors import CompilerError, ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite, require_unchanged, work_of
 from bywire.simulation.compiler import VECTOR, Compiler, find_compiler, load_library
-from bywire.simulation.emission import layout_of
 from bywire.simulation.emit_tangents import emit_tangents
 from bywire.simulation.engine import built_once, prepare
 from bywire.simulation.expressions import needed
-from bywire.simulation.layout import Layout
 from bywire.simulation.native import Request, plan_array, pointer, run_in_calls
 from bywire.simulation.program import Program
 from bywire.simulation.run import (
@@ -30,7 +28,8 @@ from bywire.simulation.run import (
     sampled_stimulus,
     selected,
 )
-from bywire.simulation.stages import Stages, build_stages
+from bywire.simulation.schedule import Layout
+from bywire.simulation.stages import Stages, build_stages, layout_of
 
 DIRECTIONS = 8
 _CHUNK = 5_000  # substeps after which a call of the kernel ends

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.bench.ensemble import changed
-from bywire.bench.side_by_side import key_figures_of
+from bywire.bench.ensemble import changed, key_figures_of
 from bywire.core.errors import BywireError, DeviceError
 from bywire.data.file_format import library
 from bywire.studies.plan import CHUNK, StudyPlan

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bywire.bench.relative_changes import refuse_share_of_temperature, share_of
+from bywire.bench.changes import refuse_share_of_temperature, share_of
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.parameters import Leaf
 from bywire.core.quantities import Unit

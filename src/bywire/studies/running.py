@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from functools import partial
 
 from bywire.bench import running
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.core.typing import Progress
-from bywire.simulation.cuda_device import find_device
+from bywire.simulation.cuda import find_device
 from bywire.simulation.engine import CUDA
 from bywire.studies.designs import WORST
 from bywire.studies.executor import executor_of, require_workers

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
-from bywire.bench.bench_source import names_experiment
+from bywire.bench.bench_file import names_experiment
 from bywire.bench.requirements import Limit, read_limit
 from bywire.core.callers import option
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name

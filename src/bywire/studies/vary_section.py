@@ -13,8 +13,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from bywire.bench.bench import Bench
+from bywire.bench.changes import OPTION
 from bywire.bench.ensemble import varied_choices, varied_leaf
-from bywire.bench.option_names import OPTION
 from bywire.core.errors import FileError, InputError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import leaf_fields
 from bywire.core.section import Hint, Name, Names, Section

@@ -30,7 +30,7 @@ from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.sweep import Sweep, common_interval, complex_values, nyquist
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import as_run
-from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.families import evaluate
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array, Complex

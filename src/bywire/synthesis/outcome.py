@@ -11,8 +11,7 @@ import numpy as np
 from bywire.bench.requirements import Limit
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.typing import Progress, silent
-from bywire.synthesis.linear_case import LinearCase, room, values_of
-from bywire.synthesis.requirement import share_left
+from bywire.synthesis.linear_case import LinearCase, room, share_left, values_of
 
 Status = Literal["met", "infeasible", "interrupted"]
 MISSED = -1e-3

@@ -17,12 +17,10 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Progress
 from bywire.core.units import shown
-from bywire.synthesis.bench_tuning import GENERATIONS, Tuning
-from bywire.synthesis.designer import design
+from bywire.synthesis.designer import design, suffixed
 from bywire.synthesis.linear_case import LinearCase, cases_of, room, values_of
-from bywire.synthesis.optimizer import suffixed
 from bywire.synthesis.outcome import Across, Design, ScheduleDesign
-from bywire.synthesis.verification import Trial, Verification, verify
+from bywire.synthesis.verification import GENERATIONS, Trial, Tuning, Verification, verify
 
 _FINE = 4000  # points of the grid for what is reported
 _ACROSS = 15

@@ -117,7 +117,7 @@ def linearize(
     SolverError
         When the motion under dither does not repeat itself.
     """
-    from bywire.analysis.linear.plant import PLANTS
+    from bywire.analysis.loop import PLANTS
     from bywire.api.linearize import linear_loop_case, linearized_loop
     from bywire.api.linearize_plant import linearize_plant, plant_locus
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.linear.plant import PLANTS
+from bywire.analysis.loop import PLANTS
 from bywire.analysis.reduction import reduction_error
 from bywire.brakes.motorcycle.linear.brake import (
     theoretical,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from analysis.small_linear_models import model_of
-from bywire.analysis.linear.transfer import Realization, minimal
+from bywire.analysis.linear.linear_model import Realization, minimal
 from bywire.analysis.loop import LOOPS
 from bywire.brakes.motorcycle.linear.brake import linear_model, theoretical
 from bywire.brakes.wedge.linear import INPUTS, full, mechanical

@@ -11,7 +11,7 @@ import bywire
 from bywire.api.described import faults
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import bench_text, load, read
-from bywire.bench.faults.course import AT_ZERO
+from bywire.bench.faults.fault_section import AT_ZERO
 from bywire.bench.faults.modes import modes_of
 from bywire.bench.running import run
 from bywire.core.catalog import PARAMETER_SETS

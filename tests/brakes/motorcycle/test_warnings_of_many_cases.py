@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 import bywire
-from bywire.bench.ensemble import changed
-from bywire.bench.side_by_side import key_figures_of
+from bywire.bench.ensemble import changed, key_figures_of
 from bywire.core import watching
 from run_once import run_once
 

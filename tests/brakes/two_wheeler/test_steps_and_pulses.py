@@ -10,7 +10,7 @@ import bywire
 from bywire.bench.experiment import as_run
 from bywire.bench.kpis.vehicle_stop import standstill
 from bywire.brakes.two_wheeler.experiments import straight_stop
-from bywire.simulation.run_group import simulate_group
+from bywire.simulation.ensemble import simulate_group
 
 OFF = {"ecu.abs": "off", "ecu.lift": "off", "ecu.p_rate": "1e7 bar/s"}
 KNOWN = {"ecu.sees": "known", "sensors.encoder.law": "ideal"}

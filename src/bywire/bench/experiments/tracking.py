@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from bywire.bench.experiment import Experiment
-from bywire.bench.generic_experiment import GenericExperiment, Subject
+from bywire.bench.generic_experiment import GenericExperiment, TestedModel
 from bywire.bench.kpis import tracking
-from bywire.bench.stimuli.registry import wanted
+from bywire.bench.stimulus import wanted
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant
@@ -30,7 +30,7 @@ class Options(ParameterSet):
     """moving average for the tracking's key figures, 0 for the raw output"""
 
 
-def build(subject: Subject) -> Experiment:
+def build(subject: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by how well the output follows.
 
     Raises

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from bywire.bench.experiment import Case, FaultyCase
-from bywire.bench.faults.course import MOST, Course
-from bywire.bench.faults.fault_section import Injection, injections
+from bywire.bench.faults.fault_section import MOST, Course, Injection, injections
 from bywire.bench.faults.modes import Mode, falsify, missed
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import Samples, integral
+from bywire.bench.kpis.samples import Samples, integral
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi, Measure, Undefined
-from bywire.bench.kpis.loops import Samples, defect_of_signal, defect_of_times
-from bywire.bench.kpis.samples import signal
+from bywire.bench.kpis.samples import Samples, defect_of_signal, defect_of_times, signal
 from bywire.bench.kpis.translator import (
     BOOL,
     FIGURE,

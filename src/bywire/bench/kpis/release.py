@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import Samples
+from bywire.bench.kpis.samples import Samples
 
 _ROUNDING = 1e-9  # s: of time zero
 

@@ -1,13 +1,101 @@
-"""Samples of signals: how they come out of a recording, and whether they are sound."""
+"""Samples of signals: sums, moving averages, and defects that leave figures undefined.
+
+Python runs them as they stand, and `bywire.bench.kpis.translator` writes their C.
+"""
 
 from __future__ import annotations
+
+from bisect import bisect_right
+from math import isfinite
 
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.loops import defect_of_signal, defect_of_times
+from bywire.bench.kpis.kpi import Undefined
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
+
+Samples = list[float]
+"""a signal, or its times, sample after sample"""
+
+
+def total(y: Samples) -> float:
+    """Sum of the samples in the order of time: Python's own sum differs between its versions."""
+    whole = 0.0
+    for x in y:
+        whole += x
+    return whole
+
+
+def integral(t: Samples, y: Samples) -> float:
+    """Integral over time by the trapezoidal rule, exact for straight pieces."""
+    whole = 0.0
+    for k in range(1, len(t)):
+        whole += 0.5 * (y[k] + y[k - 1]) * (t[k] - t[k - 1])
+    return whole
+
+
+def value_at(t: Samples, y: Samples, instant: float) -> float:
+    """Signal at an instant, straight between samples, as at the ends beyond them."""
+    k = bisect_right(t, instant) - 1
+    if k < 0:
+        return y[0]
+    if k == len(t) - 1 or t[k] == instant:
+        return y[k]
+    return (y[k + 1] - y[k]) / (t[k + 1] - t[k]) * (instant - t[k]) + y[k]
+
+
+def moving_average(t: Samples, y: Samples, period: float) -> Samples:
+    """Centered moving average over a period, as `bywire.bench.kpis.samples.smoothed` has it."""
+    last = len(t) - 1
+    width = min(period, t[last] - t[0])
+    slope = [(y[k + 1] - y[k]) / (t[k + 1] - t[k]) for k in range(len(t) - 1)]
+    primitive = [0.0] * len(t)
+    for k in range(1, len(t)):
+        primitive[k] = primitive[k - 1] + 0.5 * (y[k] + y[k - 1]) * (t[k] - t[k - 1])
+    mean = [0.0] * len(t)
+    i = 0  # the intervals in which both ends of the period lie move on with it
+    j = 0
+    for k in range(len(t)):
+        begin = min(max(t[k] - 0.5 * width, t[0]), t[last] - width)
+        end = begin + width
+        while i < last - 1 and t[i + 1] <= begin:
+            i += 1
+        while j < last - 1 and t[j + 1] <= end:
+            j += 1
+        d = begin - t[i]
+        e = end - t[j]
+        before = primitive[i] + y[i] * d + 0.5 * slope[i] * (d * d)
+        mean[k] = (primitive[j] + y[j] * e + 0.5 * slope[j] * (e * e) - before) / width
+    return mean
+
+
+def defect_of_times(t: Samples) -> Undefined | None:
+    """Why no figure is defined over these times; None over sound ones."""
+    if len(t) < 2:
+        return Undefined(f"{len(t)} samples are too few: two at least are needed")
+    wrong = 0  # counted to the end, in vectors: almost always there is none
+    for k in range(1, len(t)):
+        wrong += not t[k] > t[k - 1]
+    if wrong > 0 or not isfinite(t[0]) or not isfinite(t[-1]):
+        return Undefined("the times do not increase")
+    return None
+
+
+def defect_of_signal(t: Samples, y: Samples) -> Undefined | None:
+    """Why no figure of a signal is defined; None of a sound one."""
+    wrong = 0
+    for x in y:
+        wrong += not isfinite(x)
+    if wrong > 0:
+        k = 0
+        while isfinite(y[k]):
+            k += 1
+        return Undefined(f"not a number at {t[k]:g} s")
+    return None
+
+
+# --- Samples of a recording
 
 
 def signal(recording: xr.Dataset, name: str) -> tuple[Array, str]:
@@ -55,3 +143,60 @@ def defect(t: Array, *signals: Array) -> str:
             return f"{values.size} values do not fit {t.size} times"
         wrong = wrong or defect_of_signal(times, values.tolist())
     return "" if wrong is None else wrong.reason
+
+
+# --- Moving average of arrays
+
+
+def smoothed(t: Array, y: Array, period: float) -> Array:
+    r"""Return the centered moving average over a period.
+
+    .. math:: \bar y(t) = \frac{1}{T} \int_{c - T/2}^{c + T/2} y \, d\tau, \quad
+              c = \min(\max(t, t_0 + T/2), t_1 - T/2)
+
+    The signal counts as straight between samples and is integrated exactly. A ripple of this
+    period vanishes everywhere. There is no delay, but an edge is smeared over half a period to
+    both sides: a dead time is shortened, a rise time lengthened by up to that. Within half a
+    period of either end the nearest full average holds, so a step should not lie there.
+
+    Parameters
+    ----------
+    t
+        Times [s], increasing, shape ``(n,)``.
+    y
+        Signal, shape ``(..., n)``.
+    period
+        Averaging time T [s], at most the whole record; zero or less returns the signal itself.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape ``(..., n)``.
+    """
+    if period <= 0 or t.size < 2:
+        return y
+    width = min(period, float(t[-1] - t[0]))
+    a = np.clip(t - 0.5 * width, t[0], t[-1] - width)
+    slope = (y[..., 1:] - y[..., :-1]) / (t[1:] - t[:-1])
+    pieces = 0.5 * (y[..., 1:] + y[..., :-1]) * np.diff(t)
+    total = np.zeros(y.shape)
+    np.cumsum(pieces, axis=-1, out=total[..., 1:])
+
+    def primitive(at: Array) -> Array:
+        """Return the integral of the piecewise straight signal from ``t[0]`` to each instant."""
+        k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
+        d = at - t[k]
+        there, linear, bent = (np.take(each, k, axis=-1) for each in (total, y, slope))
+        linear *= d
+        bent *= 0.5
+        bent *= d**2
+        there += linear
+        there += bent
+        return there
+
+    return np.asarray((primitive(a + width) - primitive(a)) / width)
+
+
+def treatment(period: float) -> str:
+    """Return the note on figures of a smoothed signal; empty for the raw one."""
+    return f"of the moving average over {period:g} s" if period > 0 else ""

@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import Samples, moving_average
-from bywire.bench.kpis.smoothing import treatment
+from bywire.bench.kpis.samples import Samples, moving_average, treatment
 from bywire.bench.kpis.step_response import Response, level_before, response_from, why_unseen
 
 

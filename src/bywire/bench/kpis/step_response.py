@@ -19,8 +19,7 @@ from math import isfinite
 from typing import NamedTuple
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import Samples, integral, moving_average, total, value_at
-from bywire.bench.kpis.smoothing import treatment
+from bywire.bench.kpis.samples import Samples, integral, moving_average, total, treatment, value_at
 
 _DEAD, _BAND = 0.05, 0.02  # of the step height: end of the dead time; half settling band
 _MOVING = 0.02  # of the step height, between both halves of the window of the steady state

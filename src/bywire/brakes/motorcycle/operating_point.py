@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from bywire.bench.extent import check_memory
+from bywire.bench.experiment import check_memory
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current, memory_at, state_at

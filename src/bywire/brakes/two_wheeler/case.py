@@ -12,7 +12,7 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case
 from bywire.bench.kpis import vehicle_stop
-from bywire.bench.kpis.cases import FamilyJudge
+from bywire.bench.kpis.families import FamilyJudge
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire, at_speed
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.errors import ParameterError

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from bywire.bench.energy_ledger import energy_residual
 from bywire.bench.experiment import Case
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.recording import energy_residual
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import PARKED
 from bywire.brakes.wedge.model import WedgeBrake, state_at

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import cast
 
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.plant import Plant, PlantPoint
-from bywire.analysis.loop import Quantity
+from bywire.analysis.loop import Plant, PlantPoint, Quantity
 from bywire.brakes.wedge.linear import (
     INPUTS,
     OUTPUTS,

@@ -11,8 +11,8 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Recordings
 from bywire.bench.kpis import step_response
+from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.brakes.wedge.case import parameters_of, steps
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import Stimuli, peak, shaft_case, share_at

@@ -22,9 +22,9 @@ from bywire.export.interface import (
 from bywire.export.model_header import braced, number
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.continuous import Continuous, build_continuous
-from bywire.simulation.emission import indented, leaf_namer, statements
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph, Node
+from bywire.simulation.stages import indented, leaf_namer, statements
 
 LEAVES = {"p": "p", "x": "x", "m": "m", "c": "closed", "r": "reaction"}
 """arguments of the C functions by kind of leaf; integrals are none, they are not computed"""

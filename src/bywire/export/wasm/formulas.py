@@ -17,12 +17,11 @@ from typing import Any
 from bywire.core.errors import CompilerError
 from bywire.export.exported import Exported, start_nodes
 from bywire.export.model_header import braced, number
-from bywire.simulation.emission import leaf_count, unread
 from bywire.simulation.emit_rare import PROJECTION, rare_header, rare_results
 from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph, Node, Operation
-from bywire.simulation.layout import COUNTERS
-from bywire.simulation.stages import STATE, Stages
+from bywire.simulation.schedule import COUNTERS
+from bywire.simulation.stages import STATE, Stages, leaf_count, unread
 
 OPERATIONS = (
     "add",

@@ -9,7 +9,7 @@ import pytest
 from rig_runs import emf_inertia, rig
 
 import bywire
-from bywire.bench.recording import energy_residual
+from bywire.bench.energy_ledger import energy_residual
 from bywire.brakes.wedge.case import parameters_of
 from bywire.core.errors import ParameterError
 from run_once import run_once

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.analysis.response.harmonics import total_distortion
+from bywire.analysis.response.sweep import total_distortion
 from bywire.brakes.motorcycle.paper.fig5 import WITH, Loops
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, Runs, parameters
 from bywire.report.friction_figures import hysteresis_loop

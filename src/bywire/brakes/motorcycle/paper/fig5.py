@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.analysis.loop_width import closed_above
-from bywire.analysis.response.harmonics import amplitudes
+from bywire.analysis.response.sweep import amplitudes
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import as_run
 from bywire.bench.kpis import hysteresis
-from bywire.bench.kpis.smoothing import smoothed
-from bywire.bench.result import Result
+from bywire.bench.kpis.hysteresis import closed_above
+from bywire.bench.kpis.samples import smoothed
+from bywire.bench.running import Result
 from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, FACTS
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, parameters
 from bywire.brakes.motorcycle.staircase import jumps

@@ -9,7 +9,7 @@ import xarray as xr
 
 from bywire.analysis.crossings import bandwidth, fall
 from bywire.analysis.response.sweep import complex_values
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.brakes.motorcycle.linear.pressure_loop import BAND, PressureLoop, cancelling_pi
 from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, FACTS, REGIONS, table4_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, parameters

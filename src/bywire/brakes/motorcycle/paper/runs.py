@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import cast
 
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.reproduction import runs

@@ -11,9 +11,9 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import vehicle_stop
+from bywire.bench.kpis.families import units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.kpis.registry import units_of
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.stimulus import Stimulus
 from bywire.brakes.two_wheeler.case import (
     JUDGE,
     Course,

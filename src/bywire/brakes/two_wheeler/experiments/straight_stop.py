@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bywire.bench.experiment import Case, Experiment
-from bywire.bench.kpis.registry import units_of
+from bywire.bench.kpis.families import units_of
 from bywire.brakes.two_wheeler.case import (
     JUDGE,
     Demand,

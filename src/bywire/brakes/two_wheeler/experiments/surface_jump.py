@@ -10,8 +10,8 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import vehicle_stop
+from bywire.bench.kpis.families import units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.kpis.registry import units_of
 from bywire.brakes.two_wheeler.case import (
     JUDGE,
     Demand,

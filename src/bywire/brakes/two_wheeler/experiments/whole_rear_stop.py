@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment
+from bywire.bench.kpis.families import units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.kpis.registry import units_of
 from bywire.bench.kpis.vehicle_stop import standstill
 from bywire.brakes.two_wheeler.case import JUDGE, locked_stop, on_surface, rolling_case
 from bywire.brakes.two_wheeler.experiments.straight_stop import Options

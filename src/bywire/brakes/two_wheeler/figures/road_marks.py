@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.brakes.two_wheeler.case import vehicle_of
 from bywire.core.typing import Array
 from bywire.report import style

@@ -14,8 +14,8 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi, Undefined
-from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.kpis.step_response import Setting
 from bywire.brakes.wedge.case import case_from_parked, mean, steps
 from bywire.brakes.wedge.laws.moment_control import SomeMoment

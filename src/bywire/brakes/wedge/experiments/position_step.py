@@ -16,8 +16,8 @@ import xarray as xr
 from pydantic import AfterValidator, Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.kpis.step_response import Setting
 from bywire.brakes.wedge.case import case_from_parked, parameters_of, steps
 from bywire.brakes.wedge.elements import brake_heart

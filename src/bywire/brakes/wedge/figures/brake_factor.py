@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.brakes.wedge.series import tag
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array

@@ -6,7 +6,7 @@ from typing import cast
 
 from bywire.analysis.loop import Loop, Point, Quantity
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.shaft_rig import Memory, ShaftRig, Stimulus
+from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
 from bywire.core import ops
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
@@ -45,8 +45,8 @@ def point(par: ParameterSet, value: float) -> Point:
         drive=current_drive.State(demand=value, sensed=value, integral=duty),
         motor=servo_motor.State(i=held, theta=0.0, omega=0.0),
     )
-    memory = zeros(Memory)._replace(i_1_ref=value)
-    stimulus = zeros(Stimulus)._replace(i_1_set=value)
+    memory = zeros(ShaftRig.Memory)._replace(i_1_ref=value)
+    stimulus = zeros(ShaftRig.Stimulus)._replace(i_1_set=value)
     return Point(ShaftRig(), clamped, state, memory, stimulus, _STEP)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import cast
 
 from bywire.analysis.loop import Loop, Point, Quantity
-from bywire.brakes.wedge.control import Stimulus
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws import moment_control
 from bywire.brakes.wedge.loops.causes import CAUSES, DRIVE_LIMITS
@@ -47,7 +46,9 @@ def point(par: ParameterSet, value: float) -> Point:
     x *= turning
     memory = memory_at(x, closed)._replace(mode=moment_control.MOMENT, M_set=value, M_meas=value)
     state = state_at(x, closed)._replace(y_M=turning * value)
-    return Point(WedgeBrake(), closed, state, memory, zeros(Stimulus)._replace(M_set=value))
+    return Point(
+        WedgeBrake(), closed, state, memory, zeros(WedgeBrake.Stimulus)._replace(M_set=value)
+    )
 
 
 def _require_braking(value: float, par: WedgeParameters) -> None:

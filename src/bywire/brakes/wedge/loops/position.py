@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from typing import Any, cast
 
 from bywire.analysis.loop import Loop, Point, Quantity
-from bywire.brakes.wedge.control import Stimulus
 from bywire.brakes.wedge.loops.causes import CAUSES, DRIVE_LIMITS
 from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
@@ -73,7 +72,7 @@ def point(par: ParameterSet, value: float) -> Point:
             f"{-free * 1e3:.3g} and {free * 1e3:.3g} mm"
         )
     memory = memory_at(value, closed)
-    stimulus = zeros(Stimulus)._replace(
+    stimulus = zeros(WedgeBrake.Stimulus)._replace(
         theta_1_set=memory.theta_1_ref, theta_2_set=memory.theta_2_ref
     )
     return Point(WedgeBrake(), closed, state_at(value, closed), memory, stimulus)

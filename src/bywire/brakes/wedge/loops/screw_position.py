@@ -8,7 +8,7 @@ from bywire.analysis.loop import Loop, Point, Quantity
 from bywire.brakes.wedge.loops.causes import DRIVE_TRAIN
 from bywire.brakes.wedge.loops.position import BAND, TUNABLES
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.shaft_rig import Memory, ShaftRig, Stimulus
+from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 
@@ -22,8 +22,10 @@ def point(par: ParameterSet, value: float) -> Point:
         par.replace({"rig.mode_1": "position", "rig.load": "screw", "rig.clamp": "open"}),
     )
     state = zeros(ShaftRig.State)._replace(theta_1=value)
-    memory = zeros(Memory)._replace(theta_1_ref=value, last_1=value)
-    return Point(ShaftRig(), rig, state, memory, zeros(Stimulus)._replace(theta_1_set=value))
+    memory = zeros(ShaftRig.Memory)._replace(theta_1_ref=value, last_1=value)
+    return Point(
+        ShaftRig(), rig, state, memory, zeros(ShaftRig.Stimulus)._replace(theta_1_set=value)
+    )
 
 
 LOOP = Loop(

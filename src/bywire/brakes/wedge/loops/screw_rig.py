@@ -9,7 +9,7 @@ from bywire.analysis.loop import Loop, Point, Quantity
 from bywire.brakes.wedge.loops.causes import DRIVE_LIMITS, DRIVE_TRAIN
 from bywire.brakes.wedge.loops.position import BAND, TUNABLES, two_motor_loop
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.screw_rig import Memory, ScrewRig, Stimulus, screws_compliance
+from bywire.brakes.wedge.rigs.screw_rig import ScrewRig, screws_compliance
 from bywire.core import ops
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
@@ -53,8 +53,8 @@ def point(par: ParameterSet, value: float) -> Point:
         ScrewRig(),
         rig,
         zeros(ScrewRig.State)._replace(**state),
-        zeros(Memory)._replace(**memory),
-        zeros(Stimulus)._replace(**stimulus),
+        zeros(ScrewRig.Memory)._replace(**memory),
+        zeros(ScrewRig.Stimulus)._replace(**stimulus),
     )
 
 

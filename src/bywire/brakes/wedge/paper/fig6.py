@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from bywire.analysis.crossings import bandwidth
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.frequency_response import frequency_response
-from bywire.analysis.response.harmonics import amplitudes
-from bywire.analysis.response.sweep import Sweep
+from bywire.analysis.response.sweep import Sweep, amplitudes
 from bywire.brakes.wedge.paper import frequency
 from bywire.brakes.wedge.paper.facts import FACTS
 from bywire.brakes.wedge.paper.fig5 import friction

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.brakes.wedge.case import mean, swing
 from bywire.brakes.wedge.paper.facts import FACTS
 from bywire.brakes.wedge.paper.runs import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.brakes.wedge.paper.facts import ALLOWANCES, FACTS
 from bywire.brakes.wedge.paper.runs import MAIN, WITHOUT_RUNOUT, settled, stacked
 from bywire.reproduction.item import Item, compared, found, reading

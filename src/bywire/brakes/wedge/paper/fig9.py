@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.brakes.wedge.case import mean
 from bywire.brakes.wedge.laws.moment_control import RETRACTING
 from bywire.brakes.wedge.paper.facts import FACTS

@@ -13,7 +13,7 @@ import numpy as np
 
 from bywire.bench.experiment import Case, as_run
 from bywire.bench.kpis.hysteresis import Loop, loop_area
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis.samples import smoothed
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.experiments import friction_ramp, hard_braking
 from bywire.brakes.motorcycle.methods.braking.fit import over_frequency, restricted, unknowns_of
@@ -24,8 +24,8 @@ from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.typing import Array, Complex
 from bywire.data.recursive_filter import filtered
 from bywire.identification.least_squares import solve
+from bywire.simulation.ensemble import fit_lanes, simulate_group
 from bywire.simulation.run import Run, Trajectory, simulate
-from bywire.simulation.run_group import fit_lanes, simulate_group
 
 Par = MotorcycleParameters
 

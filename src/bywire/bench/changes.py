@@ -1,11 +1,11 @@
-"""Changes of parameters by a share of what they are, and of several by a pattern of their names."""
+"""Changes of a bench by name: parameters, options, shares of values, and patterns of names."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
-from typing import Any
+from typing import Any, TypeVar
 
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
@@ -119,3 +119,26 @@ def _scaled(name: str, text: str, share: float, value: Any, is_quantity: bool) -
 def _nodes(value: Any) -> Iterator[float]:
     """Yield the number, or the numbers of a table."""
     yield from value if isinstance(value, tuple) else (value,)
+
+
+# --- Options among parameters
+
+T = TypeVar("T")
+
+OPTION = "options."
+"""what stands before the name of an option"""
+
+
+def split_options(named: Mapping[str, T]) -> tuple[dict[str, T], dict[str, T]]:
+    """Return what is said of parameters, and of options by their names without the beginning.
+
+    Examples
+    --------
+    >>> split_options({"motor.R_m": 0.2, "options.p_to": 25e5})
+    ({'motor.R_m': 0.2}, {'p_to': 2500000.0})
+    """
+    parameters = {name: each for name, each in named.items() if not name.startswith(OPTION)}
+    options = {
+        name.removeprefix(OPTION): each for name, each in named.items() if name.startswith(OPTION)
+    }
+    return parameters, options

@@ -1,0 +1,268 @@
+"""Stimuli: their quantities, their kinds by name, and their sections in a bench.
+
+A stimulus may drive a current, a voltage, a pressure or a force. Its levels therefore carry the
+unit ``level``, which the registry replaces by the unit of the driven signal. Every stimulus is a
+function ``sample(t, par)``: times [s] of any shape give the driven signal [level] in that shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import ModuleType
+from typing import Annotated, Any, get_origin
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from bywire.core.callers import option
+from bywire.core.errors import FileError, ParameterError, UnknownNameError, quoted
+from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.quantities import Unit
+from bywire.core.registry import Kind
+from bywire.core.values import nodes, number
+
+Level = Annotated[float, Unit("level"), Field(allow_inf_nan=False)]
+Amplitude = Annotated[float, Unit("level"), Field(ge=0, allow_inf_nan=False)]
+LevelRate = Annotated[float, Unit("level/s"), Field(gt=0, allow_inf_nan=False)]
+Phase = Annotated[float, Unit("rad"), Field(allow_inf_nan=False)]
+Count = Annotated[int, Unit("1", 16.0), Field(ge=1, le=10_000)]
+
+TOLERANCE = 1e-9  # s: ticks at k * T carry rounding errors far below it
+
+
+def reached(t: NDArray[np.float64], instant: float) -> NDArray[np.bool_]:
+    """Return where the time has reached an instant, rounding errors of a tick forgiven.
+
+    ``t``: times [s], any shape; ``instant``: instant [s].
+    """
+    return t >= instant - TOLERANCE
+
+
+# --- Kinds of stimuli
+
+Value = str | float | Sequence[str | float]
+
+
+@dataclass(frozen=True)
+class StimulusKind:
+    """A kind of stimulus.
+
+    Parameters
+    ----------
+    name
+        What bench files and the command line call it: the name of its module.
+    summary
+        One line for listings.
+    parameter_class
+        Class that validates the values.
+    function
+        ``function(t, par)``: its samples [level] at the times [s].
+    """
+
+    name: str
+    summary: str
+    parameter_class: type[ParameterSet]
+    function: Callable[[NDArray[np.float64], Any], NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """A stimulus with its parameters.
+
+    Parameters
+    ----------
+    kind
+        Name of the stimulus.
+    parameters
+        Its validated parameters, SI inside.
+    """
+
+    kind: str
+    parameters: ParameterSet
+
+    def sample(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the samples at times [s], in the SI unit of the driven signal."""
+        return STIMULI.find(self.kind).function(t, self.parameters)
+
+
+def _declared(module: ModuleType) -> Iterator[StimulusKind]:
+    """Yield the kind that a module is: every module that offers ``Parameters`` and ``sample``."""
+    if hasattr(module, "sample") and hasattr(module, "Parameters"):
+        summary = (module.__doc__ or "").strip().splitlines()[0]
+        name = module.__name__.rpartition(".")[2]
+        yield StimulusKind(name, summary, module.Parameters, module.sample)
+
+
+STIMULI = Kind("stimulus", ("stimuli",), _declared, "bywire.bench.stimuli")
+"""every kind of stimulus"""
+
+
+def create(kind: str, values: Mapping[str, Value], level_unit: str) -> Stimulus:
+    """Build a stimulus from numbers (SI) and texts with units.
+
+    Parameters
+    ----------
+    kind
+        Name of the stimulus, for instance ``"ramp"``.
+    values
+        Its parameters by name. A table's nodes are a sequence, or one text with commas, each
+        node with its unit: ``"0 s, 0.2 s, 1 s"``.
+    level_unit
+        SI unit of the driven signal, for instance ``"A"`` or ``"Pa"``.
+
+    Raises
+    ------
+    UnknownNameError
+        When kind or a parameter's name is unknown.
+    UnitError
+        When a text is no quantity or its unit measures something else.
+    ParameterError
+        When a value is missing, out of range or contradicts another.
+
+    Examples
+    --------
+    >>> step = create("step", {"start": "0 A", "end": "350 mA", "t_step": "0.1 s"}, "A")
+    >>> step.sample(np.array([0.0, 0.1]))
+    array([0.  , 0.35])
+    """
+    cls = STIMULI.find(kind).parameter_class
+    leaves = leaf_fields(cls)
+    numbers: dict[str, Any] = dict(values)
+    for name in [name for name in values if name in leaves]:
+        symbol = leaves[name].unit.symbol.replace("level", level_unit)
+        is_table = get_origin(cls.model_fields[name].annotation) is tuple
+        read = nodes if is_table else number
+        numbers[name] = read(values[name], symbol, f"{kind}.{name}")
+    try:
+        return Stimulus(kind, cls.create(numbers))
+    except UnknownNameError as error:
+        raise UnknownNameError(f"stimulus {kind!r}: {error}") from None
+    except ParameterError as error:
+        raise ParameterError(_in_terms_of(str(error), kind, level_unit)) from None
+
+
+def _in_terms_of(message: str, kind: str, level_unit: str) -> str:
+    """Return the message with the driven signal's unit where the class says ``level``."""
+    unit = "" if level_unit == "1" else f" {level_unit}"
+    lines = message.replace(" level/s", f" {level_unit}/s").replace(" level", unit).splitlines()
+    return "\n".join(f"stimulus {kind!r}: {line.removeprefix('Parameters: ')}" for line in lines)
+
+
+def wanted(stimulus: Stimulus | None, experiment: str) -> Stimulus:
+    """Return a stimulus that an experiment cannot do without.
+
+    Raises
+    ------
+    ParameterError
+        When the bench gives none.
+    """
+    if stimulus is None:
+        raise ParameterError(
+            f"{experiment} needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine "
+            "or table, with its parameters; without a file "
+            f"{option('overrides', {'stimulus.kind': 'step'})} and so on"
+        )
+    return stimulus
+
+
+# --- Sections of a bench
+
+_FILE = ("format", "rate", "start", "decimal", "skip_lines")
+_CLOCK = {"time": "column", "time_unit": "unit"}  # a table of a stimulus would be another one
+_SIGNAL = ("column", "unit", "scale", "sign", "offset", "delay")
+_NAME = "stimulus"
+_SHOWN = 12
+
+
+def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
+    """Return a table's parameters with ``file`` replaced by the nodes that it holds.
+
+    Parameters
+    ----------
+    values
+        Parameters of the stimulus. ``file``: path of the file; ``column``: name of the column,
+        needed where there are several besides time; ``unit``, ``scale``, ``sign``, ``offset``,
+        ``delay``, ``rate``, ``start``, ``format``, ``decimal`` and ``skip_lines`` as in a mapping,
+        and ``time`` and ``time_unit`` for the column of the instants, where the file does not say
+        them; ``max_gap``: longest pause that is bridged. Time starts at the first instant;
+        ``between`` is ``"linear"`` unless given.
+    level_unit
+        SI unit of the driven signal.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be used, or ``times`` or ``values`` are given beside it.
+    """
+    if "file" not in values:
+        return dict(values)
+    from bywire.data.mapping import mapping_from, signal_mapping  # most benches have no file
+    from bywire.data.measurement import read_trace, trace_names
+
+    keys = ("file", "max_gap", *_FILE, *_CLOCK, *_SIGNAL)
+    rest = {key: value for key, value in values.items() if key not in keys}
+    if "times" in rest or "values" in rest:
+        raise ParameterError("stimulus 'table': give either file, or times and values")
+    path = values["file"]
+    if not isinstance(path, str):
+        raise ParameterError(f"stimulus.file: it must be a text, got {quoted(path)}")
+    whole = {key: values[key] for key in _FILE if key in values}
+    clock = {inner: values[key] for key, inner in _CLOCK.items() if key in values}
+    whole |= {"time": clock} if clock else {}
+    signal = {key: values[key] for key in _SIGNAL if key in values}
+    if "column" not in signal:
+        names = trace_names(path, whole)
+        if len(names) != 1:
+            more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+            raise FileError(
+                f"{path} has several columns besides time: name one of them with column "
+                f"({', '.join(names[:_SHOWN])}{more})"
+            )
+        signal["column"] = names[0]
+    meant = signal_mapping(_NAME, signal, "[stimulus]")
+    trace = read_trace(
+        path,
+        {_NAME: level_unit},
+        max_gap=values.get("max_gap", 0.1),
+        mapping=replace(mapping_from(whole), signals={_NAME: meant}),
+    )
+    time = trace["time"].values
+    nodes = {"times": (time - time[0]).tolist(), "values": trace[_NAME].values.tolist()}
+    return {"between": "linear", **rest, **nodes}
+
+
+# --- Sections
+
+
+def stimulus_sections(stimulus: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Return the sections of a stimulus by signal: what is no section itself under ""."""
+    plain = {key: value for key, value in stimulus.items() if not isinstance(value, Mapping)}
+    further = {key: value for key, value in stimulus.items() if isinstance(value, Mapping)}
+    return ({"": plain} if plain else {}) | further
+
+
+def stimulus_of(section: Mapping[str, Any], unit: str, name: str) -> Stimulus:
+    """Return the validated stimulus of a section.
+
+    Parameters
+    ----------
+    section
+        ``{"kind": ..., **parameters}``.
+    unit
+        SI unit of the driven signal.
+    name
+        Of the signal; empty for a plain section.
+
+    Raises
+    ------
+    InputError
+        When there is no such kind, or its parameters or its file do not fit.
+    """
+    values = dict(section)
+    kind = values.pop("kind", None)
+    if not isinstance(kind, str):
+        title = f"stimulus.{name}" if name else "stimulus"
+        raise ParameterError(f"[{title}] needs a kind: {', '.join(sorted(STIMULI.all()))}")
+    return create(kind, with_nodes(values, unit) if kind == "table" else values, unit)
