@@ -26,6 +26,7 @@ from bywire.core.errors import (
 from bywire.core.model import ASSEMBLIES
 from bywire.core.signals import signals_of
 from bywire.report.bench_figures import bench_figures
+from raising import raises
 from run_once import run_once
 from systems.loading import SPRING_AXIS, forgotten, loaded
 
@@ -230,6 +231,12 @@ def test_names_and_units_are_checked_against_the_model(
     with pytest.raises(error) as caught:
         bench("step", options)
     assert text in str(caught.value)
+
+
+def test_an_option_without_default_is_a_mistake_of_its_author() -> None:
+    experiment = replace(GENERIC_EXPERIMENTS.find("stribeck"), defaults={"speed_max": 1.0})
+    with raises(ModelError, name="levels"):
+        experiment.bound(ASSEMBLIES.find("spring-axis")(), {"levels": "0 mm"})
 
 
 def test_stimuli_are_checked_too() -> None:

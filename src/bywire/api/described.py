@@ -218,9 +218,17 @@ def option_table(rows: Sequence[Mapping[str, Any]], heading: str) -> Table:
     return text_table(titles, [[row.get(name) or "-" for name in columns] for row in rows])
 
 
+_PLACES = {"input": "the input", "output": "the output", "level": "the signal"}
+"""units of levels that belong to no signal yet: of generic experiments, and of stimuli"""
+
+
 def _range(leaf: Leaf) -> str:
     from bywire.report.wording import range_text, unit_text
 
+    place, _, per = leaf.unit.symbol.partition("/")
+    if place in _PLACES:
+        numbers = range_text(leaf).replace(f" {leaf.unit.symbol}", "")
+        return f"{numbers} in the unit of {_PLACES[place]}{per and f' per {per}'}"
     bounded = math.isfinite(leaf.low) or math.isfinite(leaf.high)
     unit = unit_text(display_unit(leaf.unit.symbol))
     return range_text(leaf) + ("" if bounded or not unit else f" in {unit}")

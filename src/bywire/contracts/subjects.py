@@ -58,11 +58,14 @@ def demands_on(name: str | None, figures: Collection[str]) -> Iterator[Demand]:
 
 
 def _element(name: str) -> Element:
-    """Return an element by its dotted name, or by the last part of it where that is enough."""
-    known = every_element()
-    ends = [full for full in known if full.rpartition(".")[2] == name]
-    if name in known or len(ends) == 1:
-        return known[name if name in known else ends[0]]
+    """Return an element by its dotted name, or by the last part of it where that is enough.
+
+    Hyphens count as underscores: names of modules have none.
+    """
+    known, module = every_element(), name.replace("-", "_")
+    ends = [full for full in known if full.rpartition(".")[2] == module]
+    if module in known or len(ends) == 1:
+        return known[module if module in known else ends[0]]
     every = {*known, *brakes(), *ASSEMBLIES.all(), *PARAMETER_SETS.all(), *EXPERIMENTS.all()}
     every |= {full.rpartition(".")[2] for full in known}
     raise unknown_name("brake, model, experiment, element or parameter set", name, ends or every)

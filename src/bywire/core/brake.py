@@ -23,6 +23,7 @@ from html import escape
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from bywire.core.arguments import checked
 from bywire.core.errors import BywireError, FileError, ModelError
@@ -324,10 +325,26 @@ def said_with_line(error: BaseException, *inside: str) -> str:
     if isinstance(error, AttributeError) and error.name and error.obj is not None:
         near = get_close_matches(error.name, dir(error.obj), n=1)
         text += f": did you mean {near[0]!r}?" if near else ""
+    if type(error).__name__ == "ValidationError":
+        text = _of_pydantic(error)
     if "truth value of a CasADi" in text:
         text = "an if, and, or, min or max on a number of the model: use bywire.core.ops.where"
     line = _innermost(error, *inside)
     return f"{line[0]}, line {line[1]}: {text}" if line else text
+
+
+def _of_pydantic(error: Any) -> str:
+    """Return an error of pydantic in one line."""
+    lacking = [str(each["loc"][0]) for each in error.errors() if each["type"] == "missing"]
+    wrong = [
+        f"{'.'.join(map(str, each['loc']))}: {each['msg']}"
+        for each in error.errors()
+        if each["type"] != "missing"
+    ]
+    if lacking:
+        names = ", ".join(lacking)
+        wrong.insert(0, f"{names}: give a value here, or a default in the class {error.title}")
+    return "; ".join(wrong)
 
 
 def warn_at_line(text: str, kind: type[Warning], error: BaseException, *inside: str) -> None:
