@@ -127,7 +127,7 @@ def foreign_line(error: BaseException) -> str:
     The innermost frame counts: what our own code raises for it is told as our own.
     """
     folders = [
-        str(Path(brake.file).parent if is_package(brake) else brake.file)
+        str(Path(brake.file).parent if _is_package(brake) else brake.file)
         for brake in brakes().values()
         if brake.module.partition(".")[0] != "bywire"
     ]
@@ -137,7 +137,7 @@ def foreign_line(error: BaseException) -> str:
     return said_with_line(error, *folders)
 
 
-def is_package(brake: Brake) -> bool:
+def _is_package(brake: Brake) -> bool:
     """Return whether a brake is a package and not a single file."""
     return hasattr(importlib.import_module(brake.module), "__path__")
 

@@ -176,7 +176,7 @@ class CitedSet:
         require_units(self.parameter_class)
         plain = {k: v for k, v in self.values.items() if not isinstance(v, Cited)}
         cited = {k: chosen(v, "") for k, v in plain.items()}
-        object.__setattr__(self, "values", computed_values({**self.values, **cited}))
+        object.__setattr__(self, "values", _computed_values({**self.values, **cited}))
         object.__setattr__(self, "source", self.source or "not given")
 
     def parameters(self) -> ParameterSet:
@@ -187,7 +187,7 @@ class CitedSet:
             raise ParameterError(f"parameter set {self.name!r}: {error}") from None
 
 
-def computed_values(values: Mapping[str, Cited]) -> dict[str, Cited]:
+def _computed_values(values: Mapping[str, Cited]) -> dict[str, Cited]:
     """Return cited values, the derived ones computed by their formulas.
 
     Raises

@@ -103,7 +103,7 @@ class PartOptions(TypedDict, total=False):
 OPTIONS = tuple(PartOptions.__annotations__)
 
 
-def parameters_at(path: str, par: Any, where: str, declaration: str) -> Any:
+def _parameters_at(path: str, par: Any, where: str, declaration: str) -> Any:
     """Return the parameters at a dotted path of those of an assembly.
 
     ``where``: whose they are; ``declaration``: how one says where they stand.
@@ -292,7 +292,7 @@ class Part(Generic[X, U, F, P]):
         ModelError
             When there are none where it looks for them.
         """
-        return parameters_at(self.path, par, self.where, f"Part({self.kind}, par='...')")
+        return _parameters_at(self.path, par, self.where, f"Part({self.kind}, par='...')")
 
     def state_at(self, instant: Instant, fixed: tuple[str, ...] | None) -> Any:
         """Return its state; ``fixed`` are those taken value-only, None for all."""
@@ -532,7 +532,7 @@ class Sub(Generic[A]):
             When there are none where it looks for them.
         """
         declaration = f"Sub({type(self.assembly).__name__}, par='...')"
-        return parameters_at(self.path, par, self.where, declaration)
+        return _parameters_at(self.path, par, self.where, declaration)
 
     # Tasks.
 

@@ -16,10 +16,10 @@ from bywire.core.signals import signals_of
 from bywire.core.traced import Traced, names_in
 from bywire.core.wires import Instant, Wire, instant_of
 
-AnyAssembly = Assembly[Any, Any]
+_AnyAssembly = Assembly[Any, Any]
 
 
-def check_wiring(model: AnyAssembly, par: ParameterSet) -> None:
+def check_wiring(model: _AnyAssembly, par: ParameterSet) -> None:
     """Evaluate an assembly on dimensions and check what it sets and returns.
 
     Raises
@@ -48,7 +48,7 @@ def check_wiring(model: AnyAssembly, par: ParameterSet) -> None:
 class _Operands:
     """What an assembly is evaluated on, and how."""
 
-    def __init__(self, model: AnyAssembly, par: ParameterSet) -> None:
+    def __init__(self, model: _AnyAssembly, par: ParameterSet) -> None:
         self.model = model
         self.second = Dimension.of("s")
         self.state = self.tuple(model.State)
@@ -91,10 +91,10 @@ class _Operands:
         except UnitError as error:
             raise ModelError(f"{_place(self.model)}: {what}: {error}") from None
 
-    def wired(self, method: str) -> AnyAssembly:
+    def wired(self, method: str) -> _AnyAssembly:
         """Return the assembly at an instant, with the lines in which its wires were set."""
         lines: dict[str, str] = {}
-        wired: AnyAssembly = self.evaluated(
+        wired: _AnyAssembly = self.evaluated(
             method,
             lambda: self.model.at(
                 self.state,
@@ -120,7 +120,7 @@ class _Operands:
             ) from None
 
 
-def _check_inputs(model: AnyAssembly, at: _Operands, w: AnyAssembly) -> None:
+def _check_inputs(model: _AnyAssembly, at: _Operands, w: _AnyAssembly) -> None:
     instant = instant_of(w, "wire")
     for name, wire in _wires(type(model)).items():
         at.dimension(wire.signal.unit, name)
@@ -151,7 +151,7 @@ def _check_inputs(model: AnyAssembly, at: _Operands, w: AnyAssembly) -> None:
         _check_inputs(sub.assembly, at, getattr(w, name))
 
 
-def _check_held(model: AnyAssembly, par: ParameterSet) -> None:
+def _check_held(model: _AnyAssembly, par: ParameterSet) -> None:
     """Check that the assemblies within get what feeds them, and that their tasks run."""
     known = signals_of(model.Stimulus) | signals_of(model.Memory)
     running = {task.name for task in model.tasks(par)}
@@ -170,13 +170,13 @@ def _check_held(model: AnyAssembly, par: ParameterSet) -> None:
             )
 
 
-def _check_balance(model: AnyAssembly, at: _Operands, w: AnyAssembly) -> None:
+def _check_balance(model: _AnyAssembly, at: _Operands, w: _AnyAssembly) -> None:
     rows = at.evaluated("balance", model.balance, at.state, at.state, at.memory, at.par, at.contact)
     for name, row in zip(model.State._fields, rows, strict=True):
         _require(model, "balance", name, row, str(at.balance[name]), "mass times its derivative")
 
 
-def _check_contacts(model: AnyAssembly, at: _Operands) -> None:
+def _check_contacts(model: _AnyAssembly, at: _Operands) -> None:
     gaps = at.evaluated("gap", model.gap, at.state, at.state, at.par)
     matrices = at.evaluated("compliance", model.compliance, at.par)
     forces = iter(at.contact)
@@ -191,7 +191,7 @@ def _check_contacts(model: AnyAssembly, at: _Operands) -> None:
                 )
 
 
-def _protocol(model: AnyAssembly, at: _Operands, method: str) -> Iterator[Any]:
+def _protocol(model: _AnyAssembly, at: _Operands, method: str) -> Iterator[Any]:
     """Yield the function of the protocol that a method is a part of, and its arguments."""
     if method == "power":
         yield from (
@@ -217,7 +217,7 @@ def _protocol(model: AnyAssembly, at: _Operands, method: str) -> Iterator[Any]:
 
 
 def _require(
-    model: AnyAssembly,
+    model: _AnyAssembly,
     method: str,
     name: str,
     value: Any,
@@ -246,7 +246,7 @@ def _wires(cls: type[Any]) -> Mapping[str, Wire]:
     return {name: value for name, value in every.items() if isinstance(value, Wire)}
 
 
-def _place(model: AnyAssembly, method: str = "wire") -> str:
+def _place(model: _AnyAssembly, method: str = "wire") -> str:
     """Return class, file and line of a method."""
     cls = type(model)
     function = getattr(cls, method)
@@ -259,7 +259,7 @@ def _place(model: AnyAssembly, method: str = "wire") -> str:
         return cls.__name__
 
 
-def _line_of(error: BaseException, model: AnyAssembly) -> str:
+def _line_of(error: BaseException, model: _AnyAssembly) -> str:
     """Return the innermost line outside of the numbers' own operations."""
     checkers = {__file__, inspect.getsourcefile(Dimension), inspect.getsourcefile(fits)}
     frames = [

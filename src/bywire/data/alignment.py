@@ -184,7 +184,7 @@ def resample(
     return Aligned(dataset, report)
 
 
-def instants_of(measurement: xr.Dataset, name: str) -> NDArray[np.float64]:
+def _instants_of(measurement: xr.Dataset, name: str) -> NDArray[np.float64]:
     """Return the instants of a signal [s]."""
     (dim,) = measurement[name].dims
     return np.asarray(measurement[dim].values, dtype=np.float64)
@@ -215,7 +215,7 @@ def _quality(measurement: xr.Dataset, name: str, longest: float | None) -> Chann
     limits = (float(low), float(high)) if low is not None and high is not None else None
     try:
         return quality(
-            instants_of(measurement, name), signal.values, max_gap=longest, limits=limits
+            _instants_of(measurement, name), signal.values, max_gap=longest, limits=limits
         )
     except ValueError as error:
         raise ParameterError(f"{name} has {error}: two at least are needed") from None
@@ -258,7 +258,7 @@ def _on_axis(
     left_out: tuple[str, ...],
 ) -> tuple[NDArray[np.float64], int]:
     """Return a signal on the axis, and how many of its values are NaN there."""
-    time, values = instants_of(measurement, name), measurement[name].values
+    time, values = _instants_of(measurement, name), measurement[name].values
     there = ~np.isnan(values)
     if not there.all():
         time, values = time[there], values[there]

@@ -36,7 +36,7 @@ _BLOCK = 1 << 20  # instants that are looked at together: their differences take
 
 
 @dataclass(frozen=True)
-class AxisKey:
+class _AxisKey:
     """What tells one time axis from another.
 
     Parameters
@@ -55,7 +55,7 @@ class AxisKey:
 
 
 def instants(
-    file: Path, source: Source, key: AxisKey, column: NDArray[np.float64] | None
+    file: Path, source: Source, key: _AxisKey, column: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
     """Return the instants of an axis [s], shape ``(sample,)``; they increase.
 
@@ -99,7 +99,7 @@ def _measured(
 ) -> NDArray[np.float64]:
     # A slower clock beside a faster one ends earlier; what follows is blank.
     time = column[: _filled(column)]
-    bad = first_not_increasing(time)
+    bad = _first_not_increasing(time)
     if bad is not None:
         where = f"{file}, column {clock.column!r}, {source.place(clock.column, bad)}"
         now, before = float(time[bad]), float(time[bad - 1]) if bad else np.nan
@@ -125,7 +125,7 @@ def _filled(column: NDArray[np.float64]) -> int:
     return 0
 
 
-def first_not_increasing(time: NDArray[np.float64]) -> int | None:
+def _first_not_increasing(time: NDArray[np.float64]) -> int | None:
     """Return the first index whose instant does not come after the one before, None if all do."""
     if time.size and not np.isfinite(time[0]):
         return 0
@@ -283,7 +283,7 @@ def _dataset(
     clocks = [c.clock.column for c in chosen if c.clock.column]
     names = list(dict.fromkeys([*clocks, *(c.column for c in chosen)]))
     values = source.read(names, progress)
-    keys = [AxisKey(c.clock, len(values[c.column]), c.mapping.delay) for c in chosen]
+    keys = [_AxisKey(c.clock, len(values[c.column]), c.mapping.delay) for c in chosen]
     dims = _dimensions(chosen, keys)
     # Numbers are turned into SI where they lie, unless they are needed once more as they are.
     uses = Counter([c.column for c in chosen] + [k.clock.column for k in dims])
@@ -329,10 +329,10 @@ def _timed(
     return numbers[:count]
 
 
-def _dimensions(chosen: Sequence[Chosen], keys: Sequence[AxisKey]) -> dict[AxisKey, str]:
+def _dimensions(chosen: Sequence[Chosen], keys: Sequence[_AxisKey]) -> dict[_AxisKey, str]:
     """Return the dimension of every time axis; that of most signals is ``time``."""
     main = Counter(keys).most_common(1)[0][0]
-    dimensions: dict[AxisKey, str] = {main: "time"}
+    dimensions: dict[_AxisKey, str] = {main: "time"}
     for signal, key in zip(chosen, keys, strict=True):
         dimensions.setdefault(key, f"time_{signal.mapping.name}")
     for signal in chosen:

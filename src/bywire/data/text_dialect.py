@@ -217,7 +217,7 @@ def dialect_of(head: Head) -> Dialect:
     if first is not None and options.titles is None:
         dialect, begin = _from_numbers(head, at, begin, *first)
     if dialect is None:
-        separator = chosen or (first[0] if first else separator_of(head, begin))
+        separator = chosen or (first[0] if first else _separator_of(head, begin))
         dialect = _headed(head, begin, separator, options.titles)
     if dialect.separator == "," and options.decimal == ",":
         raise FileError(f"{path}: a comma cannot separate columns and mark decimals: decimal = '.'")
@@ -231,7 +231,7 @@ def dialect_of(head: Head) -> Dialect:
     return dialect
 
 
-def separator_of(head: Head, at: int) -> str:
+def _separator_of(head: Head, at: int) -> str:
     """Return the separator of a line that is no row of numbers; quotes do not count."""
     bare = re.sub(r'"[^"]*"', "", head.plain(at))
     found = next((mark for mark in "\t;," if mark in bare), "")
@@ -463,9 +463,9 @@ def _kind(cells: list[str]) -> str:
 
 # --- Files with a description before the table: LabVIEW (LVM) and VBOX
 
-LVM_MARK = "LabVIEW Measurement"
+_LVM_MARK = "LabVIEW Measurement"
 END_OF_HEADER = "***End_of_Header***"
-VBOX_MARK = "[column names]"
+_VBOX_MARK = "[column names]"
 
 _LVM_SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";", "Space": " "}
 _VBOX_UNITS = {
@@ -490,9 +490,9 @@ def layout_of(head: Head) -> Dialect | None:
     FileError
         When its description does not fit together.
     """
-    if head.lines and head.lines[0].startswith(LVM_MARK):
+    if head.lines and head.lines[0].startswith(_LVM_MARK):
         return _lvm(head)
-    if any(line.strip().casefold() == VBOX_MARK for line in head.lines):
+    if any(line.strip().casefold() == _VBOX_MARK for line in head.lines):
         return _vbox(head)
     return None
 

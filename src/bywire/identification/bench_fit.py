@@ -138,7 +138,7 @@ _CAPTIONS = {
 }
 
 
-def curves_of(prediction: Prediction, role: str) -> tuple[Curve, ...]:
+def _curves_of(prediction: Prediction, role: str) -> tuple[Curve, ...]:
     """Return measured beside modeled, a curve for each output."""
     label = prediction.label
     suffix = f"-{_file_name(label)}" if label else ""
@@ -149,7 +149,7 @@ def curves_of(prediction: Prediction, role: str) -> tuple[Curve, ...]:
     )
 
 
-def compared(measured: MeasuredRun, trial: Trial, fit: Estimate) -> Prediction:
+def _compared(measured: MeasuredRun, trial: Trial, fit: Estimate) -> Prediction:
     """Return a record beside the model with the estimates; settling is left out.
 
     Parameters
@@ -169,7 +169,7 @@ def compared(measured: MeasuredRun, trial: Trial, fit: Estimate) -> Prediction:
     )
 
 
-def checks_of(
+def _checks_of(
     trials: Sequence[Trial], fit: Estimate, options: Options, resampled: bool = False
 ) -> tuple[Check, ...]:
     """Return whether the model explains the records, and whether the values mean something.
@@ -264,7 +264,7 @@ def _outliers(far: NDArray[np.bool_], options: Options) -> Check:
     )
 
 
-def noise_check(doubtful: Mapping[str, str], given: Mapping[str, str]) -> tuple[Check, ...]:
+def _noise_check(doubtful: Mapping[str, str], given: Mapping[str, str]) -> tuple[Check, ...]:
     """Return whether each output's noise is one, where the record itself had to tell it.
 
     Parameters
@@ -317,7 +317,7 @@ def _of_bench(fit: Estimate, label: str) -> bool:
     return is_parameter(unknown.name) and not unknown.name.startswith(_OWN)
 
 
-def believable(fit: Estimate) -> dict[str, float]:
+def _believable(fit: Estimate) -> dict[str, float]:
     """Return the parameters by name, less those whose values mean nothing."""
     vague = fit.vague()
     return {
@@ -327,7 +327,7 @@ def believable(fit: Estimate) -> dict[str, float]:
     }
 
 
-def validation_of(held: Prediction, options: Options) -> tuple[Check, ...]:
+def _validation_of(held: Prediction, options: Options) -> tuple[Check, ...]:
     """Return how much of a held-out record is accounted for, signal by signal."""
     checks = []
     for name in held.pairs:
@@ -352,7 +352,7 @@ def validation_of(held: Prediction, options: Options) -> tuple[Check, ...]:
     return tuple(checks)
 
 
-def figures_of(
+def _figures_of(
     records: Sequence[Prediction], trials: Sequence[Trial]
 ) -> dict[str, tuple[float, str]]:
     """Return noise, variance accounted for and error of every output in every record."""
@@ -398,7 +398,7 @@ def noise_given(name: str, text: str, unit: str) -> float:
     return noise
 
 
-def output_noise(measured: MeasuredRun, name: str, text: str) -> float:
+def _output_noise(measured: MeasuredRun, name: str, text: str) -> float:
     """Return the standard deviation of an output's noise, as given or of the record.
 
     Parameters
@@ -433,12 +433,12 @@ def output_noise(measured: MeasuredRun, name: str, text: str) -> float:
     return max(noise_of(there) if before is None else float(before), _FINEST * span)
 
 
-def resampled(measured: MeasuredRun) -> bool:
+def _resampled(measured: MeasuredRun) -> bool:
     """Return whether a record's outputs lie between the samples that were measured."""
     return any(NOISE_OF_SAMPLES in measured.data[name].attrs for name in measured.compared)
 
 
-def overestimated(
+def _overestimated(
     records: Sequence[MeasuredRun],
     trials: Sequence[Trial],
     residuals: Array,
@@ -536,7 +536,7 @@ class BenchFit:
             unknowns += self.starts(record, trial)
         problem = replace(
             output_error(trials, unknowns),
-            silent=switched_off(bench.par, unknowns, exact_laws(type(bench.par))),
+            silent=switched_off(bench.par, unknowns, _exact_laws(type(bench.par))),
         )
         starts = starts_of(
             unknowns, self.question.ranges, effort.starts, effort.spread, effort.seed
@@ -554,30 +554,30 @@ class BenchFit:
         fit = estimate(problem, options.loss, led.best.values)
         reached = _reached(led, fit)
         shown = [
-            compared(record, trial, fit)
+            _compared(record, trial, fit)
             for record, trial in zip(records.values(), trials, strict=True)
         ]
         held = self._held_out(bench, fit, options)
-        uneven = any(resampled(record) for record in records.values())
-        checks = checks_of(trials, fit, options, uneven)
+        uneven = any(_resampled(record) for record in records.values())
+        checks = _checks_of(trials, fit, options, uneven)
         doubtful = (
             {}
             if fit.is_exact
-            else overestimated(list(records.values()), trials, fit.residuals, self.question.noise)
+            else _overestimated(list(records.values()), trials, fit.residuals, self.question.noise)
         )
         return Identified(
             estimates={"output error": fit},
-            parameters=believable(fit),
-            figures=figures_of(shown, trials),
+            parameters=_believable(fit),
+            figures=_figures_of(shown, trials),
             checks=(
                 *checks,
-                *noise_check(doubtful, self.question.noise),
+                *_noise_check(doubtful, self.question.noise),
                 *starts_check(reached, effort.starts),
-                *(() if held is None else validation_of(held, options)),
+                *(() if held is None else _validation_of(held, options)),
             ),
             curves=(
-                *(curve for record in shown for curve in curves_of(record, "fit")),
-                *(() if held is None else curves_of(held, "validation")),
+                *(curve for record in shown for curve in _curves_of(record, "fit")),
+                *(() if held is None else _curves_of(held, "validation")),
             ),
             notes=(
                 *_said(records, options, coarse=not checks[0].holds),
@@ -612,12 +612,12 @@ class BenchFit:
     def trial(self, measured: MeasuredRun, label: str) -> Trial:
         """Return a record beside its run; while the run settles nothing is compared."""
         before = np.full(measured.settled, np.nan)
-        smooth = exact_laws(type(measured.case.par))
+        smooth = _exact_laws(type(measured.case.par))
         values = {name: measured.data[name].values for name in measured.compared}
         return Trial(
             replace(measured.run, par=measured.run.par.replace(smooth)),
             {name: np.concatenate((before, row)) for name, row in values.items()},
-            {name: output_noise(measured, name, self.question.noise[name]) for name in values},
+            {name: _output_noise(measured, name, self.question.noise[name]) for name in values},
             label,
             start=None
             if measured.bench.definition.preview
@@ -645,7 +645,7 @@ class BenchFit:
             raise ParameterError(f"holdout = {data}: read it first, bywire.read_measurement does")
         held = self.record(bench, data, options)
         # A label that no record has: only what all records share is known of it.
-        return compared(held, self.trial(held, "held out"), fit)
+        return _compared(held, self.trial(held, "held out"), fit)
 
 
 def _nearer(problem: Problem, start: Array) -> Array:
@@ -670,7 +670,7 @@ def _begun(bench: Bench, case: Any, values: Mapping[str, float]) -> tuple[Any, A
     return begun.state, begun.memory
 
 
-def exact_laws(cls: type[ParameterSet]) -> dict[str, str]:
+def _exact_laws(cls: type[ParameterSet]) -> dict[str, str]:
     """Return the laws of a parameter class that leave rounding out, by dotted name.
 
     Rounding has no derivative, closed loops would look open. What rounds chooses between a law
@@ -684,7 +684,7 @@ def exact_laws(cls: type[ParameterSet]) -> dict[str, str]:
 
 
 def _smoothed(bench: Bench) -> tuple[str, ...]:
-    known, exact = bench.par.choices(), exact_laws(type(bench.par))
+    known, exact = bench.par.choices(), _exact_laws(type(bench.par))
     changed = [name for name, law in exact.items() if known.get(name, law) != law]
     return tuple(
         f"{name} = {exact[name]} in the fit: rounding has no derivative" for name in changed

@@ -34,7 +34,7 @@ from bywire.simulation.run import Run, Trajectory, simulate
 _ACCUMULATED = ("J", "s")  # errors of which say when something went wrong, not how well it fits
 
 
-def compared_outputs(
+def _compared_outputs(
     case: Case, data: xr.Dataset, wanted: Sequence[str] | None, driven: Mapping[str, str]
 ) -> tuple[list[str], tuple[str, ...]]:
     """Return which outputs are compared, and what the user should know of it.
@@ -71,7 +71,7 @@ def compared_outputs(
     for name in wanted:
         if name not in signals:
             raise unknown_name("output", name, signals)
-        require_measured(data, name, signals[name])
+        _require_measured(data, name, signals[name])
     return list(wanted), notes
 
 
@@ -83,7 +83,7 @@ def _tells(values: Array, unit: str) -> bool:
     return not (unit == "1" and bool(np.all(there == np.round(there))))
 
 
-def missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
+def _missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
     """Return a sentence for each compared signal that misses samples."""
     counts = {name: int(np.isnan(data[name].values).sum()) for name in compared}
     total = data.sizes["time"]
@@ -95,7 +95,7 @@ def missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
     ]
 
 
-def require_measured(data: xr.Dataset, name: str, signal: Signal) -> None:
+def _require_measured(data: xr.Dataset, name: str, signal: Signal) -> None:
     """Refuse a signal that is not measured, or in a unit of something else."""
     require_signals(data, [name])
     unit = str(data[name].attrs.get("units", "1"))
@@ -187,7 +187,7 @@ def measured_run(
     """
     chosen = case_of(bench, case)
     driven = _inputs(chosen, data, inputs)
-    compared, passed = compared_outputs(chosen, data, outputs, driven)
+    compared, passed = _compared_outputs(chosen, data, outputs, driven)
     bench, begun_at, notes = _started(bench, data, compared)
     chosen = case_of(bench, case)
     if not settle and chosen.settle > 0.0:
@@ -248,7 +248,7 @@ def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> d
     for stimulus, signal in wanted.items():
         if stimulus not in stimuli:
             raise unknown_of_few("stimulus", stimulus, driven)
-        require_measured(data, signal, stimuli[stimulus])
+        _require_measured(data, signal, stimuli[stimulus])
     return dict(wanted)
 
 
@@ -400,7 +400,7 @@ def replay(
         measured.run,
         (
             *measured.notes,
-            *missed_samples(measured.data, measured.compared),
+            *_missed_samples(measured.data, measured.compared),
             *energy_doubts_of(measured.run, modeled),
             *filter(
                 None, [unestimated(failures) if failures and not others else abandoned(failures)]

@@ -112,7 +112,9 @@ def require_steps(data: xr.Dataset, name: str, answer: str, label: str) -> None:
         raise wrong_sign(f"{answer} of record {label or '1'}", name, f"correlation {together:.2f}")
 
 
-def identified_loop(trials: Sequence[Trial], par: ParameterSet, names: Sequence[str]) -> Identified:
+def _identified_loop(
+    trials: Sequence[Trial], par: ParameterSet, names: Sequence[str]
+) -> Identified:
     """Return a closed loop's parameters from its runs.
 
     Parameters
@@ -209,7 +211,7 @@ class LoopOptions(ParameterSet):
         return gains if self.unknowns == "gains" else (*gains, *winding)
 
 
-def without_lead(trial: Trial, data: xr.Dataset, lead: float) -> Trial:
+def _without_lead(trial: Trial, data: xr.Dataset, lead: float) -> Trial:
     """Return a trial of which the first seconds of its record do not count.
 
     Parameters
@@ -285,7 +287,7 @@ class CurrentLoop:
         that the data tells least keeps its value, and is named.
         """
         trials = [self._trial(record, par, options, label) for label, record in split(data).items()]
-        return identified_loop(trials, par, options.names(self.gains, self.winding))
+        return _identified_loop(trials, par, options.names(self.gains, self.winding))
 
     def _trial(
         self, data: xr.Dataset, par: ParameterSet, options: LoopOptions, label: str
@@ -305,7 +307,7 @@ class CurrentLoop:
             memory=memory,
             label=label,
         )
-        return without_lead(beside, data, options.lead)
+        return _without_lead(beside, data, options.lead)
 
     def record(self, time: Array, demand: Array, current: Array, label: str) -> xr.Dataset:
         """Return a record of demand and current [A]; ``label``: long name of the current."""

@@ -69,7 +69,7 @@ def moved_run(run: Run, values: Mapping[str, float], start: Start | None = None)
     return replace(run, par=run.par.replace(par), state=state._replace(**fixed), memory=memory)
 
 
-def start_slopes(
+def _start_slopes(
     start: Start, run: Run, unknowns: Sequence[Unknown], values: Mapping[str, float]
 ) -> tuple[Array, Array]:
     """Return derivatives of the initial state and memory, shapes (states, p) and (memories, p).
@@ -443,6 +443,6 @@ def _computed(
     if trial.start is None:
         answer = simulate_with_sensitivities(run, list(named), signals)
     else:
-        slopes = start_slopes(trial.start, run, unknowns, named)
+        slopes = _start_slopes(trial.start, run, unknowns, named)
         answer = simulate_with_sensitivities(run, list(named), signals, *slopes)
     return answer.trajectory.values, answer.derivatives

@@ -402,7 +402,7 @@ def judge_fit(
     )
 
 
-def require_known(tolerances: Mapping[str, str], figures: Mapping[str, Sequence[Kpi]]) -> None:
+def _require_known(tolerances: Mapping[str, str], figures: Mapping[str, Sequence[Kpi]]) -> None:
     """Refuse tolerances of figures or signals that there are not.
 
     Parameters
@@ -578,7 +578,7 @@ def judged(
     fits = []
     for segment in segments:
         figures = {name: fit_figures(pair, segment) for name, pair in outputs.items()}
-        require_known(segment.tolerances, figures)
+        _require_known(segment.tolerances, figures)
         for name, kpis in figures.items():
             if others:
                 in_others = {f: fit_figures(made[name], segment) for f, made in others.items()}

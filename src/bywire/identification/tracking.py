@@ -73,7 +73,7 @@ RELATIONS = Kind("relation", ("tracked",), instances(Relation))
 """by preference: the first of a parameter whose signals are measured is taken"""
 
 
-def find_relation(name: str, data: xr.Dataset, par: Any) -> Relation:
+def _find_relation(name: str, data: xr.Dataset, par: Any) -> Relation:
     """Return the relation that tells a parameter from what is measured.
 
     Parameters
@@ -397,7 +397,7 @@ def track(name: str, data: xr.Dataset, par: Any, block: float | None = None) -> 
     UnknownNameError, ParameterError
         When nothing tells the parameter, or too little is measured.
     """
-    relation = find_relation(name, data, par)
+    relation = _find_relation(name, data, par)
     interval = even_interval(data["time"].values)
     span = float(data["time"].values[-1] - data["time"].values[0])
     wanted = _turn(data) if block is None else block

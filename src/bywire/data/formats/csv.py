@@ -52,7 +52,7 @@ from bywire.data.time_stamps import (
 if TYPE_CHECKING:
     import xarray as xr
 
-LOOKED_AT = 1 << 16
+_LOOKED_AT = 1 << 16
 """bytes before the end that are looked at for a number that was cut"""
 
 _LAST = 100  # rows before the last one that are looked at
@@ -62,7 +62,7 @@ _NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
 @dataclass
-class Seen:
+class _Seen:
     """What was found in a table beside its numbers.
 
     Parameters
@@ -80,15 +80,15 @@ class Seen:
     empty: int = 0
     origins: dict[int, int] = field(default_factory=dict)
 
-    def add(self, other: Seen) -> None:
+    def add(self, other: _Seen) -> None:
         """Add what was found in a part of the table."""
         self.marks += other.marks
         self.comments += other.comments
         self.empty += other.empty
 
 
-def strict_columns(
-    path: Path, block: bytes, first_line: int, dialect: Dialect, indices: Sequence[int], seen: Seen
+def _strict_columns(
+    path: Path, block: bytes, first_line: int, dialect: Dialect, indices: Sequence[int], seen: _Seen
 ) -> list[NDArray[np.float64]]:
     """Return columns of a block of lines; blank cells become NaN, blank lines are left out.
 
@@ -167,7 +167,7 @@ def _require_width(path: Path, line: int, cells: list[str], dialect: Dialect) ->
         )
 
 
-def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect, seen: Seen) -> float:
+def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect, seen: _Seen) -> float:
     if dialect.is_mark(cell):
         if cell:
             seen.marks[column, cell] += 1
@@ -198,7 +198,7 @@ def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect, see
     )
 
 
-def require_whole_end(path: Path, block: bytes, last_line: int, dialect: Dialect) -> None:
+def _require_whole_end(path: Path, block: bytes, last_line: int, dialect: Dialect) -> None:
     """Refuse a table that seems to end within its last number.
 
     Many programs end a table without a line end, and a cut there does not show by itself. It does
@@ -255,7 +255,7 @@ _QUOTED = rb'(?m)(?:^|%s) *"[^"\r\n]*"(?=%s|\r?$)'  # a cell, separators around 
 _COMMENTS = tuple(mark.encode() for mark in COMMENTS)
 _STAMPS = (CLOCK, MOMENT, DAY)
 
-RASTER = "X_Value"
+_RASTER = "X_Value"
 """name of the instants that a file has as a start and a step alone, as LabVIEW calls them"""
 
 
@@ -265,7 +265,7 @@ class TextSource:
     def __init__(self, path: Path, dialect: Dialect) -> None:
         self._path = path
         self._dialect = dialect
-        self._seen = Seen()
+        self._seen = _Seen()
         names = _names(dialect)
         self.order: Sequence[str] = names
         self._index = {name: k for k, name in enumerate(names)}
@@ -287,14 +287,14 @@ class TextSource:
             if name not in self.left_out
         }
         if self._dialect.raster is not None:
-            columns = {name: replace(column, clock=RASTER) for name, column in columns.items()}
-            columns[RASTER] = Column(RASTER, "s")
+            columns = {name: replace(column, clock=_RASTER) for name, column in columns.items()}
+            columns[_RASTER] = Column(_RASTER, "s")
         return columns
 
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
         """Return the numbers of some columns; blank cells become NaN."""
         raster = self._dialect.raster
-        plain = [name for name in names if raster is None or name != RASTER]
+        plain = [name for name in names if raster is None or name != _RASTER]
         indices = [self._index[name] for name in plain] or [0]
         is_dated = self._day is not None and any(self._kind(k) == CLOCK for k in indices)
         if is_dated:
@@ -316,7 +316,7 @@ class TextSource:
         self._remark()
         numbers = dict(zip(plain, columns, strict=False))
         if raster is not None:
-            numbers[RASTER] = raster[0] + raster[1] * np.arange(columns[0].size, dtype=np.float64)
+            numbers[_RASTER] = raster[0] + raster[1] * np.arange(columns[0].size, dtype=np.float64)
         return {name: numbers[name] for name in names}
 
     def place(self, name: str, row: int) -> str:
@@ -349,8 +349,8 @@ class TextSource:
                 growing = GrowingColumns(len(indices), int(expected) + 1)
             growing.append(columns)
             line += block.count(b"\n")
-            tail = tail[-LOOKED_AT:] + block[-LOOKED_AT:]
-            require_whole_end(self._path, tail, line, dialect)
+            tail = tail[-_LOOKED_AT:] + block[-_LOOKED_AT:]
+            _require_whole_end(self._path, tail, line, dialect)
             progress(f"reading {self._path.name}", min(1.0, done / max(size, 1)))
         return growing.finished()
 
@@ -397,7 +397,7 @@ class TextSource:
             self.remarks.append(f"lines of comment left out of the table: {self._seen.comments}")
         if self._seen.empty:
             self.remarks.append(f"rows of empty cells left out: {self._seen.empty}")
-        self._seen = Seen(origins=self._seen.origins)
+        self._seen = _Seen(origins=self._seen.origins)
 
 
 def _names(dialect: Dialect) -> list[str]:
@@ -455,7 +455,7 @@ def _blocks(path: Path, dialect: Dialect) -> Iterator[bytes]:
 
 
 def _fast(
-    block: bytes, dialect: Dialect, indices: Sequence[int], seen: Seen
+    block: bytes, dialect: Dialect, indices: Sequence[int], seen: _Seen
 ) -> list[NDArray[np.float64]] | None:
     """Return the columns of a block without a flaw; None where each line needs a look."""
     import pandas as pd
@@ -502,7 +502,7 @@ def _width(block: bytes, dialect: Dialect) -> int:
     return width + 1 if is_right and not rest else 0
 
 
-def _seconds(cells: Any, dialect: Dialect, column: int, seen: Seen) -> NDArray[np.float64] | None:
+def _seconds(cells: Any, dialect: Dialect, column: int, seen: _Seen) -> NDArray[np.float64] | None:
     """Return time stamps as seconds from the first one; None where one is none."""
     kind, origin = dialect.kinds[column], seen.origins[column]
     stamps = [nanoseconds(str(cell).strip(), kind) for cell in cells]
@@ -512,7 +512,7 @@ def _seconds(cells: Any, dialect: Dialect, column: int, seen: Seen) -> NDArray[n
 
 
 def _careful(
-    path: Path, block: bytes, line: int, dialect: Dialect, indices: Sequence[int], seen: Seen
+    path: Path, block: bytes, line: int, dialect: Dialect, indices: Sequence[int], seen: _Seen
 ) -> list[NDArray[np.float64]]:
     """Return the columns of a block with a flaw: line by line where it is, else by a library."""
     parts = []
@@ -522,14 +522,14 @@ def _careful(
         if columns is None:
             columns = _with_marks(plain, dialect, indices, seen)
         if columns is None:
-            columns = strict_columns(path, piece, line, dialect, indices, seen)
+            columns = _strict_columns(path, piece, line, dialect, indices, seen)
         parts.append(columns)
         line += piece.count(b"\n")
     return [np.concatenate(columns) for columns in zip(*parts, strict=True)]
 
 
 def _with_marks(
-    block: bytes, dialect: Dialect, indices: Sequence[int], seen: Seen
+    block: bytes, dialect: Dialect, indices: Sequence[int], seen: _Seen
 ) -> list[NDArray[np.float64]] | None:
     """Return the columns of lines whose only flaw is cells that say that nothing was measured."""
     import pandas as pd
@@ -550,7 +550,7 @@ def _with_marks(
     )
     if len(frame) != block.count(b"\n") + (not block.endswith(b"\n")):
         return None
-    found, columns = Seen(), []
+    found, columns = _Seen(), []
     for k in indices:
         cells = [cell.strip() for cell in frame[k]]
         marked = np.array([dialect.is_mark(cell) for cell in cells])
