@@ -230,7 +230,8 @@ def require_room(
     size = 8 * sum(source.columns[name].length or 0 for name in wanted)
     if size > most:
         raise FileError(
-            f"{file} says that it holds {size / 2**30:.3g} GiB of numbers in {len(wanted)} columns,"
-            f" and {most / 2**30:.3g} GiB are read at most: choose fewer signals, or check the "
-            "file where it is much smaller"
+            f"{file} declares {size / 2**30:.3g} GiB of numbers in {len(wanted)} columns,"
+            f" and {most / 2**30:.3g} GiB are the limit: choose fewer signals, or check the "
+            "file where it is much smaller",
+            name=str(file),
         )

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from bywire.core import units
 from bywire.core.arguments import checked
-from bywire.core.errors import FileError, InputError, ParameterError, UnitError, quoted
+from bywire.core.errors import FileError, InputError, ParameterError, UnitError, not_valid, quoted
 from bywire.core.quantities import display_unit
 from bywire.core.typing import Progress, silent
 from bywire.data.column_choice import Chosen, choose, every_signal, left_out_note
@@ -90,7 +90,11 @@ def instants(
         if key.delay:
             time -= key.delay
     if time.size < 2:
-        raise FileError(f"{file} has too few rows, {time.size}: two at least are needed")
+        raise FileError(
+            f"{file} has too few rows, {time.size}: two at least are needed",
+            name=str(file),
+            value=str(time.size),
+        )
     return time
 
 
@@ -260,10 +264,14 @@ def opened(file: Path, meaning: MeasurementMapping) -> Iterator[Source]:
     except InputError:
         raise
     except MemoryError:
-        raise FileError(f"{file} does not fit into memory: read fewer signals at a time") from None
+        raise FileError(
+            f"{file} does not fit into memory: read fewer signals at a time", name=str(file)
+        ) from None
     except OSError as error:
         reason = error.strerror or str(error)
-        raise FileError(f"{file} cannot be read ({reason}): it may be damaged or cut") from None
+        raise FileError(
+            f"{file} cannot be read ({reason}): it may be damaged or cut", name=str(file)
+        ) from None
 
 
 def mapping_of(
@@ -324,7 +332,8 @@ def _timed(
     if not np.isnan(numbers[count:]).all():
         raise FileError(
             f"{file}, column {signal.column!r}: it has numbers after the last instant of "
-            f"{signal.clock.column!r}: give the signal its own time in a mapping"
+            f"{signal.clock.column!r}: give the signal its own time in a mapping",
+            name=signal.column,
         )
     return numbers[:count]
 
@@ -339,7 +348,8 @@ def _dimensions(chosen: Sequence[Chosen], keys: Sequence[_AxisKey]) -> dict[_Axi
         if signal.mapping.name in dimensions.values():
             raise ParameterError(
                 f"signal {quoted(signal.mapping.name)} has the name of the instants of signals: "
-                "give it another one in a mapping"
+                "give it another one in a mapping",
+                name=signal.mapping.name,
             )
     return dimensions
 
@@ -394,7 +404,7 @@ def read_trace(
     """
     longest = units.parse(max_gap, "s", "max_gap")
     if not longest > 0:
-        raise ParameterError(f"max_gap = {max_gap!r} is not valid: it must be > 0 s")
+        raise not_valid("max_gap", repr(max_gap), "> 0 s")
     file = Path(path)
     meaning = _meaning(file, mapping)
     with opened(file, meaning) as source:
@@ -446,7 +456,8 @@ def _names(file: Path, source: Source, meaning: MeasurementMapping) -> tuple[str
         there = ", ".join(source.columns)
         raise FileError(
             f"{file}: none of its columns {quoted(there)} beside time has a name: add a first row, "
-            "as 'time [s], pedal [mm]', or say in a mapping what they are"
+            "as 'time [s], pedal [mm]', or say in a mapping what they are",
+            name=str(file),
         )
     return names
 
@@ -459,8 +470,9 @@ def _chosen(file: Path, source: Source, meaning: MeasurementMapping, name: str) 
     near = [c for c in source.columns if c.casefold() == said.column.casefold()]
     if len(near) > 1:
         raise FileError(
-            f"{file}, column {quoted(said.column)}: the name stands twice, capitals or not: rename "
-            "one of them"
+            f"{file}, column {quoted(said.column)}: the name occurs twice, capitals or not: rename "
+            "one of them",
+            name=said.column,
         )
     return replace(said, column=near[0]) if near else said
 
@@ -471,7 +483,10 @@ def _require_quantity(file: Path, source: Source, signal: xr.DataArray, symbol: 
         unit = source.columns[column].unit or signal.attrs["units"]
         raise UnitError(
             f"{file}, column {quoted(column)}: {quoted(unit)} has the wrong unit, it cannot be "
-            f"{symbol}: choose a column in {display_unit(symbol)} or a unit like it"
+            f"{symbol}: choose a column in {display_unit(symbol)} or a unit like it",
+            name=column,
+            value=unit,
+            valid=symbol,
         )
     signal.attrs["units"] = symbol
 
@@ -483,7 +498,7 @@ def _require_whole(file: Path, source: Source, signal: xr.DataArray, longest: fl
     if missing.size:
         raise FileError(
             f"{file}, {source.place(column, int(missing[0]))}, column {quoted(column)}: blank or "
-            "NaN is no measured value: fill it in or remove the row"
+            "NaN is not a measured value: fill it in or remove the row"
         )
     time = signal[signal.dims[0]].values
     steps = np.diff(time)
@@ -495,5 +510,6 @@ def _require_whole(file: Path, source: Source, signal: xr.DataArray, longest: fl
             f"{file}, {source.place(column, k + 1)}: a gap of {steps[k]:.4g} s after "
             f"{time[k]:.6g} s ({gaps.size} in the file, the longest {most:.4g} s; max_gap is "
             f"{longest:g} s): fill it in, or, if a straight line across it is what you want, allow "
-            f'it with max_gap="{1.01 * most:.3g} s"'
+            f'it with max_gap="{1.01 * most:.3g} s"',
+            name=column,
         )

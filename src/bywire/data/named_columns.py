@@ -127,7 +127,9 @@ def renamed(data: xr.Dataset, named: NamedColumns) -> xr.Dataset:
         When instants are named, which signals in memory have already.
     """
     if named.time:
-        raise ParameterError(f"{option('time')} is for measurement files: leave it out")
+        raise ParameterError(
+            f"{option('time')} is for measurement files: leave it out", name="time"
+        )
     for name, column in named.signals.items():
         if column not in data:
             raise unknown_name("signal", column, [str(each) for each in data.data_vars])

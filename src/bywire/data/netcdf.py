@@ -62,7 +62,8 @@ def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(
             f"cannot write {path}: {reason}: make room there, or choose a folder that you may "
-            "write to"
+            "write to",
+            name=str(path),
         ) from None
     return path
 
@@ -89,8 +90,9 @@ def read_recording(path: str | Path) -> xr.Dataset:
     file = Path(path)
     if not NETCDF.recognizes(head_of(file)):
         raise FileError(
-            f"cannot read recording {file}: it is no NetCDF file: bywire convert, or "
-            "read_measurement, reads other formats"
+            f"cannot read recording {file}: it is not a NetCDF file: bywire convert, or "
+            "read_measurement, reads other formats",
+            name=str(file),
         )
     with limited(file, FORMAT) as source:
         require_room(file, source)

@@ -50,14 +50,19 @@ def read_toml(
     """
     text = _text(file, kind, missing, too_large)
     if _LONG_KEY.search(text):
-        raise FileError(f"{file} holds a dotted key of more than {_KEY_PARTS} parts: shorten it")
+        raise FileError(
+            f"{file} contains a dotted key of more than {_KEY_PARTS} parts: shorten it",
+            name=str(file),
+        )
     try:
         content = tomllib.loads(text)
         _require_numbers(content, file, "")
     except RecursionError:
-        raise FileError(f"{file} is no {kind}: it is nested far too deeply") from None
+        raise FileError(
+            f"{file} is not a {kind}: it is nested too deeply", name=str(file)
+        ) from None
     except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
-        raise FileError(f"{file} is not valid TOML: {error}") from None
+        raise FileError(f"{file} is not valid TOML: {error}", name=str(file)) from None
     return content
 
 
@@ -70,7 +75,12 @@ def _require_numbers(value: Any, file: Path, key: str) -> None:
         for each in value:
             _require_numbers(each, file, key)
     elif isinstance(value, int) and value.bit_length() >= sys.float_info.max_exp:
-        raise FileError(f"{file}: {key} = {quoted(value)}: write any finite number, below 1.8e308")
+        raise FileError(
+            f"{file}: {key} = {quoted(value)}: write any finite number, below 1.8e308",
+            name=key,
+            value=quoted(value),
+            valid="finite number",
+        )
 
 
 def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str) -> str:
@@ -80,14 +90,17 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
     except (OSError, ValueError) as error:  # ValueError: a null character in the path
         reason = error.strerror if isinstance(error, OSError) else NULL_CHARACTER
         hint = missing(file) if isinstance(error, FileNotFoundError) else _ADVICE
-        raise FileError(f"cannot read {kind} {file}: {reason}: {hint}") from None
+        raise FileError(f"cannot read {kind} {file}: {reason}: {hint}", name=str(file)) from None
     if len(data) > LARGEST:
-        raise FileError(f"{file} has more than {LARGEST // 1000} kB: that is no {kind}{too_large}")
+        raise FileError(
+            f"{file} has more than {LARGEST // 1000} kB, too much for a {kind}{too_large}",
+            name=str(file),
+        )
     try:
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError:
         raise FileError(
-            f"cannot read {kind} {file}: it is not UTF-8 text: give a TOML file"
+            f"cannot read {kind} {file}: it is not UTF-8 text: give a TOML file", name=str(file)
         ) from None
 
 
@@ -157,7 +170,10 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
     if not kind or kind == wanted or (head in content and head != HEADS[kind]):
         return
     raise ParameterError(
-        f"this is {_WORDS[kind]} and not {_WORDS[wanted]}: '{_COMMANDS[kind]} {file}' takes it"
+        f"this is {_WORDS[kind]} and not {_WORDS[wanted]}: '{_COMMANDS[kind]} {file}' takes it",
+        name=str(file),
+        value=kind,
+        valid=wanted,
     )
 
 

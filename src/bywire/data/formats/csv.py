@@ -193,7 +193,7 @@ def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect, see
     other = "," if dialect.decimal == "." else "."
     hint = f"; the decimal mark is {dialect.decimal!r} here" if other in cell else ""
     raise FileError(
-        f"{where} is no finite number{hint}: correct it; where it marks a missing value, write "
+        f"{where} is not a finite number{hint}: correct it; where it marks a missing value, write "
         f"missing = [{cell!r}] in the mapping"
     )
 
