@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
 from bywire.core.callers import option
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, not_valid
 from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
@@ -394,7 +394,7 @@ def noise_given(name: str, text: str, unit: str) -> float:
     """
     noise = number(text, unit, f"noise of {name}")
     if not noise > 0.0:
-        raise ParameterError(f"noise of {name} = {text} is not valid: it must be > 0 {unit}")
+        raise not_valid(f"noise of {name}", text, f"> 0 {unit}")
     return noise
 
 
@@ -420,13 +420,15 @@ def _output_noise(measured: MeasuredRun, name: str, text: str) -> float:
     there = _finite(measured.data[name])
     if there.size < _FEWEST:
         raise ParameterError(
-            f"{name} has {there.size} samples: {_FEWEST} at least are needed to tell its noise"
+            f"{name} has {there.size} samples: at least {_FEWEST} are needed to estimate its noise",
+            name=name,
         )
     span = float(np.ptp(there))
     if not span > 0.0:
         raise ParameterError(
-            f"{name} does not move: an output that rests tells nothing; leave it out, or "
-            "excite the system"
+            f"{name} does not move: an output at rest determines nothing; leave it out, or "
+            "excite the system",
+            name=name,
         )
     # Between uneven samples lie means of two, whose noise is smaller and no longer white.
     before = measured.data[name].attrs.get(NOISE_OF_SAMPLES)
@@ -642,7 +644,9 @@ class BenchFit:
         if data is None:
             return None
         if not isinstance(data, xr.Dataset):
-            raise ParameterError(f"holdout = {data}: read it first, bywire.read_measurement does")
+            raise ParameterError(
+                f"holdout = {data}: read it first, bywire.read_measurement does", name="holdout"
+            )
         held = self.record(bench, data, options)
         # A label that no record has: only what all records share is known of it.
         return _compared(held, self.trial(held, "held out"), fit)

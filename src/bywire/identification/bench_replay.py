@@ -63,10 +63,12 @@ def _compared_outputs(
             notes = (f"left out as flags, sums or constants: {', '.join(passed)}",)
     if not wanted:
         raise ParameterError(
-            "nothing measured is an output of the model: name signals as the model does "
+            "no measured signal is an output of the model: name signals as the model does "
             f"({option('mapping')}), "
             f"for instance {', '.join(list(signals)[:6])}; measured are "
-            f"{nearest_first(there, signals)}"
+            f"{nearest_first(there, signals)}",
+            name="mapping",
+            valid=", ".join(signals),
         )
     for name in wanted:
         if name not in signals:
@@ -100,7 +102,12 @@ def _require_measured(data: xr.Dataset, name: str, signal: Signal) -> None:
     require_signals(data, [name])
     unit = str(data[name].attrs.get("units", "1"))
     if unit != signal.unit and not measures(unit_of_symbol(unit), signal.unit):
-        raise UnitError(f"{name} is measured in {unit}, but {signal.unit} is wanted: check the map")
+        raise UnitError(
+            f"{name} is measured in {unit}, and must be in {signal.unit}: check the map",
+            name=name,
+            value=unit,
+            valid=signal.unit,
+        )
 
 
 # --- The run, before it is computed
@@ -200,7 +207,8 @@ def measured_run(
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
                 f"{signal} drives the model and misses {missing.size} samples, the first at "
-                f"{at:.4g} s: cut the record there"
+                f"{at:.4g} s: cut the record there",
+                name=signal,
             )
     run = _run(bench, chosen, data, driven, between)
     return MeasuredRun(
@@ -228,7 +236,11 @@ def case_of(bench: Bench, label: str) -> Case:
     """
     cases = {case.label: case for case in bench.cases()}
     if not cases:
-        raise ParameterError(f"experiment {bench.experiment!r} makes no run: take another one")
+        raise ParameterError(
+            f"experiment {bench.experiment!r} makes no run: choose another one",
+            name="experiment",
+            value=bench.experiment,
+        )
     if label and label not in cases:
         raise unknown_name(f"run of {bench.experiment}", label, cases)
     return cases[label] if label else next(iter(cases.values()))
@@ -241,9 +253,11 @@ def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> d
     driven = without_noise(stimuli)
     if not wanted:
         raise ParameterError(
-            f"nothing measured drives the model: give {option('inputs', {'STIMULUS': 'SIGNAL'})} "
+            f"no measured signal drives the model: give {option('inputs', {'STIMULUS': 'SIGNAL'})} "
             f"with one of "
-            f"{', '.join(driven)} and one of {nearest_first(there, driven)}"
+            f"{', '.join(driven)} and one of {nearest_first(there, driven)}",
+            name="inputs",
+            valid=", ".join(driven),
         )
     for stimulus, signal in wanted.items():
         if stimulus not in stimuli:
@@ -287,8 +301,10 @@ def _on_grid(
         even, said = as_even(data, aligned.record)
         return even, aligned, tuple(said)
     raise StepError(
-        f"neither samples every {interval:g} s nor every {case.record:g} s go with steps of "
-        f"{bench.step:g} s: resample the measurement (bywire convert --rate)"
+        f"neither samples every {interval:g} s nor every {case.record:g} s fit steps of "
+        f"{bench.step:g} s: resample the measurement (bywire convert --rate)",
+        name="step",
+        value=f"{bench.step:g} s",
     )
 
 
@@ -381,7 +397,9 @@ def replay(
         When nothing drives the model, nothing is compared, or an input has gaps.
     """
     if RECORD in data:
-        raise ParameterError("replay takes one record, and this measurement has several")
+        raise ParameterError(
+            "replay takes one record, and this measurement has several", name="data"
+        )
     measured = measured_run(bench, data, inputs, outputs, case)
     wanted = dict.fromkeys((*measured.compared, *energy_signals(measured.run)))
     modeled = simulate(measured.run, tuple(wanted))

@@ -443,7 +443,7 @@ def disagreements(estimates: Mapping[str, Estimate]) -> tuple[Disagreement, ...]
     W. G. Cochran, The combination of estimates from different experiments, Biometrics 10, 1954.
     """
     if len(estimates) < 2:
-        raise ParameterError("one estimate alone agrees with itself: give one for each record")
+        raise ParameterError("a single estimate cannot be compared: give one for each record")
     tables = {
         label: {
             u.name: _Told(float(v), float(d), estimate.freedom, u.unit)

@@ -420,7 +420,7 @@ def estimate(
     Raises
     ------
     ParameterError
-        When the data tells none of the unknowns.
+        When the data determine none of the unknowns.
     """
     kept: tuple[Kept, ...] = ()
     origin = problem
@@ -446,9 +446,10 @@ def estimate(
         problem = problem.held(index)
         if not problem.unknowns:
             raise ParameterError(
-                f"the data tells none of {', '.join(k.unknown.label for k in kept)}: of "
+                f"the data determine none of {', '.join(k.unknown.label for k in kept)}: of "
                 f"{kept[0].unknown.label}, {kept[0].reason}; "
-                f"{advice(best, kept[0].unknown.name in problem.silent)}"
+                f"{advice(best, kept[0].unknown.name in problem.silent)}",
+                name=", ".join(k.unknown.label for k in kept),
             )
 
 
@@ -459,7 +460,10 @@ def _at_minimum(problem: Problem, solution: Solution, loss: Loss) -> tuple[Estim
     data = r.size - priors
     if data <= len(problem.unknowns):
         raise ParameterError(
-            f"{data} measured values cannot tell {len(problem.unknowns)} unknowns: measure more"
+            f"{data} measured values cannot determine {len(problem.unknowns)} unknowns: "
+            "measure more",
+            name="unknowns",
+            value=str(len(problem.unknowns)),
         )
     scale = np.array([u.scale for u in problem.unknowns])
     known = priors + problem.apart

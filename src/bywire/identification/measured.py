@@ -121,7 +121,7 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
         When there is none, or one has other signals than the first.
     """
     if not records:
-        raise ParameterError("no record is given: one at least is needed")
+        raise ParameterError("no record is given: at least one is needed")
     first, *others = records
     if not others:
         return records[first]
@@ -132,7 +132,8 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
             differing = ", ".join(sorted(wanted ^ set(map(str, record.data_vars))))
             raise ParameterError(
                 f"records {first} and {label} differ in their signals ({differing}): records of "
-                "one experiment have the same ones"
+                "one experiment have the same signals",
+                name=label,
             )
         t = record["time"].values - record["time"].values[0]
         times.append(start + t)
@@ -320,7 +321,12 @@ def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[s
             raise unknown_name(kind, name, there)
         given = str(data[name].attrs.get("units", "1"))
         if unit not in ("", given) and not measures(unit_of_symbol(given), unit):
-            raise UnitError(f"{where}: {name} is in {given}, but {unit} is wanted: check the map")
+            raise UnitError(
+                f"{where}: {name} is in {given}, and must be in {unit}: check the map",
+                name=name,
+                value=given,
+                valid=unit,
+            )
     return (*signals, *(("record",) if "record" in there and "record" not in signals else ()))
 
 
@@ -376,7 +382,8 @@ def _require_whole(data: xr.Dataset, where: str, gaps: bool) -> None:
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
                 f"{where}: {name} misses {missing.size} samples, the first at {at:.4g} s: cut the "
-                "record there, or fill it knowingly with 'bywire convert --exclude nothing'"
+                "record there, or fill it knowingly with 'bywire convert --exclude nothing'",
+                name=str(name),
             )
 
 

@@ -330,7 +330,9 @@ def even_interval(t: Array) -> float:
     """
     steps = np.diff(t)
     if not steps.size or not steps.min() > 0.0:
-        raise ParameterError("time does not increase from sample to sample: sort or cut the record")
+        raise ParameterError(
+            "time does not increase from sample to sample: sort or cut the record", name="time"
+        )
     mean, middle = float(t[-1] - t[0]) / steps.size, float(np.median(steps))
     usual = float(f"{middle:.9g}")
     for interval in (*(float(f"{mean:.{k}g}") for k in _DIGITS), usual, float(f"{mean:.9g}")):
@@ -342,7 +344,8 @@ def even_interval(t: Array) -> float:
     raise ParameterError(
         f"time is not evenly spaced (steps of {steps.min():g} to {steps.max():g} s, and instants "
         f"off an even grid by more than {UNEVEN:g} of the step): resample it first, as "
-        f'bywire.resample(data, "{1e3 * float(f"{middle:.3g}"):g} ms")'
+        f'bywire.resample(data, "{1e3 * float(f"{middle:.3g}"):g} ms")',
+        name="time",
     )
 
 

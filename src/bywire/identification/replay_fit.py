@@ -21,7 +21,7 @@ from bywire.bench.requirements import Limit, Verdict, parted, read_limit, verdic
 from bywire.bench.step_error import with_step_errors
 from bywire.core import units
 from bywire.core.callers import option
-from bywire.core.errors import InputError, ParameterError, unknown_name
+from bywire.core.errors import InputError, ParameterError, not_valid, unknown_name
 from bywire.core.quantities import Unit
 from bywire.core.section import Hint, Section
 from bywire.core.typing import Array
@@ -98,16 +98,15 @@ def estimate_lag(
         if np.isnan(values).any():
             raise ParameterError(
                 f"{name} has gaps or missing values: choose a piece without them, for instance "
-                "measurement.sel(time=slice(0, 10))"
+                "measurement.sel(time=slice(0, 10))",
+                name=name,
             )
         if np.ptp(values) == 0.0:
-            raise ParameterError(f"{name} does not move: a lag cannot be seen in it")
+            raise ParameterError(f"{name} does not move: it shows no lag", name=name)
     most = int(np.ceil(reach / step))
     if not most >= 1 or a.size - most < _LEAST:
-        raise ParameterError(
-            f"largest = {reach:g} s is not valid: it must be at least a step, {step:g} s, and "
-            f"leave an overlap of {_LEAST} steps in {a.size * step:g} s"
-        )
+        overlap = f"leave an overlap of {_LEAST} steps in {a.size * step:g} s"
+        raise not_valid("largest", f"{reach:g} s", f"at least a step, {step:g} s, and {overlap}")
     rough = _coefficients(a, b, most)
     k = int(np.argmax(np.abs(rough)))
     shift, coefficient = _refined(a, b, k - most, float(np.sign(rough[k])))
@@ -283,7 +282,8 @@ def found_in(demand: xr.DataArray, tolerances: Mapping[str, str]) -> list[Segmen
     if len(merged) - 1 > _MOST:
         raise ParameterError(
             f"the demand {demand.name} holds and moves {len(merged) - 1} times: name the "
-            f"stretches that matter in a file, {option('segments')} FILE"
+            f"stretches that matter in a file, {option('segments')} FILE",
+            name="segments",
         )
     counts = {"hold": 0, "move": 0}
     segments = []
@@ -325,12 +325,14 @@ def read_segments(path: str | Path, tolerances: Mapping[str, str]) -> list[Segme
 def _from(content: Mapping[str, Any], tolerances: Mapping[str, str]) -> list[Segment]:
     file = SegmentFile.read(content, "a file of segments")
     if not file.segments:
-        raise ParameterError("no segment: write [segments.NAME] with start and stop")
+        raise ParameterError(
+            "no segment: write [segments.NAME] with start and stop", name="segments"
+        )
     shared = {**tolerances, **file.tolerances}
     segments = []
     for name, section in file.segments.items():
         if not section.start < section.stop:
-            raise ParameterError(f"[segments.{name}]: start must lie before stop")
+            raise ParameterError(f"[segments.{name}]: start must lie before stop", name=name)
         limits = {**shared, **section.tolerances}
         segments.append(Segment(name, section.start, section.stop, limits))
     return segments
@@ -363,7 +365,9 @@ def read_tolerances(texts: Sequence[str]) -> dict[str, str]:
         if compare is None or not name or not bound:
             raise ParameterError(
                 f"{option('tolerances')} {text!r} cannot be read: write for instance 'nrmse <= 5 "
-                "%' or 'p_mc.max_error <= 2 bar'"
+                "%' or 'p_mc.max_error <= 2 bar'",
+                name="tolerances",
+                value=text,
             )
         limit = f"{compare} {bound}"
         limits[name] = f"{limits[name]} and {limit}" if name in limits else limit
@@ -430,7 +434,8 @@ def _limits(key: str, text: str, kpi: Kpi) -> list[Limit]:
         if limit.bound < 0.0:
             raise ParameterError(
                 f"tolerance {limit} bounds the magnitude, which is never negative: give a "
-                f"lower limit as well, such as '{key} >= ...', and both are taken with their sign"
+                f"lower limit as well, such as '{key} >= ...', and both are taken with their sign",
+                name=key,
             )
     return [replace(limit, of_magnitude=True) for limit in limits]
 
@@ -490,7 +495,8 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
     if there.sum() < 2:
         raise ParameterError(
             f"segment {segment.name!r}, {segment.start:g} to {segment.stop:g} s, holds "
-            f"{int(there.sum())} samples: two at least are needed"
+            f"{int(there.sum())} samples: at least two are needed",
+            name=segment.name,
         )
     y, m = y[there], m[there]
     error = m - y
@@ -529,7 +535,8 @@ def _require_within(time: Array, segment: Segment) -> None:
     if segment.start < first - spare or segment.stop > last + spare:
         raise ParameterError(
             f"segment {segment.name!r}, {segment.start:g} to {segment.stop:g} s, goes beyond the "
-            f"record, which holds {first:.6g} to {last:.6g} s: correct its start or stop"
+            f"record, which holds {first:.6g} to {last:.6g} s: correct its start or stop",
+            name=segment.name,
         )
 
 

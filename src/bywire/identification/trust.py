@@ -121,7 +121,11 @@ def displaced(par: ParameterSet, names: Sequence[str], spread: float, seed: int)
             return par.replace({u.name: float(v) for u, v in zip(unknowns, values, strict=True)})
         except ParameterError:
             continue
-    raise ParameterError(f"no admissible parameters within {100 * spread:g} % of these: lower it")
+    raise ParameterError(
+        f"no valid parameters within {100 * spread:g} % of these: lower it",
+        name="spread",
+        value=f"{100 * spread:g} %",
+    )
 
 
 def experiments(

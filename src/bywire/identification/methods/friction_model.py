@@ -165,7 +165,9 @@ def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> Non
             f"too few samples slide {' and '.join(short)} ({said}; {_LEAST} each way are needed): "
             "record motion to and fro (speed changes its sign), or lower "
             f"{option('options')} slowest, which "
-            f"leaves out what is slower than {100 * slowest:g} % of a record's fastest speed"
+            f"leaves out what is slower than {100 * slowest:g} % of a record's fastest speed",
+            name="slowest",
+            value=f"{slowest:g}",
         )
 
 
@@ -261,7 +263,9 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     wanted = known if options.law == "choose" else (_find_law(options.law),)
     if wanted[0] not in known:
         raise ParameterError(
-            f"law {options.law!r} needs a measured pressure that varies by 20 % at least"
+            f"law {options.law!r} needs a measured pressure that varies by at least 20 %",
+            name="law",
+            value=options.law,
         )
     choice = choose([law.candidate() for law in wanted], records, "friction")
     best = choice.chosen

@@ -143,7 +143,9 @@ def _require_known(case: Case, question: Question) -> None:
     if not question.noise:
         raise ParameterError(
             f"no output is measured: give {option('outputs')} SIGNAL, once for each of the "
-            f"model's outputs that the record has, for instance {', '.join(list(outputs)[:6])}"
+            f"model's outputs that the record has, for instance {', '.join(list(outputs)[:6])}",
+            name="outputs",
+            valid=", ".join(outputs),
         )
     driven = without_noise(stimuli)
     states = case.model.State._fields

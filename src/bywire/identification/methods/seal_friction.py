@@ -173,15 +173,19 @@ def _require_told(groups: Sequence[Group]) -> None:
     if not groups:
         raise ParameterError(
             "no stroke crosses the stretch x_low to x_high: move the piston to and fro through "
-            f"it, or set {option('options')} x_low and x_high to where it moves"
+            f"it, or set {option('options')} x_low and x_high to where it moves",
+            name="x_low",
         )
     if len({g.direction for g in groups}) < 2:
-        raise ParameterError("F_0 and f need strokes both ways: friction alone changes sign")
+        raise ParameterError(
+            "F_0 and f need strokes both ways: friction alone changes sign", name="F_0"
+        )
     levels = [g.p for g in groups]
     if max(levels) < _APART * min(levels) or len(groups) < 4:
         raise ParameterError(
-            f"f cannot be told from F_0: all strokes were made at {min(levels) / 1e5:.3g} to "
-            f"{max(levels) / 1e5:.3g} bar; give a record each at two pressures or more"
+            f"f cannot be separated from F_0: all strokes were made at {min(levels) / 1e5:.3g} to "
+            f"{max(levels) / 1e5:.3g} bar; give a record each at two pressures or more",
+            name="f",
         )
 
 
