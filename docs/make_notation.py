@@ -229,7 +229,12 @@ def bench_reference() -> str:
         lines += [f"### {g.name}, of any brake", "", f"{summary}.", ""]
         rows = [("", *row[1:3], "", *row[4:]) for row in parameter_rows(g.options)]
         lines += table(("", "option", "unit", "", "range or choices", "meaning"), rows)
-    lines += ["## Loops", "", "Loops for `linearize`, `margins`, `frequency-response`, `agreement` and `design`.", ""]
+    lines += [
+        "## Loops",
+        "",
+        "Loops for `linearize`, `margins`, `frequency-response`, `agreement` and `design`.",
+        "",
+    ]
     rows = (
         (
             f"`{loop.name}`",

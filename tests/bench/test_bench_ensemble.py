@@ -89,7 +89,7 @@ def test_what_is_refused(bench):
         bywire.simulate_ensemble(bench, {"motor.R_n": [0.3]})
     with pytest.raises(ParameterError, match=r"motor\.R_m = -1 \(in SI\).*ohm"):
         bywire.simulate_ensemble(bench, {"motor.R_m": [0.3, -1.0]})
-    with pytest.raises(ParameterError, match="one length"):
+    with pytest.raises(ParameterError, match="the same length"):
         bywire.simulate_ensemble(bench, {"motor.R_m": [0.3], "motor.K_e": [0.03, 0.04]})
     with pytest.raises(ParameterError, match="leave signals out"):
         bywire.simulate_ensemble(bench, {"motor.R_m": [0.3]}, ["p_mc"])

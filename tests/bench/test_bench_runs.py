@@ -156,5 +156,5 @@ def test_work_is_counted_in_substeps_the_same_alone_and_side_by_side():
     alone = simulate(computed)
     assert alone.work >= 0.2 / 20e-6
     assert alone.work == simulate_group([computed] * 3)[1].work
-    with pytest.raises(WorkLimitError, match="more than"):
+    with pytest.raises(WorkLimitError, match="more work than"):
         simulate(replace(computed, most_work=0.5 * alone.work))

@@ -185,7 +185,7 @@ def test_every_run_tells_of_a_loss_that_gives_energy(
     axis: Callable[[str], Bench], warned: Callable[[Bench], Sequence[str]]
 ) -> None:
     (told,) = warned(axis("+"))
-    assert told.startswith("the loss 'viscous damping' (E_damping) gives ")
+    assert told.startswith("the loss 'viscous damping' (E_damping) delivers ")
 
 
 def test_no_run_tells_of_a_loss_that_loses(axis: Callable[[str], Bench]) -> None:

@@ -98,6 +98,8 @@ def command_lines(page: Path) -> Iterator[list[str]]:
         for line in block.replace("\\\n", "").splitlines():
             if line.startswith("bywire ") and "<TAB>" not in line:
                 yield shlex.split(line, comments=True)[1:]
+    for line in re.findall(r"^\| `bywire ([^`]+)` \|", page.read_text(encoding="utf-8"), re.M):
+        yield shlex.split(line)
 
 
 def parsed(words: list[str]) -> None:

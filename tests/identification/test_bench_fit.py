@@ -271,7 +271,7 @@ def test_ranges_priors_and_starts() -> None:
         ({"unknowns": {"motor.R_m": "1..0.1 ohm"}}, "is empty"),
         (
             {"unknowns": {"motor.R_m": "-1..1 ohm"}},
-            "range of motor.R_m = '-1..1 ohm' is not valid: it must be > 0 ohm",
+            "'-1..1 ohm' is not valid: it must be > 0 ohm",
         ),
         ({"priors": {"motor.R_m": "0.3"}}, "prior of motor.R_m"),
         ({"priors": {"motor.R_m": "0.3 +- 0 ohm"}}, "with a deviation > 0"),

@@ -62,5 +62,5 @@ def test_a_processor_that_is_too_old_is_refused(kernel):
 
 
 def test_what_the_compiler_refuses_is_said():
-    with pytest.raises(CompilerError, match=r"(?s)NVRTC refused a generated kernel:.*expected"):
+    with pytest.raises(CompilerError, match=r"(?s)NVRTC rejected a generated kernel:.*expected"):
         cuda_binary("KERNEL void bw_run_cases(double) { 1 +; }", 90, ENTRY)

@@ -147,14 +147,14 @@ def test_a_bench_says_that_its_cases_go_there(driver):
 
 def test_memory_that_is_too_small_is_said(runs, driver):
     driver.capacity = 10_000
-    with pytest.raises(DeviceError, match=r"emulated 0 has 0\.01 MB free.*takes .* MB: record"):
+    with pytest.raises(DeviceError, match=r"emulated 0 has 0\.01 MB free.*needs .* MB: record"):
         simulate_group(runs, engine="cuda")
 
 
 def test_memory_that_others_took_meanwhile_is_said(runs, driver, monkeypatch):
     monkeypatch.setattr(driver, "cuMemGetInfo", lambda: (OK, 10**9, 10**9))
     driver.capacity = 50_000
-    with pytest.raises(DeviceError, match=r"no room for .* MB: .* are free: end what else"):
+    with pytest.raises(DeviceError, match=r"no room for .* MB: .* are free: end other programs"):
         simulate_group(runs, engine="cuda")
     assert not driver.places
 

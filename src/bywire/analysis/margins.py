@@ -11,7 +11,7 @@ import numpy as np
 from bywire.analysis.crossings import NEARLY_ZERO, lower_factor, margin_of, upper_factor
 from bywire.analysis.loop import Loop
 from bywire.analysis.loop_figures import LOOP_FIGURES, LoopFigure, LoopFigures
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array, Complex
 from bywire.core.undefined import EqualWhereUndefined
@@ -111,7 +111,7 @@ UNSTABLE = LoopMargins(
     bandwidth=math.nan,
     stable=False,
 )
-"""what an unstable loop has: no margins"""
+"""margins of an unstable loop"""
 
 
 def figures_at(loop: Loop, par: ParameterSet, value: float) -> LoopFigures:
@@ -167,10 +167,10 @@ def worst(
     Nothing is worse than an unstable loop, or none, whose margins are NaN.
     """
     if not margins:
-        raise ParameterError("no margins to choose from: give at least one value")
+        raise ParameterError("margins need at least one value", name="values")
     result: dict[str, tuple[float, float]] = {}
     for field, figure in MARGINS.items():
-        if field == "crossover":  # a place, of which neither more nor less is better
+        if field == "crossover":  # neither a larger nor a smaller one is better
             continue
         sense = -1.0 if figure.is_less_better else 1.0
         sizes = [sense * getattr(row, field) if row.is_sound else -math.inf for row in margins]
@@ -185,7 +185,7 @@ def _or_nan(figure: float) -> float:
 
 # --- Loop gain over frequency, for Nyquist and Nichols charts
 
-_BELOW = 30.0  # by so much a chart begins below the band of the loop
+_BELOW = 30.0  # ratio of the loop's band to the lowest frequency of a chart
 _CHART_POINTS = 1500
 
 
@@ -286,7 +286,7 @@ def disk(margin: float) -> Disk:
     Magazine 40(5), 2020: the symmetric margin, drawn in the Nyquist plane.
     """
     if not 0.0 < margin <= 2.0:
-        raise ParameterError(f"disk margin = {margin:g}: it must be > 0 and <= 2")
+        raise not_valid("disk margin", f"{margin:g}", "> 0 and <= 2")
     a = 0.5 * margin
     if a == 1.0:  # |S - T| = 1 at the imaginary axis: the circle has become a line
         return Disk(-math.inf, math.inf)

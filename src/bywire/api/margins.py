@@ -26,6 +26,7 @@ from bywire.report.answer import Answer
 from bywire.report.document import (
     Banner,
     Block,
+    Details,
     Document,
     FigureBlock,
     Listing,
@@ -125,7 +126,7 @@ class Margins(Answer):
                 Section("Figures", figures),
                 provenance,
             ],
-            brief=[head, table, *none, *worst_line, Paragraph(LEGEND)],
+            brief=[head, table, *none, *worst_line, Details("", [Paragraph(LEGEND)])],
             data=self._data(),
             banner=self._banner(),
             changes=self.case.subject.changes,

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 from bywire.api import identification
-from bywire.api.identify import ChosenMethod, choose
+from bywire.api.identification import ChosenMethod, choose
 from bywire.core.libraries import on_one_thread
 from bywire.core.typing import Progress, silent
 from bywire.identification import trust as trusted

@@ -16,28 +16,28 @@ _PATTERN = re.compile(r"[*?\[]")
 
 
 def is_relative(name: str, value: object) -> bool:
-    """Tell whether a change hangs on what is there: a share such as ``+50%``, or a pattern."""
+    """Return whether a change is relative: a percentage such as ``+50%``, or a pattern of names."""
     return bool(_PATTERN.search(name) or (isinstance(value, str) and _SHARE.fullmatch(value)))
 
 
 def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return changes by plain names, shares as numbers [SI].
+    """Return changes by plain names, with percentages as numbers [SI].
 
     Parameters
     ----------
     base
-        Parameters that are changed.
+        Parameters before the changes.
     changes
         Values by dotted name. A text with a sign and a percentage, ``"+50%"``, changes a quantity
-        by that share of what it is; ``*``, ``?`` and ``[...]`` in a name stand for any characters,
-        and a name that is written out goes before a pattern.
+        by that share of its value; ``*``, ``?`` and ``[...]`` in a name match any characters. A
+        name without a pattern takes precedence.
 
     Raises
     ------
     UnknownNameError
         When a pattern matches nothing.
     ParameterError
-        When a share is wanted of what is no quantity, of zero, or of a temperature.
+        When a percentage is given for a choice, for zero, or for a temperature.
     """
     if not any(is_relative(name, value) for name, value in changes.items()):
         return dict(changes)
@@ -53,8 +53,10 @@ def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
             names = [name for name in names if name in leaves and any(_nodes(values[name]))]
             if not names:
                 raise ParameterError(
-                    f"{pattern} = {quoted(changes[pattern])}: none of what it matches is a "
-                    "quantity other than zero: give a value"
+                    f"{pattern} = {quoted(changes[pattern])}: the pattern matches no quantity that "
+                    "is not zero: give a value",
+                    name=pattern,
+                    value=str(changes[pattern]),
                 )
         spread |= dict.fromkeys(names, changes[pattern])
     spread |= {name: value for name, value in changes.items() if not _PATTERN.search(name)}
@@ -70,7 +72,7 @@ def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def share_of(value: object) -> float | None:
-    """Return the share that a text asks for; None where it is a value.
+    """Return the share of a percentage with a sign; None for a plain value.
 
     Examples
     --------
@@ -82,12 +84,12 @@ def share_of(value: object) -> float | None:
 
 
 def refuse_share_of_temperature(name: str, text: str, symbol: str) -> None:
-    """Refuse a share of what has no natural zero: 5 % of 20 degC are 1 K to one, 15 K to another.
+    """Reject a percentage of a temperature: 5 % of 20 degC are 1 K in degC, but 15 K in kelvin.
 
     Parameters
     ----------
     name, text
-        What is changed, and by which share.
+        Parameter and percentage.
     symbol
         Its SI unit.
 
@@ -98,26 +100,35 @@ def refuse_share_of_temperature(name: str, text: str, symbol: str) -> None:
     """
     if difference_unit(symbol) != symbol:
         raise ParameterError(
-            f"{name} = {quoted(text)}: a share of a temperature says nothing, for its zero may be "
-            "this one or that: give a temperature, or a width in K"
+            f"{name} = {quoted(text)}: a percentage of a temperature is ambiguous, as degC and K "
+            "have different zeros: give a temperature, or a width in K",
+            name=name,
+            value=text,
+            valid="a temperature, or a width in K",
         )
 
 
 def _scaled(name: str, text: str, share: float, value: Any, is_quantity: bool) -> Any:
     if not is_quantity:
         raise ParameterError(
-            f"{name} = {quoted(text)}: a share is of quantities alone, and this is a choice, now "
-            f"{value}: name another one"
+            f"{name} = {quoted(text)}: a choice, now {value}, cannot change by a percentage: name "
+            "another choice",
+            name=name,
+            value=text,
         )
     nodes = [*_nodes(value)]
     if not any(nodes):
-        raise ParameterError(f"{name} = {quoted(text)}: a share of 0 changes nothing: give a value")
+        raise ParameterError(
+            f"{name} = {quoted(text)}: a percentage of 0 changes nothing: give a value",
+            name=name,
+            value=text,
+        )
     scaled = tuple(Written((1.0 + share) * node, text) for node in nodes)
     return scaled if isinstance(value, tuple) else scaled[0]
 
 
 def _nodes(value: Any) -> Iterator[float]:
-    """Yield the number, or the numbers of a table."""
+    """Yield a number, or each number of a table."""
     yield from value if isinstance(value, tuple) else (value,)
 
 
@@ -126,11 +137,11 @@ def _nodes(value: Any) -> Iterator[float]:
 T = TypeVar("T")
 
 OPTION = "options."
-"""what stands before the name of an option"""
+"""prefix of the name of an option"""
 
 
 def split_options(named: Mapping[str, T]) -> tuple[dict[str, T], dict[str, T]]:
-    """Return what is said of parameters, and of options by their names without the beginning.
+    """Return the values of parameters, and those of options by their names without the prefix.
 
     Examples
     --------

@@ -43,19 +43,19 @@ from bywire.simulation.run import Run, Trajectory, simulate
 
 
 def varied_choices(bench: Bench) -> Mapping[str, tuple[Any, ...]]:
-    """Return what every choice of a bench that may vary can be, by its name.
+    """Return the possible values of every choice of a bench that may vary, by name.
 
-    Structural choices of the brake, and of the options ``options.NAME`` those that are listed
-    or true or false: a text of another kind names a signal, or a file.
+    These are the structural choices of the brake, and those options ``options.NAME`` that have
+    listed values or are true or false. Other texts name a signal or a file.
     """
     return choices_that_vary(type(bench.par), type(bench.chosen_options))
 
 
-@lru_cache(maxsize=64)  # the cases of a study ask for the same ones
+@lru_cache(maxsize=64)  # the same for all cases of a study
 def choices_that_vary(
     of: type[ParameterSet], chosen: type[ParameterSet]
 ) -> Mapping[str, tuple[Any, ...]]:
-    """Return the same by the classes of a bench's parameters and options."""
+    """Return `varied_choices` by the classes of a bench's parameters and options."""
     options = {f"{OPTION}{name}": choices_of(chosen, name) for name in choice_fields(chosen)}
     parameters = {name: choices_of(of, name) for name in choice_fields(of)}
     return parameters | {name: admitted for name, admitted in options.items() if admitted}
@@ -66,21 +66,21 @@ def choices_that_vary(
 
 @dataclass(frozen=True)
 class BenchEnsemble:
-    """What a bench gave for many values.
+    """Results of a bench for many values of its parameters and options.
 
     Parameters
     ----------
     variations
         Parameter, or ``options.NAME``, by name -> its value [SI] in each case, shape (cases,).
     results
-        What each case gave, judged by the bench's requirements.
+        Result of each case, judged by the bench's requirements.
     """
 
     variations: Mapping[str, Array]
     results: tuple[Result, ...]
 
     def kpi(self, name: str) -> Array:
-        """Return a key figure of every case, shape (cases,); NaN where it is not defined."""
+        """Return a key figure of every case, shape (cases,); NaN where undefined."""
         return np.array([result.kpi(name).value for result in self.results])
 
     @property
@@ -94,9 +94,9 @@ class BenchEnsemble:
         Raises
         ------
         UnknownNameError
-            When there is no such signal.
+            When the signal is unknown.
         ParameterError
-            When the experiment makes several runs: take ``results[k].recordings``.
+            When the experiment makes several runs: use ``results[k].recordings``.
         """
         each = [result.recording for result in self.results]
         if signal not in each[0]:
@@ -139,43 +139,49 @@ def simulate_ensemble(
     ----------
     run
         A run: model, parameters, initial values, stimulus, steps; see
-        `bywire.simulation.ensemble.simulate_ensemble`. Or a bench: every case then starts where
-        the experiment starts it with these parameters, and has its key figures and verdicts.
+        `bywire.simulation.ensemble.simulate_ensemble`. Or a bench: every case then has the initial
+        values that the experiment computes from its parameters, with key figures and verdicts.
     variations
-        Dotted name of a parameter, or of a bench ``options.NAME`` -> its value [SI] in each case,
-        shape (cases,). What is not named keeps its value.
+        Dotted name of a parameter, or ``options.NAME`` of a bench -> its value [SI] in each case,
+        shape (cases,). Other parameters keep their values.
     signals
-        Outputs of a run to record. A bench records all that its key figures need.
+        Outputs of a run to record. A bench records all signals that its key figures need.
     threads
         Threads to use, >= 1; all cores by default.
     engine
-        What computes: ``auto``, the bench's own or lanes of this machine's processor;
-        ``compiled``, ``virtual-machine``, or ``cuda``, a graphics processor (``docs/studies.md``).
+        ``auto``, the engine of the bench or lanes of this machine's processor; ``compiled``;
+        ``virtual-machine``; or ``cuda``, a graphics processor (``docs/studies.md``).
 
     Returns
     -------
     Ensemble
-        Of a run: its signals, shape (cases, rows) each.
+        For a run: its signals, shape (cases, rows) each.
     BenchEnsemble
-        Of a bench: recordings, key figures and verdicts of every case.
+        For a bench: recordings, key figures and verdicts of every case.
 
     Raises
     ------
     InputError
-        For names that are unknown, values out of range, and variations of several lengths.
+        For unknown names, values out of range, and variations of different lengths.
     RunError
-        When a trajectory leaves the numbers.
+        When a trajectory becomes infinite or not a number.
     """
     if isinstance(run, Run):
         if signals is None:
-            raise ParameterError("signals are missing: name the outputs of the run to record")
+            raise ParameterError(
+                "signals are missing: name the outputs of the run to record", name="signals"
+            )
         return ensemble.simulate_ensemble(run, variations, signals, threads, engine)
     if signals is not None:
-        raise ParameterError("a bench records all signals: leave signals out")
+        raise ParameterError("a bench records all signals: leave signals out", name="signals")
     arrays = {name: np.atleast_1d(np.asarray(v, dtype=float)) for name, v in variations.items()}
     lengths = {name: array.size for name, array in arrays.items()}
     if not arrays or len(set(lengths.values())) != 1 or 0 in lengths.values():
-        raise ParameterError(f"variations must have one length >= 1 each, got {lengths}")
+        raise ParameterError(
+            f"variations must all have the same length >= 1, got {lengths}",
+            name="variations",
+            value=str(lengths),
+        )
     benches = [
         changed(run, {name: float(array[k]) for name, array in arrays.items()})
         for k in range(next(iter(lengths.values())))
@@ -184,12 +190,12 @@ def simulate_ensemble(
 
 
 def varied_leaf(bench: Bench, name: str) -> Leaf:
-    """Return the description of a parameter, or of an option ``options.NAME``, that may vary.
+    """Return the description of a number of the parameters or options that may vary.
 
     Raises
     ------
     UnknownNameError
-        With the nearest numbers of the bench.
+        With the most similar names of the bench.
     """
     return _varied_leaf(type(bench.par), type(bench.chosen_options), name)
 
@@ -205,20 +211,20 @@ def _varied_leaf(of: type[ParameterSet], chosen: type[ParameterSet], name: str) 
 
 
 class _Names(NamedTuple):
-    """Names of what is changed of a bench."""
+    """Names of changed parameters and options of a bench."""
 
     parameters: tuple[str, ...]
     options: tuple[tuple[str, str], ...]
-    """each with its name among the options"""
+    """each name with the name among the options"""
     switches: frozenset[str]
-    """those that are true or false"""
+    """names of choices that are true or false"""
 
 
-@lru_cache(maxsize=64)  # the cases of a study all change the same
+@lru_cache(maxsize=64)  # the same for all cases of a study
 def _names_within(
     of: type[ParameterSet], chosen: type[ParameterSet], names: tuple[str, ...]
 ) -> _Names:
-    """Return which names are of parameters and which of options, or refuse one that is of none."""
+    """Sort names into parameters and options, or reject an unknown one."""
     choices = choices_that_vary(of, chosen)
     for name in names:
         if name not in choices:
@@ -229,14 +235,15 @@ def _names_within(
 
 
 def changed(bench: Bench, values: Mapping[str, float | str], seed: int | None = None) -> Bench:
-    """Return a bench with other parameters, choices and options [SI], and noise of another seed.
+    """Return a bench with other parameters, choices and options [SI], and another seed.
 
-    What is true or false is a text, ``"true"`` or ``"false"``, as other choices are.
+    Switches are texts, ``"true"`` or ``"false"``, like other choices.
 
     Raises
     ------
     InputError
-        When one is unknown or out of range, or contradicts another; the values are named.
+        When a name is unknown, or a value out of range or in contradiction to another; the message
+        lists the values.
     """
     names = _names_within(type(bench.par), type(bench.chosen_options), tuple(values))
     plain: Mapping[str, Any] = values
@@ -247,11 +254,11 @@ def changed(bench: Bench, values: Mapping[str, float | str], seed: int | None = 
     try:
         return bench.varied(overrides, options, seed)
     except InputError as error:
-        said = ", ".join(
+        changes = ", ".join(
             f"{name} = {value}" if isinstance(value, str) else f"{name} = {value:g}"
             for name, value in values.items()
         )
-        raise error.reworded(f"{said} (in SI): {error}") from None
+        raise error.reworded(f"{changes} (in SI): {error}") from None
 
 
 def run_benches(
@@ -264,7 +271,7 @@ def run_benches(
     """Make all runs of several benches of one experiment, and judge each bench.
 
     Cases that differ in numbers alone (parameters, initial values, stimuli) run side by side in
-    lanes; others, and all without a compiler, one after the other.
+    lanes. Other cases, and all cases without a compiler, run one after the other.
 
     Parameters
     ----------
@@ -277,12 +284,12 @@ def run_benches(
     threads
         Threads to use, >= 1; all cores by default.
     estimate_error
-        Whether all runs are made again in other steps; see `bywire.bench.running.run`.
+        Whether to repeat all runs in other steps; see `bywire.bench.running.run`.
 
     Raises
     ------
     StepError
-        When the runs do not fit into this machine together, or steps do not divide each other.
+        When the runs together need too much memory, or steps do not divide each other.
     RunError
         When a run fails.
     KeyboardInterrupt
@@ -301,7 +308,7 @@ def run_benches(
                 each[factor] = further
             continue
         for bench, each, failed, most in zip(benches, others, failures, limits, strict=True):
-            try:  # a single case may be what keeps them from running side by side
+            try:  # a single case may prevent a joint run
                 other = replace(bench, step=factor * bench.step)
                 (each[factor],) = _recordings([other], progress, engine, threads, limits=[most])
             except NO_ESTIMATE as error:
@@ -325,7 +332,7 @@ def _recordings(
     work: Sequence[dict[str, float]] = (),
     limits: Sequence[Mapping[str, float]] = (),
 ) -> list[dict[str, xr.Dataset]]:
-    """Return the recordings of each bench by label, and note what work they took."""
+    """Return the recordings of each bench by label, and add the work of its runs."""
     recordings = [static_recordings(bench) for bench in benches]
     for made in rounds(benches, progress, engine, threads, limits=limits):
         given = zip(made.places, made.cases, made.runs, made.trajectories, strict=True)
@@ -346,10 +353,10 @@ class Wanted:
     Parameters
     ----------
     signals
-        In all rows.
+        Outputs in all rows.
     ends
-        In the first and the last one alone; in all of runs with changes, and of a graphics
-        processor.
+        Outputs in the first and last rows alone. Runs with changes, and graphics processors, record
+        them in all rows.
     """
 
     signals: tuple[str, ...]
@@ -363,9 +370,9 @@ class Round:
     Parameters
     ----------
     places
-        Which of the benches make this run.
+        Indices of the benches that make this run.
     cases, runs, trajectories
-        What each asks for, as the engine takes it, and what it gave.
+        Case of each bench, its run for the engine, and the trajectory.
     """
 
     places: Sequence[int]
@@ -384,24 +391,24 @@ def rounds(
 ) -> Iterator[Round]:
     """Yield the first run of all benches, the second one, and so on.
 
-    Runs that fit into lanes are a `RunGroup`, of which the settling that no recording keeps is not
-    recorded; others, and all without a compiler, are computed one after the other.
+    Runs that fit into lanes are a `RunGroup`, which records only rows that a recording keeps. Other
+    runs, and all runs without a compiler, are computed one after the other.
 
     Parameters
     ----------
     benches
         Benches of one experiment.
     progress, engine, threads
-        As of `bywire.bench.ensemble.run_benches`.
+        As in `run_benches`.
     signals
         ``signals(run)``: outputs to record of runs side by side; None for all.
     limits
-        Of each bench the work that its runs may take, by label; without end by default.
+        For each bench the largest work of its runs, by label; unlimited by default.
 
     Raises
     ------
     StepError
-        When the runs do not fit into this machine together.
+        When the runs together need too much memory.
     RunError
         When a run fails.
     KeyboardInterrupt
@@ -453,19 +460,19 @@ def _share(report: Any, k: int, count: int, share: float) -> None:
     report((k + share) / count)
 
 
-# --- Key figures and warnings, without recordings for anybody to look at
+# --- Key figures and warnings without recordings
 
 
 @dataclass(frozen=True)
 class KeyFigures:
-    """What benches of one experiment gave, without recordings.
+    """Key figures and warnings of benches of one experiment, without recordings.
 
     Parameters
     ----------
     figures
-        Key figures, each of all benches.
+        Key figures, each for all benches.
     warnings
-        What the runs of each bench warned of.
+        Warnings of the runs of each bench.
     """
 
     figures: tuple[KpiOfCases, ...]
@@ -477,7 +484,7 @@ class KeyFigures:
 
 
 def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyFigures:
-    """Return the key figures of several benches of one experiment, as `run_benches` gives them.
+    """Return the key figures of several benches of one experiment, equal to `run_benches`.
 
     Parameters
     ----------
@@ -489,7 +496,7 @@ def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyF
     Raises
     ------
     StepError
-        When the runs do not fit into this machine.
+        When the runs need too much memory.
     RunError
         When a run fails.
     KeyboardInterrupt
@@ -508,11 +515,11 @@ def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyF
             _recorded(benches, made, recordings, warnings)
             continue
         rows = rows_of_group(group, made.cases[0].settle)
-        said = watch_cases(
+        texts = watch_cases(
             rows, group.runs, group.unsettled.tolist(), _books(made, group, rows, threads)
         )
-        for k, case, texts in zip(made.places, made.cases, said, strict=True):
-            warnings[k] += _labeled(benches[k], case, texts)
+        for k, case, each in zip(made.places, made.cases, texts, strict=True):
+            warnings[k] += _labeled(benches[k], case, each)
         if families is not None:
             if benches[0].definition.beside is not None:
                 rows = inputs_recorded(rows, made.cases, wanted)
@@ -526,13 +533,13 @@ def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyF
 
 
 def _is_plain(bench: Bench) -> bool:
-    """Return whether an experiment makes one run, to whose recording nothing is added."""
+    """Return whether an experiment makes one run and adds nothing to its recording."""
     definition = bench.definition
     return definition.static is None and definition.finish is None and len(bench.cases()) == 1
 
 
 def needed(wanted: set[str], run: Run) -> Wanted | None:
-    """Return the outputs that key figures, warnings and books of energy look at; None for all."""
+    """Return the outputs that key figures, warnings and energy balances read; None for all."""
     watched, names = run.model.watched(run.par), run.model.Output._fields
     if watched is None:
         return None
@@ -544,9 +551,9 @@ def needed(wanted: set[str], run: Run) -> Wanted | None:
 
 
 def _books(made: Round, group: RunGroup, rows: Rows, threads: int | None) -> list[list[str]]:
-    """Return what every run warns of because its energies cannot be true.
+    """Return the warnings of every run on impossible energies.
 
-    Their ends tell of most runs that they can; where they do not, all rows are computed.
+    For most runs the two ends exclude such warnings. Otherwise all rows are computed.
     """
     if group.end_names:
         if are_surely_sound(cast(xr.Dataset, ends_of_group(group)), made.runs):
@@ -563,14 +570,14 @@ def _recorded(
     recordings: list[dict[str, Any]],
     warnings: list[list[str]],
 ) -> None:
-    """Add what runs recorded that were computed one after the other."""
+    """Add the recordings and warnings of runs that were computed one after the other."""
     for k, case, run, trajectory in zip(
         made.places, made.cases, made.runs, made.trajectories, strict=True
     ):
-        recordings[k][case.label], said = rows_recorded(benches[k], case, run, trajectory)
-        warnings[k] += _labeled(benches[k], case, said)
+        recordings[k][case.label], texts = rows_recorded(benches[k], case, run, trajectory)
+        warnings[k] += _labeled(benches[k], case, texts)
 
 
 def _labeled(bench: Bench, case: Case, texts: Sequence[str]) -> list[str]:
-    """Return warnings, with the run's label where there are several."""
+    """Return warnings, with the run's label if there are several runs."""
     return [f"{case.label}: {t}" for t in texts] if len(bench.cases()) > 1 else list(texts)

@@ -1,4 +1,4 @@
-"""Trajectories as recordings: datasets with units, names and where they come from."""
+"""Recordings of trajectories: datasets with units, labels and their origin."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def record(
 ) -> xr.Dataset:
     """Return the recording of a run.
 
-    ``settle``: time of the run [s] that lies before the recording's zero; ``keep``: how much of it
-    is kept, at negative times; ``notes``: further attributes, for instance the experiment's name.
+    ``settle``: time of the run [s] before the recording's zero; ``keep``: part of it that is kept,
+    at negative times; ``notes``: further attributes, for instance the experiment's name.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def record(
     """
     rows = rows_of(run, trajectory, settle, keep)
     variables = {n: ("time", row.values, dict(row.attrs)) for n, row in rows.data_vars.items()}
-    # As an index of pandas: from an array, xarray would load pint to see what it is.
+    # As an index of pandas: for an array, xarray would import pint to check its type.
     axis = pd.Index(rows["time"].values, name="time")
     recording = xr.Dataset(variables, coords={"time": ("time", axis, {"units": "s"})})
     recording["time"].attrs["long_name"] = "time"
@@ -56,7 +56,7 @@ def record(
 
 
 def run_notes(run: Run, trajectory: Trajectory) -> dict[str, Any]:
-    """Return what a recording says of its run, but for the warnings."""
+    """Return the attributes of a recording that describe its run, without warnings."""
     return {
         "bywire_version": __version__,
         "model": run.model.name,
@@ -77,11 +77,11 @@ def rows_of(
     keep: float,
     notes: Callable[[], Mapping[str, Any]] = dict,
 ) -> Rows:
-    """Return what a recording of a run holds, as plain arrays, without warnings; see `record`."""
+    """Return the content of a run's recording as plain arrays, without warnings; see `record`."""
     time = trajectory.time - settle
     begin = int(np.searchsorted(time, -keep - 1e-9))
     attributes = _attributes_of(run.model.Output)
-    # A copy: each signal in one piece, and the settling not kept in memory.
+    # A copy: each signal is contiguous, and the settling is not kept in memory.
     kept = dict(zip(trajectory.names, trajectory.values[begin:].T.copy(), strict=True))
     signals = {name: kept[name] for name in attributes if name in kept}
     return Rows(
@@ -94,7 +94,7 @@ def rows_of(
 
 
 def rows_of_group(group: RunGroup, settle: float) -> Rows:
-    """Return what recordings of several runs hold, of those rows that were computed."""
+    """Return the content of the recordings of several runs, for the computed rows."""
     signals = dict(zip(group.names, group.values, strict=True))
     attributes = _attributes_of(group.runs[0].model.Output)
     return Rows(
@@ -103,7 +103,7 @@ def rows_of_group(group: RunGroup, settle: float) -> Rows:
 
 
 def ends_of_group(group: RunGroup) -> Rows:
-    """Return the first and the last row of several runs, with what these alone recorded."""
+    """Return the first and last rows of several runs, with the signals of these rows alone."""
     values = {name: each[:, [0, -1]] for name, each in zip(group.names, group.values, strict=True)}
     values |= zip(group.end_names, group.ends, strict=True)
     attributes = _attributes_of(group.runs[0].model.Output)
@@ -124,7 +124,7 @@ def _attributes(signal: Signal) -> dict[str, str]:
 
 
 def watch(recording: xr.Dataset, run: Run, trajectory: Trajectory) -> list[str]:
-    """Return what the user should know of a recording: validity left, stops met, solver trouble."""
+    """Return warnings on a recording: ranges of validity, end stops, solver problems, energies."""
     if not recording.sizes["time"]:  # interrupted before the first row
         return []
     doubts = _solver_doubts(trajectory.doubt, trajectory.unsettled)
@@ -134,10 +134,10 @@ def watch(recording: xr.Dataset, run: Run, trajectory: Trajectory) -> list[str]:
 def watch_cases(
     rows: Rows, runs: Sequence[Run], unsettled: Sequence[int], books: Sequence[Sequence[str]]
 ) -> list[list[str]]:
-    """Return what `watch` says of each of several runs of one structure and plan.
+    """Return the warnings of `watch` for each of several runs of one structure and plan.
 
-    ``rows``: of all of them; ``unsettled``: substeps of each that hit the cap of the contacts;
-    ``books``: what `energy_doubts` says of each.
+    ``rows``: rows of all runs; ``unsettled``: substeps of each that hit the cap of the contacts;
+    ``books``: `energy_doubts` of each.
     """
     solver = map(_solver_doubts, doubts_of(runs), unsettled)
     model, pars = runs[0].model, [run.par for run in runs]
@@ -150,7 +150,7 @@ def watch_cases(
 
 
 def _solver_doubts(doubt: str, unsettled: int) -> list[str]:
-    doubts = [doubt.replace("; ", ", ")] if doubt else []  # what joins the warnings
+    doubts = [doubt.replace("; ", ", ")] if doubt else []  # semicolons separate warnings
     if unsettled:
         doubts.append(
             f"{unsettled} substeps hit the cap of the contact iteration: take a smaller step"
@@ -159,7 +159,7 @@ def _solver_doubts(doubt: str, unsettled: int) -> list[str]:
 
 
 def energy_doubts_of(run: Run, trajectory: Trajectory) -> list[str]:
-    """Return what `energy_doubts` says of a run of which the `energy_signals` were computed."""
+    """Return the `energy_doubts` of a run with computed `energy_signals`."""
     if not trajectory.time.size:
         return []
     attributes = _attributes_of(run.model.Output)

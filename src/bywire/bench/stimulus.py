@@ -1,8 +1,9 @@
 """Stimuli: their quantities, their kinds by name, and their sections in a bench.
 
-A stimulus may drive a current, a voltage, a pressure or a force. Its levels therefore carry the
-unit ``level``, which the registry replaces by the unit of the driven signal. Every stimulus is a
-function ``sample(t, par)``: times [s] of any shape give the driven signal [level] in that shape.
+A stimulus may drive a current, a voltage, a pressure or a force. Its levels therefore have the unit
+``level``, which `create` replaces by the unit of the driven signal. Every file of ``stimuli/`` is
+a kind: ``Parameters`` and a function ``sample(t, par)``, which returns the driven signal [level] at
+times [s] of any shape.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from bywire.core.callers import option
-from bywire.core.errors import FileError, ParameterError, UnknownNameError, quoted
+from bywire.core.errors import FileError, ParameterError, UnknownNameError, not_valid, quoted
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.quantities import Unit
 from bywire.core.registry import Kind
@@ -29,11 +30,11 @@ LevelRate = Annotated[float, Unit("level/s"), Field(gt=0, allow_inf_nan=False)]
 Phase = Annotated[float, Unit("rad"), Field(allow_inf_nan=False)]
 Count = Annotated[int, Unit("1", 16.0), Field(ge=1, le=10_000)]
 
-TOLERANCE = 1e-9  # s: ticks at k * T carry rounding errors far below it
+TOLERANCE = 1e-9  # s: the rounding errors of ticks at k * T are far smaller
 
 
 def reached(t: NDArray[np.float64], instant: float) -> NDArray[np.bool_]:
-    """Return where the time has reached an instant, rounding errors of a tick forgiven.
+    """Return whether each time has reached an instant, within the rounding errors of a tick.
 
     ``t``: times [s], any shape; ``instant``: instant [s].
     """
@@ -52,7 +53,7 @@ class StimulusKind:
     Parameters
     ----------
     name
-        What bench files and the command line call it: the name of its module.
+        Name in bench files and on the command line: the name of its module.
     summary
         One line for listings.
     parameter_class
@@ -88,7 +89,7 @@ class Stimulus:
 
 
 def _declared(module: ModuleType) -> Iterator[StimulusKind]:
-    """Yield the kind that a module is: every module that offers ``Parameters`` and ``sample``."""
+    """Yield the kind that a module with ``Parameters`` and ``sample`` declares."""
     if hasattr(module, "sample") and hasattr(module, "Parameters"):
         summary = (module.__doc__ or "").strip().splitlines()[0]
         name = module.__name__.rpartition(".")[2]
@@ -107,17 +108,17 @@ def create(kind: str, values: Mapping[str, Value], level_unit: str) -> Stimulus:
     kind
         Name of the stimulus, for instance ``"ramp"``.
     values
-        Its parameters by name. A table's nodes are a sequence, or one text with commas, each
-        node with its unit: ``"0 s, 0.2 s, 1 s"``.
+        Its parameters by name. The nodes of a table are a sequence, or one text with commas in
+        which each node has its unit: ``"0 s, 0.2 s, 1 s"``.
     level_unit
         SI unit of the driven signal, for instance ``"A"`` or ``"Pa"``.
 
     Raises
     ------
     UnknownNameError
-        When kind or a parameter's name is unknown.
+        When the kind or a parameter is unknown.
     UnitError
-        When a text is no quantity or its unit measures something else.
+        When a text is not a quantity, or has a unit of another dimension.
     ParameterError
         When a value is missing, out of range or contradicts another.
 
@@ -138,31 +139,32 @@ def create(kind: str, values: Mapping[str, Value], level_unit: str) -> Stimulus:
     try:
         return Stimulus(kind, cls.create(numbers))
     except UnknownNameError as error:
-        raise UnknownNameError(f"stimulus {kind!r}: {error}") from None
+        raise error.reworded(f"stimulus {kind!r}: {error}") from None
     except ParameterError as error:
-        raise ParameterError(_in_terms_of(str(error), kind, level_unit)) from None
+        raise error.reworded(_in_terms_of(str(error), kind, level_unit)) from None
 
 
 def _in_terms_of(message: str, kind: str, level_unit: str) -> str:
-    """Return the message with the driven signal's unit where the class says ``level``."""
+    """Return the message with the unit of the driven signal in place of ``level``."""
     unit = "" if level_unit == "1" else f" {level_unit}"
     lines = message.replace(" level/s", f" {level_unit}/s").replace(" level", unit).splitlines()
     return "\n".join(f"stimulus {kind!r}: {line.removeprefix('Parameters: ')}" for line in lines)
 
 
-def wanted(stimulus: Stimulus | None, experiment: str) -> Stimulus:
-    """Return a stimulus that an experiment cannot do without.
+def required_stimulus(stimulus: Stimulus | None, experiment: str) -> Stimulus:
+    """Return the stimulus of a bench, which an experiment needs.
 
     Raises
     ------
     ParameterError
-        When the bench gives none.
+        When the bench has none.
     """
     if stimulus is None:
         raise ParameterError(
             f"{experiment} needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine "
             "or table, with its parameters; without a file "
-            f"{option('overrides', {'stimulus.kind': 'step'})} and so on"
+            f"{option('overrides', {'stimulus.kind': 'step'})} and so on",
+            name="stimulus",
         )
     return stimulus
 
@@ -170,31 +172,31 @@ def wanted(stimulus: Stimulus | None, experiment: str) -> Stimulus:
 # --- Sections of a bench
 
 _FILE = ("format", "rate", "start", "decimal", "skip_lines")
-_CLOCK = {"time": "column", "time_unit": "unit"}  # a table of a stimulus would be another one
+_CLOCK = {"time": "column", "time_unit": "unit"}  # flat, as a table would be another stimulus
 _SIGNAL = ("column", "unit", "scale", "sign", "offset", "delay")
 _NAME = "stimulus"
 _SHOWN = 12
 
 
 def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
-    """Return a table's parameters with ``file`` replaced by the nodes that it holds.
+    """Return the parameters of a table, with ``file`` replaced by its nodes.
 
     Parameters
     ----------
     values
         Parameters of the stimulus. ``file``: path of the file; ``column``: name of the column,
-        needed where there are several besides time; ``unit``, ``scale``, ``sign``, ``offset``,
+        needed if there are several besides time; ``unit``, ``scale``, ``sign``, ``offset``,
         ``delay``, ``rate``, ``start``, ``format``, ``decimal`` and ``skip_lines`` as in a mapping,
-        and ``time`` and ``time_unit`` for the column of the instants, where the file does not say
-        them; ``max_gap``: longest pause that is bridged. Time starts at the first instant;
-        ``between`` is ``"linear"`` unless given.
+        and ``time`` and ``time_unit`` for the column of times, if the file does not name them;
+        ``max_gap``: longest gap that is bridged. Time starts at the first row; ``between`` is
+        ``"linear"`` by default.
     level_unit
         SI unit of the driven signal.
 
     Raises
     ------
     InputError
-        When the file cannot be used, or ``times`` or ``values`` are given beside it.
+        When the file cannot be used, or ``times`` or ``values`` are given as well.
     """
     if "file" not in values:
         return dict(values)
@@ -204,10 +206,12 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
     keys = ("file", "max_gap", *_FILE, *_CLOCK, *_SIGNAL)
     rest = {key: value for key, value in values.items() if key not in keys}
     if "times" in rest or "values" in rest:
-        raise ParameterError("stimulus 'table': give either file, or times and values")
+        raise ParameterError(
+            "stimulus 'table': give either file, or times and values", name="stimulus.file"
+        )
     path = values["file"]
     if not isinstance(path, str):
-        raise ParameterError(f"stimulus.file: it must be a text, got {quoted(path)}")
+        raise not_valid("stimulus.file", quoted(path), "a text")
     whole = {key: values[key] for key in _FILE if key in values}
     clock = {inner: values[key] for key, inner in _CLOCK.items() if key in values}
     whole |= {"time": clock} if clock else {}
@@ -218,15 +222,17 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
             more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
             raise FileError(
                 f"{path} has several columns besides time: name one of them with column "
-                f"({', '.join(names[:_SHOWN])}{more})"
+                f"({', '.join(names[:_SHOWN])}{more})",
+                name="stimulus.column",
+                valid=", ".join(names),
             )
         signal["column"] = names[0]
-    meant = signal_mapping(_NAME, signal, "[stimulus]")
+    mapped = signal_mapping(_NAME, signal, "[stimulus]")
     trace = read_trace(
         path,
         {_NAME: level_unit},
         max_gap=values.get("max_gap", 0.1),
-        mapping=replace(mapping_from(whole), signals={_NAME: meant}),
+        mapping=replace(mapping_from(whole), signals={_NAME: mapped}),
     )
     time = trace["time"].values
     nodes = {"times": (time - time[0]).tolist(), "values": trace[_NAME].values.tolist()}
@@ -237,7 +243,7 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
 
 
 def stimulus_sections(stimulus: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """Return the sections of a stimulus by signal: what is no section itself under ""."""
+    """Return the sections of a stimulus by signal; plain keys are the section ""."""
     plain = {key: value for key, value in stimulus.items() if not isinstance(value, Mapping)}
     further = {key: value for key, value in stimulus.items() if isinstance(value, Mapping)}
     return ({"": plain} if plain else {}) | further
@@ -253,16 +259,17 @@ def stimulus_of(section: Mapping[str, Any], unit: str, name: str) -> Stimulus:
     unit
         SI unit of the driven signal.
     name
-        Of the signal; empty for a plain section.
+        Name of the signal; empty for a plain section.
 
     Raises
     ------
     InputError
-        When there is no such kind, or its parameters or its file do not fit.
+        When the kind is unknown, or its parameters or its file are not valid.
     """
     values = dict(section)
     kind = values.pop("kind", None)
     if not isinstance(kind, str):
         title = f"stimulus.{name}" if name else "stimulus"
-        raise ParameterError(f"[{title}] needs a kind: {', '.join(sorted(STIMULI.all()))}")
+        kinds = ", ".join(sorted(STIMULI.all()))
+        raise ParameterError(f"[{title}] needs a kind: {kinds}", name=f"{title}.kind", valid=kinds)
     return create(kind, with_nodes(values, unit) if kind == "table" else values, unit)

@@ -328,9 +328,8 @@ def _with_texts(unknown: Unknown, within: str, prior: str, leaf: Leaf | None) ->
 def _prior(unknown: Unknown, text: str) -> tuple[float, float]:
     mean, deviation = _pair(unknown, text, BETWEEN.split(text), "prior", " +- ")
     if not deviation > 0.0:
-        raise not_valid(
-            f"prior of {unknown.name}", quoted(text), "MEAN +- DEVIATION with a deviation > 0"
-        )
+        valid = "MEAN +- DEVIATION with a deviation > 0"
+        raise not_valid(f"prior of {unknown.name}", quoted(text), valid)
     return mean, deviation
 
 

@@ -118,7 +118,6 @@ def tallies(items: Iterable[Item]) -> dict[str, Tally]:
 
 # --- Reproductions
 
-_WIDTH = 150  # characters of a line of a part's own table
 _THREADS = 4  # more would wait for each other's Python
 
 
@@ -244,9 +243,9 @@ class Reproduction(Answer):
     def _tables(self) -> list[str | Flat]:
         """Return what a terminal shows: parts' own tables, and the verdicts of all others."""
         rest = [item for part in self.parts if not part.tables for item in part.items]
-        lines: list[str | Flat] = [TableBlock(verdicts(rest), width=0), ""] if rest else []
+        lines: list[str | Flat] = [TableBlock(verdicts(rest)), ""] if rest else []
         for title, table in (pair for part in self.parts for pair in part.tables.items()):
-            lines += [title, TableBlock(table, width=_WIDTH), ""]
+            lines += [title, TableBlock(table), ""]
         return lines
 
     def _sections(self, short: Listing) -> list[Section]:

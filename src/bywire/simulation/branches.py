@@ -43,7 +43,7 @@ class Modes:
     rest: list[Node]
 
     def without(self, known: Collection[Node]) -> Modes:
-        """Return the parts less nodes that are known already."""
+        """Return the parts without nodes that are known already."""
         return Modes(
             *(
                 [n for n in each if n not in known]
@@ -53,14 +53,14 @@ class Modes:
 
 
 def modes(graph: Graph, roots: Sequence[Node], level: Levels) -> Modes:
-    """Split what a substep computes.
+    """Split the nodes of a substep by how often they change.
 
     Parameters
     ----------
     roots
         Results of the substep.
     level
-        Tells how often a node changes, see ``stages.LEVEL``.
+        How often each node changes, see ``stages.LEVEL``.
     """
     substep = needed(graph, roots, lambda n: level[n] < 2)
     order = needed(graph, roots, lambda n: level[n] == 0)
@@ -132,16 +132,16 @@ _SELECTIONS = ("if_else_zero", "select")
 
 @dataclass(frozen=True)
 class Arm:
-    """What an arm of a selection needs alone.
+    """Nodes that only one arm of a selection needs.
 
     Parameters
     ----------
     nodes
-        What is computed in it, in order.
+        Nodes computed in it, in order.
     kept
         Those of them that a later selection by the same condition takes over.
     taken
-        What it takes over from earlier ones.
+        Nodes taken over from earlier arms.
     """
 
     nodes: tuple[Node, ...] = ()
@@ -155,7 +155,7 @@ Arms = tuple[Arm, Arm]
 def branched(
     graph: Graph, order: Sequence[Node], kept: Collection[Node]
 ) -> tuple[list[Node], dict[Node, Arms]]:
-    """Take out of an order what the arms of its selections alone need.
+    """Remove from an order the nodes that only arms of its selections need.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def _arm(graph: Graph, selection: Node, place: int) -> Node | None:
 
 
 def _needs(graph: Graph, end: Node | None, cone: Collection[Node]) -> set[Node]:
-    """Return what of a cone a value needs."""
+    """Return the nodes of a cone that a value needs."""
     needs: set[Node] = set()
     stack = [] if end is None else [end]
     while stack:
@@ -292,7 +292,7 @@ def _cone(
     users: Mapping[Node, Sequence[Node]],
     kept: Collection[Node],
 ) -> set[Node]:
-    """Return what one arm of selections needs and nothing else does."""
+    """Return the nodes that only one arm of selections needs."""
     ends: dict[Node, set[Node]] = {}
     for selection in selections:
         arm = _arm(graph, selection, place)
@@ -329,7 +329,7 @@ def branch(
     return [*declared, f"if ({test}) {{", *texts[0], "} else {", *texts[1], "}"]
 
 
-# --- What follows from ramps alone is kept for as long as these stand still
+# --- Values that follow from ramps alone are kept while the ramps are constant
 # A ramp is a linear function of states between two limits, such as the share of a road's second
 # surface over the place. All but a short while it stands at a limit, and what follows from it and
 # from parameters, a peak of adhesion with its logarithm for one, need not be computed again. The
@@ -365,7 +365,7 @@ def remembered(
     states: Collection[Node],
     level: Levels,
 ) -> tuple[list[Node], tuple[Remembered, ...], list[Node]]:
-    """Return what is worth remembering of a substep, what that follows from, and all else.
+    """Split a substep: values worth remembering, their inputs, and the rest.
 
     Parameters
     ----------
@@ -378,7 +378,7 @@ def remembered(
     states
         Nodes that are there already, and linear in states.
     level
-        Tells how often a node changes, see ``stages.LEVEL``.
+        How often each node changes, see ``stages.LEVEL``.
 
     Returns
     -------
@@ -459,7 +459,7 @@ def _read_outside(
 
 
 def declarations(groups: Sequence[Remembered], name: Namer) -> list[str]:
-    """Return the declarations of what is remembered, unknown so far."""
+    """Return the declarations of remembered values, unknown at first."""
     lines = []
     for k, group in enumerate(groups):
         lines.append(f"uint64_t known{k} = 0;")

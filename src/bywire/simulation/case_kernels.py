@@ -44,7 +44,7 @@ class CaseKernel(Protocol):
     at_once: int
 
     def rows(self, cases: int, rows: int) -> Array:
-        """Return room for what cases record, shape (cases, rows, signals)."""
+        """Return an array for the recorded rows, shape (cases, rows, signals)."""
         ...
 
     def advance(
@@ -63,7 +63,7 @@ class CaseKernel(Protocol):
 
 
 class LaneKernel:
-    """Compiled kernel for a group of cases, of the signals that are wanted and nothing else.
+    """Compiled kernel for a group of cases and a selection of signals.
 
     ``signals``: how many outputs it records; ``ends``: how many of them, the last ones, at both
     ends of the rows alone.
@@ -166,7 +166,7 @@ def is_side_by_side(engine: str) -> bool:
     Raises
     ------
     UnknownNameError
-        When there is no such engine.
+        When the engine is unknown.
     """
     if engine not in engine_names():
         raise unknown_name("engine", engine, engine_names())
@@ -188,7 +188,7 @@ def case_kernel(
     Raises
     ------
     DeviceError
-        For ``cuda`` where there is no graphics processor, or no room on it.
+        For ``cuda`` without a graphics processor, or without enough memory on it.
     """
     if engine == CUDA:
         from bywire.simulation.cuda import find_device

@@ -53,8 +53,11 @@ def usable_folder() -> Path:
     if not folder.is_absolute():  # in whatever folder one works, somebody else's perhaps
         if "BYWIRE_CACHE" in os.environ:
             raise CompilerError(
-                f"BYWIRE_CACHE = {folder} is relative, and kernels of the working folder would be "
-                f"run: name a folder from the root, such as {folder.absolute()}, or unset it"
+                f"BYWIRE_CACHE = {folder} is relative, so that kernels of the working folder would "
+                f"run: name an absolute folder, such as {folder.absolute()}, or unset it",
+                name="BYWIRE_CACHE",
+                value=str(folder),
+                valid="an absolute folder",
             )
         return process_folder()
     try:
@@ -70,8 +73,10 @@ def usable_folder() -> Path:
     advice = f"{place} is not yours alone, and others could put code there"
     if "BYWIRE_CACHE" in os.environ:
         raise CompilerError(
-            f"BYWIRE_CACHE = {folder}: {advice}: name a new folder in one that only you can write "
-            "to, or unset it"
+            f"BYWIRE_CACHE = {folder}: {advice}: name a new folder within a folder that only you "
+            "can write to, or unset it",
+            name="BYWIRE_CACHE",
+            value=str(folder),
         )
     _warn_once(f"compiled kernels are not kept: {advice}: set BYWIRE_CACHE to a folder of yours")
     return process_folder()
@@ -103,7 +108,7 @@ def open_to_others(path: Path) -> str:
 
 
 def _is_closed(status: os.stat_result, is_above: bool) -> bool:
-    """Return whether nobody but its owner may write to something."""
+    """Return whether only its owner may write to a file or folder."""
     by_others = status.st_mode & stat.S_IWOTH
     by_group = status.st_mode & stat.S_IWGRP and not _is_private(status.st_gid)
     return not (by_others or by_group) or bool(is_above and status.st_mode & stat.S_ISVTX)
@@ -122,7 +127,7 @@ def _is_private(group: int) -> bool:
 
 
 def keep_text(path: Path, text: str) -> None:
-    """Write a file of the folder whole or not at all; where that fails, nothing is kept."""
+    """Write a file of the folder completely or not at all."""
     with contextlib.suppress(OSError), replacing(path) as fresh:
         fresh.write_text(text, encoding="utf-8")
 
@@ -150,7 +155,7 @@ def digest_of(library: Path) -> Path:
 
 
 def _content(path: Path) -> bytes:
-    """Return the bytes of a file that nobody else could have written."""
+    """Return the bytes of a file that only the user could have written."""
     place = open_to_others(path)
     if place:
         raise PermissionError(place)
@@ -183,7 +188,9 @@ def load(library: Path, entry: str) -> ctypes.CDLL:
         if place:
             raise CompilerError(
                 f"{library} is not loaded: {place} is not yours alone, and others could put code "
-                "there: set BYWIRE_CACHE to a new folder in one that only you can write to"
+                "there: set BYWIRE_CACHE to a new folder within a folder that only you can write "
+                "to",
+                name=str(library),
             )
         loaded = ctypes.CDLL(str(library.resolve(strict=True)))
         getattr(loaded, entry)
@@ -240,14 +247,14 @@ _OTHERWISE = (
 
 @dataclass(frozen=True)
 class Compiler:
-    """How to call a C compiler.
+    """C compiler and how to call it.
 
     Parameters
     ----------
     command
         Program and leading arguments.
     label
-        What messages and recordings call it, with its version.
+        Name in messages and recordings, with its version.
     quick
         Whether it takes half the time for kernels that give the same digits by GCC and run a
         tenth slower.
@@ -281,8 +288,11 @@ def find_compiler() -> Compiler | None:
         if program := find_program(wanted):
             return _labeled((program,), is_quick)
         raise CompilerError(
-            f"BYWIRE_CC = {wanted!r} names no program: "
-            "unset it, or set it to a C compiler or 'none'"
+            f"BYWIRE_CC = {wanted!r} is not a program: "
+            "unset it, or set it to a C compiler or 'none'",
+            name="BYWIRE_CC",
+            value=wanted,
+            valid="a C compiler or 'none'",
         )
     commands: list[tuple[str, ...]] = [
         (path,) for name in ("cc", "gcc", "clang") if (path := find_program(name))
@@ -310,7 +320,12 @@ def _is_quick() -> bool:
     """
     quick = os.environ.get("BYWIRE_CC_QUICK") or "0"
     if quick not in ("0", "1"):
-        raise CompilerError(f"BYWIRE_CC_QUICK = {quick!r} is not valid: set it to 0 or 1")
+        raise CompilerError(
+            f"BYWIRE_CC_QUICK = {quick!r} is not valid: it must be 0 or 1",
+            name="BYWIRE_CC_QUICK",
+            value=quick,
+            valid="0 or 1",
+        )
     return quick == "1"
 
 
@@ -319,13 +334,13 @@ def _labeled(command: tuple[str, ...], is_quick: bool) -> Compiler:
         done = run_program([*command, "--version"], 60.0)
     except (OSError, subprocess.TimeoutExpired) as error:
         reason = getattr(error, "strerror", None) or "it took longer than 60 s"
-        what = f"the C compiler {command[0]} does not start ({reason})"
-        raise CompilerError(f"{what}: {_OTHERWISE}") from None
+        text = f"the C compiler {command[0]} does not start ({reason}): {_OTHERWISE}"
+        raise CompilerError(text, name=command[0]) from None
     if done.returncode != 0:
-        what = f"the C compiler {command[0]} does not tell its version"
-        raise CompilerError(f"{what}: {_OTHERWISE}")
+        text = f"the C compiler {command[0]} does not report its version: {_OTHERWISE}"
+        raise CompilerError(text, name=command[0])
     first = (done.stdout.splitlines() or [Path(command[0]).name])[0].strip()
-    # Said in the label, by which kept kernels and recordings tell compilers apart.
+    # Part of the label, which identifies the compiler in kept kernels and recordings.
     return Compiler(command, f"{first}, quick" if is_quick else first, is_quick)
 
 
@@ -420,7 +435,7 @@ def _compiled_into(library: Path, source: str, flags: tuple[str, ...], compiler:
 
 @cache
 def processor() -> str:
-    """Return what tells processors of different abilities apart that share a cache folder."""
+    """Return a digest of the processor's features, for machines that share a cache folder."""
     try:
         with Path("/proc/cpuinfo").open() as lines:  # of which there are many where cores are
             return next(line for line in lines if line.startswith(("flags", "Features"))).rstrip()
@@ -442,5 +457,5 @@ def _compile(compiler: Compiler, flags: tuple[str, ...], source: Path, target: P
     if done.returncode != 0 or not target.exists():
         message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
         raise CompilerError(
-            f"{compiler.label} refused a generated kernel:\n{message}\n{_OTHERWISE}"
+            f"{compiler.label} rejected a generated kernel:\n{message}\n{_OTHERWISE}"
         )

@@ -55,13 +55,15 @@ def bindings(name: str) -> ModuleType:
         return importlib.import_module(f"cuda.bindings.{name}")
     except ImportError:
         raise DeviceError(
-            "engine 'cuda' takes NVIDIA's bindings and its compiler, which are not installed: "
-            f"{how_to_install('gpu')}; {OTHERWISE}"
+            "engine 'cuda' needs NVIDIA's bindings and compiler, which are not installed: "
+            f"{how_to_install('gpu')}; {OTHERWISE}",
+            name="engine",
+            value="cuda",
         ) from None
 
 
 def cuda_binary(source: str, capability: int, entry: str) -> bytes:
-    """Return what a kernel is for a graphics processor, compiled unless it is kept.
+    """Return the code of a kernel for a graphics processor, compiled unless it is kept.
 
     Parameters
     ----------
@@ -81,7 +83,7 @@ def cuda_binary(source: str, capability: int, entry: str) -> bytes:
     Raises
     ------
     DeviceError
-        When the compiler is not there, or knows no processor as old.
+        When the compiler is missing, or does not support a processor that old.
     CompilerError
         With the first lines of the compiler's message.
     """
@@ -97,8 +99,8 @@ def cuda_binary(source: str, capability: int, entry: str) -> bytes:
     if not target:
         raise DeviceError(
             f"NVRTC {version[0]}.{version[1]} compiles for graphics processors of compute "
-            f"capability {min(known) / 10:.1f} and later, not for {capability / 10:.1f}: take an "
-            f"older release of it, {OTHERWISE}"
+            f"capability {min(known) / 10:.1f} and later, not for {capability / 10:.1f}: install "
+            f"an older release of it, {OTHERWISE}"
         )
     is_own = target == capability
     options = (f"--gpu-architecture={'sm' if is_own else 'compute'}_{target}", *OPTIONS)
@@ -129,7 +131,7 @@ def _compiled(nvrtc: Any, text: str, options: tuple[str, ...], is_own: bool) -> 
             said = _text(nvrtc.nvrtcGetProgramLogSize, nvrtc.nvrtcGetProgramLog, program)
             lines = said.rstrip(b"\0").decode(errors="replace").splitlines()
             message = "\n".join(line for line in lines if line.strip())[:2000] or error.name
-            raise CompilerError(f"NVRTC refused a generated kernel:\n{message}\n{OTHERWISE}")
+            raise CompilerError(f"NVRTC rejected a generated kernel:\n{message}\n{OTHERWISE}")
         if is_own:
             return _text(nvrtc.nvrtcGetCUBINSize, nvrtc.nvrtcGetCUBIN, program)
         return _text(nvrtc.nvrtcGetPTXSize, nvrtc.nvrtcGetPTX, program)
@@ -138,7 +140,7 @@ def _compiled(nvrtc: Any, text: str, options: tuple[str, ...], is_own: bool) -> 
 
 
 def _text(size_of: Any, fill: Any, program: Any) -> bytes:
-    """Return what a program tells of itself; the bindings fill bytes that exist."""
+    """Return a property of a program; the bindings fill existing bytes."""
     _, size = size_of(program)
     content = bytes(bytearray(size))
     fill(program, content)
@@ -234,19 +236,20 @@ class CudaDevice:
                 if int(unknown)
                 else "{:.4g} of {:.4g} MB are free: ".format(*(size / _MEGA for size in sizes))
             )
-            what = f"no room for {wanted / _MEGA:.3g} MB" if wanted else "no memory left"
+            what = f"no room for {wanted / _MEGA:.3g} MB" if wanted else "no free memory"
             raise DeviceError(
-                f"{self.label} has {what}: {left}end what else computes there, name another one "
-                f"by {VARIABLE}, {OTHERWISE}"
+                f"{self.label} has {what}: {left}end other programs on it, name another one by "
+                f"{VARIABLE}, {OTHERWISE}",
+                name=self.label,
             )
         _, said = self._driver.cuGetErrorString(status)
         text = (said or b"").decode(errors="replace") or status.name
         where = getattr(self, "label", "a graphics processor")
-        raise DeviceError(f"{where} failed: {text} ({status.name}); start anew, {OTHERWISE}")
+        raise DeviceError(f"{where} failed: {text} ({status.name}); start again, {OTHERWISE}")
 
 
 class Memory:
-    """Memory of a graphics processor that is given back together, and what works on it.
+    """Memory of a graphics processor that is freed together, with operations on it.
 
     Parameters
     ----------
@@ -322,15 +325,20 @@ def find_device() -> CudaDevice:
     if said or not count:
         why = f" ({said})" if said else ""
         raise DeviceError(
-            f"engine 'cuda' finds no graphics processor of NVIDIA's{why}: see that nvidia-smi "
-            f"lists one, {OTHERWISE}"
+            f"engine 'cuda' finds no NVIDIA graphics processor{why}: check that nvidia-smi lists "
+            f"one, {OTHERWISE}",
+            name="engine",
+            value="cuda",
         )
     wanted = os.environ.get(VARIABLE, "0")
     number = read_count(wanted)
     if number is None or number >= count:
         raise ParameterError(
-            f"{VARIABLE} = {quoted(wanted)} names no graphics processor: there "
-            f"{'is one, 0' if count == 1 else f'are {count}, 0 to {count - 1}'}"
+            f"{VARIABLE} = {quoted(wanted)} is not a graphics processor: there "
+            f"{'is one, 0' if count == 1 else f'are {count}, 0 to {count - 1}'}",
+            name=VARIABLE,
+            value=wanted,
+            valid="0" if count == 1 else f"0 to {count - 1}",
         )
     return CudaDevice(driver, number)
 
@@ -430,8 +438,8 @@ class CudaKernel:
         most = min(MOST, int(_SHARE * free) // size)
         if most < 1:
             raise DeviceError(
-                f"{self._device.label} has {free / 1e6:.3g} MB free, of which a case may take half "
-                f"and takes {size / 1e6:.3g} MB: record fewer signals, or less often"
+                f"{self._device.label} has {free / 1e6:.3g} MB free, of which a case may use half, "
+                f"but it needs {size / 1e6:.3g} MB: record fewer signals, or less often"
             )
         batches = -(-count // most)
         sized = copy.copy(self)

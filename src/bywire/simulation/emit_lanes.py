@@ -96,28 +96,28 @@ class Lanes:
         return as_number(self.graph, node, self.name, VECTOR_C)
 
     def once(self) -> list[str]:
-        """Return the statements of what depends on parameters alone."""
+        """Return the statements for values that depend on parameters alone."""
         ticks = [n for task in self.stages.ticks for n in task]
         roots = [*self.pass_roots, *self.coefficients, *ticks, *self.stages.output]
         order = needed(self.graph, roots, lambda _: False)
         return self.lines([n for n in order if self.level[n] == 0])
 
     def framed(self) -> list[str]:
-        """Return the statements of what changes with the ticks."""
+        """Return the statements for values that change with the ticks."""
         roots = [*self.pass_roots, *self.coefficients]
         order = needed(self.graph, roots, lambda n: self.level[n] == 0)
         own = frozenset(self.mode.values)
         return self.lines([n for n in order if self.level[n] == 1 and n not in own])
 
     def mode_state(self) -> list[str]:
-        """Return the declarations of what changes with the mode alone, and of the mode."""
+        """Return the declarations of values that change with the mode alone, and of the mode."""
         if not self.mode.atoms:
             return []
         values = [f"V {self.name(n)} = SET(0.0);" for n in self.mode.values]
         return [*values, *(f"B b{n} = (B){{0}};" for n in self.mode.atoms), "int fresh = 1;"]
 
     def judged(self) -> list[str]:
-        """Return the statements of what tells whether one pass serves a substep.
+        """Return the statements that decide whether one pass suffices for a substep.
 
         What hangs on the mode is renewed with it.
         """

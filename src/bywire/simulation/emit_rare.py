@@ -1,4 +1,4 @@
-"""C text of what is rare: a substep that one ordinary pass does not serve.
+"""C text of rare substeps, for which one ordinary pass does not suffice.
 
 Its functions stand alone and compute for any length of a step what does not follow from
 parameters alone. A substep in which a velocity with dry friction changes its sign is cut where

@@ -224,7 +224,7 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
 
 
 def _mode_state(mode: Modes, name: Namer) -> list[str]:
-    """Return the declarations of what changes with the mode alone, and of the mode: unknown."""
+    """Return the declarations of values that change with the mode alone, and of an unknown mode."""
     if not mode.atoms:
         return []
     return [*(f"double {name(n)} = 0.0;" for n in mode.values), "uint64_t mode = 0, fresh = 1;"]

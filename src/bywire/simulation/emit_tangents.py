@@ -146,7 +146,7 @@ static APART void exact_tangents(int lanes, const double *restrict p, double h,
 
 
 def located_statements(layout: Layout) -> list[str]:
-    """Return the statements that repeat or cut a substep and take over what comes out."""
+    """Return the statements that repeat or cut a substep and take over the result."""
     nx, nm, q, m = (layout.length["x"], layout.length["m"], layout.start["q"], layout.start["m"])
     names = [f"{kind}{k}" for kind in STATE for k in range(layout.length[kind])]
     return [

@@ -16,7 +16,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, not_valid, unknown_name
 from bywire.core.interrupts import thread_pool
 from bywire.core.parameters import ParameterSet, leaf_table
 from bywire.core.typing import Array
@@ -45,8 +45,8 @@ from bywire.simulation.run import (
 )
 from bywire.simulation.schedule import COUNTERS, Schedule
 
-# Pieces of a run, between which progress is shown and an interrupt is heeded: at most so many, and
-# not of fewer substeps, of which a piece costs a hundred.
+# Pieces of a run, between which progress and interrupts are handled: their largest number, and
+# their least number of substeps. A piece costs as much as a hundred substeps.
 _CHUNKS, _SUBSTEPS = 20, 20_000
 
 
@@ -67,23 +67,23 @@ def fit_lanes(runs: Sequence[Run], engine: str = "auto") -> bool:
 
 @dataclass(frozen=True)
 class RunGroup(Sequence[Trajectory]):
-    """What runs gave side by side: a sequence of their trajectories, kept together.
+    """Trajectories of runs side by side, kept together.
 
     Parameters
     ----------
     runs
-        What was computed.
+        The runs.
     time
         Times of the rows [s], shape (rows,).
     values
         Signals, each of all runs in one piece, shape (signals, runs, rows). Where runs have changes
-        and the stored energy is recorded, the last one is what these put in.
+        and the stored energy is recorded, the last one is the work of the changes.
     names
         Signals, in the order of the first axis.
     vectors
         State vectors at the end, shape (entries, runs).
     kernel
-        What computed them.
+        Kernel that computed them.
     ends, end_names
         Signals of which the first and the last row alone were recorded, shape (signals, runs, 2).
     """
@@ -170,21 +170,22 @@ def simulate_group(
     WorkLimitError
         When a run takes more work than it may.
     DeviceError
-        For ``cuda`` where there is no graphics processor, or no room on it.
+        For ``cuda`` without a graphics processor, or without enough memory on it.
     """
     if threads is not None and threads < 1:
-        raise ParameterError(f"threads = {threads} is not valid: it must be >= 1")
+        raise not_valid("threads", str(threads), ">= 1")
     if not fit_lanes(runs, engine):
         raise ParameterError(
-            "these runs cannot be computed side by side: that takes a C compiler, and one model, "
-            "structure, duration, step, recording interval and set of sample times"
+            "these runs cannot be computed side by side: they need a C compiler and the same "
+            "model, structure, duration, step, recording interval and sample times"
         )
     prepared = prepare(runs[0].model, runs[0].par)
     names = tuple(prepared.outputs)
     wanted = names if signals is None else tuple(signals)
     if ends and (engine == CUDA or any(run.changes for run in runs)):
         raise ParameterError(
-            "runs with changes or on a graphics processor record all rows: leave ends out"
+            "runs with changes or on a graphics processor record all rows: leave ends out",
+            name="ends",
         )
     selection = tuple(selected(names, (*wanted, *ends)).tolist())
     schedule = runs[0].schedule()
@@ -267,7 +268,7 @@ def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
 class _Carried:
     """Runs that are carried on side by side.
 
-    ``jumping``: the energies among the signals that changes make jump, by book; see `energies`.
+    ``jumping``: energies among the signals that jump at changes, by balance; see `energies`.
     """
 
     def __init__(
@@ -314,7 +315,7 @@ class _Carried:
         return self._vector
 
     def _change(self, begin: int, rows: Array) -> None:
-        """Take the parameters that hold from a frame on, and note what energy that puts in."""
+        """Set the parameters from a frame on, and record the work of the change."""
         here = self._changes.get(begin, ())
         if not here:
             return
@@ -325,7 +326,7 @@ class _Carried:
             rows[-self._books :] += (self._energies(rows) - before)[:, : self._count, None]
 
     def _energies(self, rows: Array) -> Array:
-        """Return the sum of each book's energies of every lane now [J], shape (books, lanes)."""
+        """Return the total energy of each balance in every lane [J], shape (balances, lanes)."""
         end, kept = self._schedule.frames, self._vector
         row = np.empty((self._kernel.lanes, 1, rows.shape[0] - self._books))
         self._vector = kept.copy()
@@ -367,7 +368,11 @@ def case_matrix(run: Run, variations: Variations) -> Array:
             raise unknown_name("parameter", name, names)
     lengths = {name: array.size for name, array in arrays.items()}
     if not arrays or len(set(lengths.values())) != 1 or 0 in lengths.values():
-        raise ParameterError(f"variations must have one length >= 1 each, got {lengths}")
+        raise ParameterError(
+            f"variations must all have the same length >= 1, got {lengths}",
+            name="variations",
+            value=str(lengths),
+        )
     count = next(iter(lengths.values()))
     matrix = np.repeat(np.array(list(run.par.leaves().values()))[:, None], count, axis=1)
     for name, array in arrays.items():
@@ -386,7 +391,9 @@ def _check_extremes(run: Run, name: str, array: Array) -> None:
     for value in values:
         changed = run.par.replace({name: value})
         if [task.period for task in run.model.tasks(changed)] != periods:
-            raise ParameterError(f"{name} is a sample time and cannot vary within an ensemble")
+            raise ParameterError(
+                f"{name} is a sample time, which cannot vary within an ensemble", name=name
+            )
 
 
 def _check_group(par: ParameterSet, group: str, arrays: Mapping[str, Array], count: int) -> None:
@@ -401,7 +408,7 @@ def _check_group(par: ParameterSet, group: str, arrays: Mapping[str, Array], cou
         try:
             node.replace({name: float(values[k]) for name, values in varied.items()})
         except ParameterError as error:
-            raise ParameterError(f"case {k}: {error}") from None
+            raise error.reworded(f"case {k}: {error}") from None
 
 
 def _has_rules(cls: type[ParameterSet]) -> bool:
@@ -417,7 +424,7 @@ def _has_rules(cls: type[ParameterSet]) -> bool:
 
 @dataclass(frozen=True)
 class Ensemble:
-    """What an ensemble gave.
+    """Results of an ensemble.
 
     Parameters
     ----------
@@ -482,11 +489,11 @@ def simulate_ensemble(
     CompilerError
         For ``compiled`` without a compiler.
     DeviceError
-        For ``cuda`` where there is no graphics processor, or no room on it.
+        For ``cuda`` without a graphics processor, or without enough memory on it.
     """
     prepared = prepare(run.model, run.par)
     if threads is not None and threads < 1:
-        raise ParameterError(f"threads = {threads} is not valid: it must be >= 1")
+        raise not_valid("threads", str(threads), ">= 1")
     matrix = case_matrix(run, variations)
     if not is_side_by_side(engine):
         return _one_by_one(run, variations, tuple(signals), engine)

@@ -29,7 +29,7 @@ _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.S)
 
 @dataclass(frozen=True)
 class Request:
-    """What a kernel works on, as contiguous arrays.
+    """Inputs of a kernel, as contiguous arrays.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Ends:
-    """Where the signals recorded at both ends of the rows alone go.
+    """Destination of the signals that are recorded in the first and last rows alone.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def run_in_calls(
     call: Callable[[int, int, int], int],
     most: int = CHUNK,
 ) -> None:
-    """Run frames begin..end in calls of a kernel between which an interrupt is heeded.
+    """Run frames begin..end in calls of a kernel, with a check for interrupts between them.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
 
 
 def text_digest(text: str) -> str:
-    """Digest of a kernel's C: what it computes, without comments."""
+    """Digest of a kernel's C without comments."""
     return hashlib.sha256(_COMMENT.sub("", text).encode()).hexdigest()
 
 

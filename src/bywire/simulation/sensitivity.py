@@ -174,7 +174,7 @@ def simulate_with_sensitivities(
         When there is no compiler.
     """
     if not parameters:
-        raise ParameterError("sensitivities need at least one parameter: name it")
+        raise ParameterError("sensitivities need at least one parameter", name="parameters")
     require_unchanged(run.changes, "sensitivities")
     prepared = prepare(run.model, run.par)
     directions = _directions(run, parameters, prepared.program.parameter_names)
@@ -233,13 +233,16 @@ def simulate_with_sensitivities(
 def _require_shape(name: str, given: Array | None, wanted: tuple[int, int]) -> None:
     if given is not None and np.shape(given) != wanted:
         raise ParameterError(
-            f"{name} has the shape {np.shape(given)}, wanted is {wanted}: rows, parameters"
+            f"{name} has the shape {np.shape(given)}: it must be {wanted}, rows and parameters",
+            name=name,
+            value=str(np.shape(given)),
+            valid=str(wanted),
         )
 
 
 @dataclass(frozen=True)
 class _Directions:
-    """What moves along each direction.
+    """Changes of initial values, parameters and stimuli along each direction.
 
     Parameters
     ----------

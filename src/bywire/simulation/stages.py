@@ -138,7 +138,7 @@ class _Balance:
 
 
 def balanced(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
-    """Return nodes of the same values, in an order of operations that waits less."""
+    """Return nodes with the same values, in an order of operations with less waiting."""
     balance = _Balance(graph, roots, level)
     return [balance.node(root) for root in roots]
 
@@ -148,7 +148,7 @@ def balanced(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
 # When a leaf changes: 0 once a run, 1 once a frame (a tick may change it), 2 every substep.
 LEVEL = {"p": 0, "h": 0, "sp": 0, "su": 0, "m": 1, "sm": 1}
 SEEDS = frozenset({"sp", "su", "sm", "sx", "sd", "sr", "sq", "sh"})
-STATE = ("x", "d", "r", "q")  # what a substep renews, in the order of the state vector
+STATE = ("x", "d", "r", "q")  # renewed in every substep, in the order of the state vector
 
 
 @dataclass(frozen=True)
@@ -451,10 +451,10 @@ def branching_statements(
     dialect: Dialect = PLAIN_C,
     later: Iterable[Node] = (),
 ) -> list[str]:
-    """Return declarations in which costly functions stand inside the only branch that needs them.
+    """Return declarations with costly functions inside the only branch that needs them.
 
-    Where the condition fails, the processor skips the function. ``later``: nodes that read what is
-    declared here, too.
+    If the condition fails, the processor skips the function. ``later``: further nodes that read
+    these declarations.
     """
     uses = Counter(a for node in (*order, *later) for a in graph.arguments(node))
     inside = {

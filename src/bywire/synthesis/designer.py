@@ -33,19 +33,19 @@ Report = Callable[[float], None]
 
 
 def stage(progress: Progress | None, label: str) -> Report:
-    """Return what reports the share of one stage; nothing is shown where nobody watches."""
+    """Return a function that reports the finished share of one stage, if progress is shown."""
     if progress is None:
         return lambda share: None
     return lambda share: progress(label, min(max(share, 0.0), 1.0))
 
 
 def piece(report: Report, k: int, count: int) -> Report:
-    """Return what reports the share of one of several pieces of a stage."""
+    """Return a function that reports the finished share of one of several pieces of a stage."""
     return lambda share: report((k + share) / count)
 
 
 def suffixed(progress: Progress | None, text: str) -> Progress | None:
-    """Return progress whose labels say besides what they are of."""
+    """Return progress with a suffix in its labels."""
     if progress is None:
         return None
     return lambda label, share: progress(f"{label}, {text}", share)
@@ -66,7 +66,7 @@ _SIMPLEX = 25  # evaluations per gain
 
 @dataclass(frozen=True)
 class Problem:
-    """What is chosen, for what, and what it must serve.
+    """Design problem: parameters to choose, requirements, and models.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Problem:
         Dotted name -> lowest and highest value [SI]; searched on a logarithmic scale where the
         lowest is above zero.
     requirements
-        What must hold for every case.
+        Constraints for every case.
     cases
         The models, the nominal one first.
     """
@@ -216,7 +216,7 @@ class Search:
         return self.problem.slacks(np.clip(z, 0.0, 1.0), self.cases, plain=self.plain)
 
     def _judged(self, z: Array) -> float:
-        """Return the worst wanted slack, or what is missing of the kept ones; note the best."""
+        """Return the worst slack of the objectives, or the violation of a constraint."""
         slacks = self._slacks(z)
         value = float(slacks[:, self._chosen()].min())
         if self.kept:
@@ -272,7 +272,7 @@ class Search:
 
 
 def starts_of(problem: Problem, given: Sequence[Array], seed: int) -> list[Array]:
-    """Return where to start: the given points, and the best of a seeded sample of the cube."""
+    """Return start points: the given ones, and the best of a seeded sample of the cube."""
     n = len(problem.tunables)
     sample = qmc.Sobol(n, rng=np.random.default_rng(seed)).random(_SAMPLES)
     worst = [float(problem.slacks(z, [0]).min()) for z in sample]
@@ -300,7 +300,7 @@ _TRACKS = 50.0  # error above which an output does not follow the set point by d
 
 
 def linear_floors(requirements: Sequence[Limit], error: float) -> tuple[Limit, ...]:
-    """Return what every model keeps: a disk margin, and an error in the end.
+    """Return constraints for every model: a disk margin, and a residual error.
 
     Parameters
     ----------
@@ -327,7 +327,7 @@ def bench_floors(
     floors: Sequence[Limit],
     trials: Iterable[BenchFigures],
 ) -> tuple[Limit, ...]:
-    """Return what retuned gains keep of the linear design's: floors, and how its step settled.
+    """Return constraints for retuned gains from the linear design: floors, and its settled step.
 
     Parameters
     ----------
@@ -417,7 +417,9 @@ def design(
         When nothing can be tuned, or a bandwidth is beyond half the sampling frequency.
     """
     if not tunables:
-        raise ParameterError("nothing is left to tune: set fewer of the loop's parameters")
+        raise ParameterError(
+            "there is nothing to tune: set fewer of the loop's parameters", name="overrides"
+        )
     floors = linear_floors(requirements, largest_error(cases, start))
     problem = Problem(tunables, (*requirements, *floors), tuple(cases))
     _require_sampled(problem, start)
@@ -454,8 +456,11 @@ def _require_sampled(problem: Problem, start: Mapping[str, float]) -> None:
     for wanted in problem.requirements:
         if wanted.unit == "Hz" and not wanted.is_upper and wanted.bound >= 0.5 / period:
             raise ParameterError(
-                f"requirement {str(wanted)!r}: the loop is sampled every {period * 1e3:g} ms; ask "
-                f"for less than {0.5 / period:g} Hz"
+                f"requirement {str(wanted)!r}: the loop is sampled every {period * 1e3:g} ms; "
+                f"require less than {0.5 / period:g} Hz",
+                name=wanted.figure,
+                value=wanted.text,
+                valid=f"< {0.5 / period:g} Hz",
             )
 
 
@@ -534,7 +539,7 @@ def _looked_anew(
     gain: float,
     limits: tuple[int, float],
 ) -> Array | None:
-    """Return the point seen that a finer judgment prefers, the coarsely best looked at first.
+    """Return the visited point that a finer evaluation prefers, checking the coarsely best first.
 
     Ends where the coarse slack is not above ``least`` or promises no ``gain`` any more. Of points
     nearer to each other than the second of the limits, one is looked at, and the first of them is
@@ -556,7 +561,7 @@ def _looked_anew(
 
 
 def _conflicts(search: Search, progress: Progress | None) -> tuple[Conflict, ...]:
-    """Return what every binding requirement allows of each other one."""
+    """Return the best value of each requirement that every binding one allows."""
     problem = search.problem
     if search.best is None:
         return ()
@@ -621,5 +626,5 @@ def _judged(
 
 
 def _size(value: float) -> float:
-    """Return a figure by which models are ordered: nothing is worse than one without it."""
+    """Return a figure by which models are ordered; a model without it is the worst."""
     return -np.inf if np.isnan(value) else value

@@ -19,7 +19,14 @@ from bywire.analysis.loop_figures import LOOP_FIGURES, LoopFigure, LoopFigures
 from bywire.analysis.margins import NO_LOOP
 from bywire.bench.requirements import Limit, parted
 from bywire.core import units
-from bywire.core.errors import InputError, ParameterError, UnitError, quoted, unknown_name
+from bywire.core.errors import (
+    InputError,
+    ParameterError,
+    UnitError,
+    not_valid,
+    quoted,
+    unknown_name,
+)
 from bywire.core.interrupts import interrupts_deferred
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.units import shown
@@ -34,7 +41,7 @@ _BY_WORD: Mapping[str, LoopFigure] = {
     **{figure.margin: figure for figure in LOOP_FIGURES.values() if figure.margin},
     **LOOP_FIGURES,
 }
-"""figures by what requirements may call them: their names, and those of `bywire margins --json`"""
+"""figures by their names in requirements: their own, and those of `bywire margins --json`"""
 
 
 def share_left(limit: Limit, value: float) -> float:
@@ -64,7 +71,9 @@ def read(texts: Sequence[str]) -> tuple[Limit, ...]:
         When a limit's unit measures something else.
     """
     if not texts:
-        raise ParameterError("no requirement is given: write for instance 'bandwidth >= 10 Hz'")
+        raise ParameterError(
+            "a design needs a requirement, for instance 'bandwidth >= 10 Hz'", name="requirement"
+        )
     requirements = tuple(_read(text) for text in texts)
     for first, second in combinations(requirements, 2):
         _require_compatible(first, second)
@@ -75,7 +84,10 @@ def _read(text: str) -> Limit:
     word, compare, written = parted(text) if isinstance(text, str) else ("", None, "")
     if not word or compare is None or not written:
         raise ParameterError(
-            f"requirement {quoted(text)} cannot be read: write for instance 'bandwidth >= 10 Hz'"
+            f"requirement {quoted(text)} cannot be read: write for instance 'bandwidth >= 10 Hz'",
+            name="requirement",
+            value=text,
+            valid="'bandwidth >= 10 Hz'",
         )
     word = re.sub(r"[ -]+", "_", word)
     if word not in _BY_WORD:
@@ -89,7 +101,10 @@ def _read(text: str) -> Limit:
         reach = f"above {low:g}" if high == math.inf else f"{low:g} to {high:g}"
         raise ParameterError(
             f"requirement {quoted(text)}: every loop has a {figure.name} of {reach} {figure.unit}; "
-            "ask for something in between"
+            "require a value in between",
+            name=figure.name,
+            value=text,
+            valid=f"{reach} {figure.unit}",
         )
     return Limit(figure.name, compare, bound, figure.unit, f"{compare} {written}")
 
@@ -100,11 +115,18 @@ def _bound(text: str, figure: LoopFigure) -> float:
         return float(10.0 ** (units.parse(text.removesuffix("dB").strip(), "1", name) / 20.0))
     if figure.unit == "%":
         if not text.endswith("%") and not re.fullmatch(r"0+\.?0*", text):
-            raise UnitError(f"{name} = {quoted(text)} is no limit in percent: write '<= 15 %'")
+            raise not_valid(
+                name, quoted(text), "a limit in percent such as '<= 15 %'", kind=UnitError
+            )
         return 100.0 * units.parse(text, "1", name)
     if figure.unit == "deg":
         if re.fullmatch(r"[-+\d.eE]+", text):
-            raise UnitError(f"{name} = {quoted(text)} has no unit: write '{text} deg'")
+            raise UnitError(
+                f"{name} = {quoted(text)} has no unit: write '{text} deg'",
+                name=name,
+                value=text,
+                valid=f"{text} deg",
+            )
         return math.degrees(units.parse(text.replace("°", "deg"), "rad", name))
     return units.parse(text, figure.unit, name)
 
@@ -115,13 +137,15 @@ def _require_compatible(first: Limit, second: Limit) -> None:
     if first.is_upper == second.is_upper:
         raise ParameterError(
             f"{first.figure} is required twice, {str(first)!r} and {str(second)!r}: "
-            "leave one of them"
+            "leave one of them out",
+            name=first.figure,
         )
     low, high = (second, first) if first.is_upper else (first, second)
     if low.bound > high.bound:
         raise ParameterError(
             f"{str(low)!r} and {str(high)!r} contradict each other: no loop meets both; "
-            "change one of the limits"
+            "change one of the limits",
+            name=low.figure,
         )
 
 
@@ -139,7 +163,7 @@ class LinearCase:
     Parameters
     ----------
     label
-        What distinguishes it, for instance ``"motor.R_m = 0.2"``.
+        Label of the case, for instance ``"motor.R_m = 0.2"``.
     build
         ``build(gains) -> (loop gain, closed loop)`` for gains by dotted name, both sampled alike.
     changes, at
@@ -178,7 +202,7 @@ def room(figures: LoopFigures, requirement: Limit) -> float:
 
 
 def slack(figures: LoopFigures, requirement: Limit) -> float:
-    """Return how far a requirement is met, as a share of its limit: what a search climbs.
+    """Return the slack of a requirement, as a share of its limit: the objective of the search.
 
     For a bandwidth it is the room of the closed loop's magnitude above -3 dB up to the limit:
     the frequency itself jumps where a dip touches that level.
@@ -208,7 +232,7 @@ def cases_of(
     Raises
     ------
     UnknownNameError
-        When there is no such number.
+        When the parameter is unknown.
     ParameterError
         When a tunable is among them, there are too many combinations, or one does not exist.
     """
@@ -218,7 +242,11 @@ def cases_of(
     combinations = list(product(*over.values())) if over else []
     if len(combinations) > _MOST:
         raise ParameterError(
-            f"the ranges have {len(combinations)} combinations: {_MOST} at most, take fewer values"
+            f"the ranges have {len(combinations)} combinations, more than {_MOST}: take fewer "
+            "values",
+            name="over",
+            value=str(len(combinations)),
+            valid=f"<= {_MOST}",
         )
     cases = [case_of(loop, NOMINAL, par, {}, value)]
     for combination in combinations:
@@ -230,9 +258,9 @@ def cases_of(
 
 
 def require_given(loop: Loop, name: str) -> None:
-    """Refuse what the design chooses, of what varies."""
+    """Reject a varied parameter that the design chooses."""
     if name in loop.tunables or _scheduled(loop, name):
-        raise ParameterError(f"{name} is what the design chooses: it cannot also vary")
+        raise ParameterError(f"the design chooses {name}, which cannot also vary", name=name)
 
 
 def _shown(loop: Loop, par: ParameterSet, name: str, value: float) -> str:
@@ -261,7 +289,7 @@ def existing_case(
     try:
         loop.point(par.replace(changes), at)
     except InputError as error:
-        raise ParameterError(f"{label}: {error}") from None
+        raise error.reworded(f"{label}: {error}") from None
     return case_of(loop, label, par, changes, at)
 
 

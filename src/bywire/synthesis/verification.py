@@ -53,7 +53,7 @@ MEASURED = frozenset({"bandwidth", "crossover", *STEP_FIGURES})
 
 @dataclass(frozen=True)
 class Candidate:
-    """A set of gains with what it showed.
+    """Set of gains with its results.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class Candidate:
         return self.rooms.get(text, self.slacks[text])
 
     def standing(self, enough: float) -> tuple[float, float]:
-        """Return what to prefer gains by, the larger the better.
+        """Return the objective of gains, the larger the better.
 
         Where a requirement is missed, how far the figures are off; else the worst slack, and
         from a slack that is enough on the worst bandwidth.
@@ -112,7 +112,7 @@ def bench_slacks(
     Parameters
     ----------
     requirements
-        What is required.
+        Requirements.
     figures
         Figures on the bench.
     linear
@@ -133,7 +133,7 @@ def ceiling(
     known: Sequence[BenchFigures],
     linear: Mapping[str, float],
 ) -> float:
-    """Return what the worst slack cannot exceed, whatever is still to be measured.
+    """Return an upper bound of the worst slack, whatever the missing measurements.
 
     Parameters
     ----------
@@ -713,7 +713,9 @@ def verify(
         When no amplitude is given.
     """
     if not trial.amplitudes:
-        raise ParameterError(f"loop {trial.loop.name!r}: no amplitude is given to try it with")
+        raise ParameterError(
+            f"loop {trial.loop.name!r} needs an amplitude for the bench", name="amplitude"
+        )
     problem = Problem(tunables, tuple(requirements), tuple(cases))
     floors = tuple(kept or ())
     target = _target(requirements, cases[0], gains)

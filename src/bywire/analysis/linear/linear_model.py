@@ -27,7 +27,7 @@ class LinearModel:
     Parameters
     ----------
     name
-        What figures and messages call it.
+        Name in figures and messages.
     A, B, C, D
         Matrices, shapes (n, n), (n, nu), (ny, n), (ny, nu).
     states, inputs, outputs
@@ -176,7 +176,7 @@ class LinearModel:
         UnknownNameError
             When a state is unknown.
         ParameterError
-            When a dropped state acts on what is kept.
+            When a dropped state acts on a kept one.
         """
         kept = _places("state", states, self.states)
         dropped = [k for k in range(len(self.states)) if k not in kept]
@@ -187,8 +187,10 @@ class LinearModel:
         if coupled and not held:
             names = ", ".join(self.states[k] for k in dropped)
             raise ParameterError(
-                f"{self.name}: the dropped states ({names}) act on what is kept: keep them, or "
-                "hold them with held=True"
+                f"{self.name}: the dropped states ({names}) act on the kept states: keep them, or "
+                "hold them with held=True",
+                name="states",
+                value=names,
             )
         return replace(
             self,
@@ -206,7 +208,7 @@ class LinearModel:
         Parameters
         ----------
         inputs, outputs
-            Names; all where none is given.
+            Names; all by default.
 
         Raises
         ------
@@ -265,8 +267,10 @@ class LinearModel:
             step = expm(whole * period)
         if not np.isfinite(step).all():
             raise ParameterError(
-                f"a model that is sampled every {period:g} s has no finite numbers: take a shorter "
-                "sample time"
+                f"a model with the sample time {period:g} s has no finite numbers: take a shorter "
+                "sample time",
+                name="period",
+                value=f"{period:g} s",
             )
         B = np.zeros_like(self.B)
         B[:, acting] = step[:n, n:]
@@ -315,9 +319,9 @@ def _places(kind: str, names: Sequence[str], known: tuple[str, ...]) -> list[int
 # --- Poles of sampled models as rates of continuous motions
 
 DEAD = 1e-9
-"""poles of less than this size are dead beats: their motion is over within a sample"""
+"""poles below this magnitude are deadbeat: their motion ends within a sample"""
 STILL = 1e-6
-"""rates of less than this size [1/s] are those of what does not move: integrators at rest"""
+"""rates below this magnitude [1/s] count as zero: integrators at rest"""
 
 
 def rates(model: LinearModel) -> Complex:
@@ -484,7 +488,7 @@ def _reached(system: Realization) -> Realization:
 
 
 def _complement(row: Array) -> Array:
-    """Return an orthonormal basis of what is perpendicular to a unit vector, by a reflection."""
+    """Return an orthonormal basis of the complement of a unit vector, by a reflection."""
     v = row.copy()
     v[0] += np.copysign(1.0, row[0])
     reflection = np.eye(len(row)) - 2.0 * np.outer(v, v) / float(v @ v)
@@ -507,7 +511,7 @@ class Transfer:
     Parameters
     ----------
     name
-        What figures and messages call it.
+        Name in figures and messages.
     input, output
         Names of the signals.
     input_unit, output_unit
@@ -581,8 +585,11 @@ class Transfer:
         error = float(np.max(np.abs(rounded[seen] / exact[seen] - 1.0), initial=0.0))
         if not error <= tolerance:
             raise ParameterError(
-                f"{self.name}: polynomials of degree {len(self.poles)} in z would be {error:.1g} "
-                f"off, {tolerance:g} is admissible: use zeros, poles and factor, or state_space()"
+                f"{self.name}: polynomials of degree {len(self.poles)} in z would have an error of "
+                f"{error:.1g}, above {tolerance:g}: use zeros, poles and factor, or state_space()",
+                name="tolerance",
+                value=f"{error:.1g}",
+                valid=f"<= {tolerance:g}",
             )
         return system
 
@@ -622,7 +629,7 @@ class Transfer:
         path
             From the input to the output, continuous or sampled.
         name
-            What figures and messages call it.
+            Name in figures and messages.
         input, output
             Name and SI unit of each.
         period

@@ -25,7 +25,7 @@ from bywire.analysis.response.sweep import (
     sine_window,
     spread_of,
 )
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, not_valid
 from bywire.core.interrupts import thread_pool
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array, Complex, Progress
@@ -39,7 +39,7 @@ STILL = 1e-12
 
 
 def require_stable(closed: LinearModel) -> None:
-    """Refuse a loop whose response would grow without end.
+    """Reject an unstable loop.
 
     Raises
     ------
@@ -52,7 +52,8 @@ def require_stable(closed: LinearModel) -> None:
     rates = ", ".join(f"{math.log(abs(z)) / closed.period:.3g}" for z in outside)
     raise ParameterError(
         f"{closed.name}: the closed loop is unstable and has no frequency response; its poles "
-        f"outside the unit circle grow with {rates} 1/s"
+        f"outside the unit circle grow with {rates} 1/s",
+        name=closed.name,
     )
 
 
@@ -161,7 +162,7 @@ def _measured(repeated: Repeated, sizes: Array, periods: int, least: float) -> d
     """Return the figures of all cases at one frequency, shape (cases,) each."""
     outputs = repeated.values[:, :, 0]
     count = max(min(HARMONICS, outputs.shape[1] // (2 * periods)), 1)
-    # The window holds whole periods: harmonics are lines of its Fourier transform.
+    # The window contains whole periods: harmonics are lines of its Fourier transform.
     spectrum = np.fft.rfft(outputs, axis=1)[:, periods : count * periods + 1 : periods]
     lines = 2.0 / outputs.shape[1] * spectrum
     moves = np.ptp(outputs, axis=1) > least
@@ -179,7 +180,7 @@ def _measured(repeated: Repeated, sizes: Array, periods: int, least: float) -> d
     }
 
 
-# --- What the step does to a measured response: the same response in half steps beside it
+# --- Numerical error of a measured response, from the same response with half the step
 
 FIGURES = (
     "gain",
@@ -190,7 +191,7 @@ FIGURES = (
     "gain_margin",
     "lower_gain_margin",
 )
-"""what gets an error; phases and margins in degree"""
+"""figures with an error; phases and margins in degree"""
 
 
 def with_step_errors(response: xr.Dataset, finer: xr.Dataset, share: float) -> xr.Dataset:
@@ -253,12 +254,12 @@ def largest(response: xr.Dataset) -> str:
 # --- All frequencies at once
 
 MOST = 12
-"""windows after which a response is given up; they are long here"""
+"""number of windows after which a response is abandoned; windows are long here"""
 
 
 @dataclass(frozen=True)
 class Broadband:
-    """A periodic excitation that holds many frequencies.
+    """Periodic excitation with many frequencies.
 
     Parameters
     ----------
@@ -332,9 +333,7 @@ def broadband_response(
     """
     require_measurable(run, sweep)
     if excitation.count < 1:
-        raise ParameterError(
-            f"realizations = {excitation.realizations}: average at least 1 multisine"
-        )
+        raise not_valid("realizations", str(excitation.realizations), ">= 1")
     if progress is not None:
         progress("frequency response", 0.0)
     length, lines = line_window(run, sweep)
@@ -447,7 +446,7 @@ def _measured_lines(
 
 
 def _distortion(repeated: Repeated, lines: list[int], shape: tuple[int, int, int]) -> Array:
-    """Return what is near each line but not excited, over what is at it, from the last window."""
+    """Return the ratio of unexcited lines nearby to each excited line, from the last window."""
     power = np.abs(np.fft.rfft(repeated.values[:, :, 0], axis=1)[:, : lines[-1] + 1]) ** 2
     power = power.reshape(*shape, -1).mean(axis=2)
     at = power[:, :, lines]
@@ -461,7 +460,7 @@ def _distortion(repeated: Repeated, lines: list[int], shape: tuple[int, int, int
 def _of_runs(
     repeated: Repeated, shares: Mapping[str, Array], shape: tuple[int, int, int], lines: int
 ) -> dict[str, Array]:
-    """Return what concerns whole runs: the worst of their realizations, means of the shares."""
+    """Return results of whole runs: the worst of their realizations, and means of shares."""
     known = {
         "windows": repeated.windows.reshape(shape).max(axis=2),
         "settled": repeated.repeats.reshape(shape).min(axis=2),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bywire.bench.experiment import Experiment
 from bywire.bench.generic_experiment import GenericExperiment, TestedModel
 from bywire.bench.kpis import extremes
-from bywire.bench.stimulus import wanted
+from bywire.bench.stimulus import required_stimulus
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant
 
@@ -28,7 +28,7 @@ class Options(ParameterSet):
 def build(subject: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by the extremes of the output."""
     return subject.experiment(
-        lambda options, stimuli: wanted(stimuli.get(""), "open-loop").sample,
+        lambda options, stimuli: required_stimulus(stimuli.get(""), "open-loop").sample,
         {"extremes": lambda options: extremes.Setting(subject.output)},
         driven_unit=lambda _: subject.units["input"],
     )

@@ -7,7 +7,7 @@ from typing import Any
 from bywire.bench.experiment import Experiment
 from bywire.bench.generic_experiment import GenericExperiment, TestedModel
 from bywire.bench.kpis import tracking
-from bywire.bench.stimulus import wanted
+from bywire.bench.stimulus import required_stimulus
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant
@@ -48,7 +48,7 @@ def build(subject: TestedModel) -> Experiment:
         return tracking.Setting(subject.output, subject.input, options.smoothing)
 
     return subject.experiment(
-        lambda options, stimuli: wanted(stimuli.get(""), "tracking").sample,
+        lambda options, stimuli: required_stimulus(stimuli.get(""), "tracking").sample,
         {"tracking": followed},
         "tracking",
         followed=followed,

@@ -1,4 +1,4 @@
-"""Between which values a signal stays."""
+"""Largest and smallest value of a signal."""
 
 from __future__ import annotations
 

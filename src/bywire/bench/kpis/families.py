@@ -22,7 +22,7 @@ from bywire.core.registry import Kind
 
 @dataclass(frozen=True)
 class Family:
-    """Key figures that are computed from the same data.
+    """Family of key figures, computed from the same data.
 
     Parameters
     ----------
@@ -31,15 +31,14 @@ class Family:
     summary
         One line for listings.
     setting_class
-        What the family needs to know beside the recording.
+        Class of the family's inputs in addition to the recording.
     measures
         Its figures by name, in the order of the file; each has ``name``, ``unit`` and
         ``definition``.
     select
-        ``select(recording, setting)``: the data that its functions take; None where they loop over
-        samples.
+        ``select(recording, setting)``: data for its functions; None if they loop over samples.
     loops
-        How those are run; None where there is ``select``.
+        Functions that loop over samples; None with ``select``.
     """
 
     name: str
@@ -51,7 +50,7 @@ class Family:
 
 
 def _declared(module: ModuleType) -> Iterator[Family]:
-    """Yield the family that a module is: every module that declares figures."""
+    """Yield the family of a module that declares figures."""
     figures = {m.name: m for m in vars(module).values() if isinstance(m, Measure)}
     if figures:
         summary = (module.__doc__ or "").strip().splitlines()[0]
@@ -59,8 +58,9 @@ def _declared(module: ModuleType) -> Iterator[Family]:
         select = getattr(module, "select", None)
         if not hasattr(module, "Setting"):
             raise ModelError(
-                f"{module.__file__}: key figures need a data class Setting beside them, with the "
-                "names of their signals"
+                f"{module.__file__}: key figures need a data class Setting in their file, with the "
+                "names of their signals",
+                name="Setting",
             )
         loops = None if select else LoopFamily(module)
         if loops is not None and not module.__name__.startswith("bywire.bench."):
@@ -74,7 +74,7 @@ FAMILIES = Kind("family of key figures", ("kpis",), _declared, "bywire.bench.kpi
 
 
 def definitions() -> Mapping[str, Measure]:
-    """Return every key figure by name, for listings; names are unique over the families."""
+    """Return every key figure by name, for listings; names are unique across families."""
     known: dict[str, Measure] = {}
     for each in FAMILIES.all().values():
         twice = known.keys() & each.measures.keys()
@@ -100,7 +100,7 @@ def units_of(*names: str, resolved: Mapping[str, str] = MappingProxyType({})) ->
 
 
 def recorded(name: str, setting: Any, signals: Collection[str]) -> dict[str, str]:
-    """Return the unit of every figure of a family that such a recording can show, by its name.
+    """Return the unit of every figure of a family whose signals are recorded, by name.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def evaluate(name: str, recording: xr.Dataset, setting: Any) -> dict[str, Kpi]:
     Raises
     ------
     UnknownNameError
-        When the family, or a signal that the setting asks for by name, is unknown.
+        When the family, or a signal that the setting names, is unknown.
     ParameterError
         When a signal has more dimensions than time.
     """
@@ -146,7 +146,7 @@ def evaluate(name: str, recording: xr.Dataset, setting: Any) -> dict[str, Kpi]:
 
 
 def _by_loops(family: LoopFamily, recording: xr.Dataset, setting: Any) -> dict[str, Kpi]:
-    """Return the figures of one run; of a long one by C, where there is a compiler."""
+    """Return the figures of one run; for a long run by C, if there is a compiler."""
     t, _ = signal(recording, "time")
     signals, level = family.signals_of(recording, setting)
     if family.is_worth_c(t.size):
@@ -172,23 +172,23 @@ def _by_loops(family: LoopFamily, recording: xr.Dataset, setting: Any) -> dict[s
 
 @dataclass(frozen=True)
 class FamilyJudge:
-    """The judge of an experiment of one run whose key figures come from families.
+    """Judge of an experiment with one run whose key figures come from families.
 
-    Of many cases it judges all at once, of no more signals than it needs.
+    It judges many cases at once, from the needed signals alone.
 
     Parameters
     ----------
     settings
         ``settings(options)``: the ``Setting`` of each family by its name.
     left_out
-        Figures of these families that are not given.
+        Figures of these families to leave out.
     levels
-        ``levels(run, options)``: what of the settings depends on the parameters of a run, by the
-        family's name and the setting's field; None where nothing does.
+        ``levels(run, options)``: values of settings that depend on the parameters of a run, by the
+        family's name and the setting's field; None if there are none.
     further
-        ``further(run, options)``: figures of the experiment's own, which come first.
+        ``further(run, options)``: further figures of the experiment, which come first.
     further_signals
-        Names of all signals that these look at.
+        Names of all signals that these figures read.
     """
 
     settings: Callable[[Any], Mapping[str, Any]]
@@ -210,8 +210,8 @@ class FamilyJudge:
     ) -> tuple[KpiOfCases, ...]:
         """Return the key figures of many cases.
 
-        ``rows``: signals of shape (cases, time); ``options``, ``pars``: of each case, of one
-        structure; parameters are needed where levels or further figures depend on them.
+        ``rows``: signals of shape (cases, time); ``options``, ``pars``: options and parameters of
+        each case, of one structure; parameters are needed for levels and further figures.
         """
         distinct = {id(chosen): chosen for chosen in options}  # mostly one
         known = {number: self.settings(chosen) for number, chosen in distinct.items()}
@@ -227,7 +227,7 @@ class FamilyJudge:
         return (*own, *wanted)
 
     def signals(self, options: Sequence[Any]) -> set[str]:
-        """Return the names of all signals that it may look at, of cases with these options."""
+        """Return the names of all signals that it may read, for cases with these options."""
         distinct = {id(chosen): chosen for chosen in options}.values()
         each = {setting for chosen in distinct for setting in self.settings(chosen).values()}
         named = {name for setting in each for name in signals_of_setting(setting)}
@@ -236,7 +236,7 @@ class FamilyJudge:
     def _of_run(
         self, settings: Mapping[str, Any], run: xr.Dataset, options: Any
     ) -> Mapping[str, Any]:
-        """Return the settings with what depends on the parameters of a run."""
+        """Return the settings with the values that depend on the parameters of a run."""
         if self.levels is None:
             return settings
         levels = self.levels(run, options)
@@ -247,15 +247,15 @@ class FamilyJudge:
 
 
 def signals_of_setting(setting: Any) -> set[str]:
-    """Return the names of signals in a family's ``Setting``; texts that name none among them."""
+    """Return all texts in a family's ``Setting``: names of signals, and possibly others."""
     return {value for value in vars(setting).values() if isinstance(value, str) and value}
 
 
 def evaluate_cases(name: str, rows: Rows, settings: Sequence[Any]) -> dict[str, KpiOfCases]:
     """Return all figures of a family by name, of many cases at once.
 
-    By the C of a family that loops over samples; of others, and without a compiler, each for
-    itself.
+    A family that loops over samples is computed in C. Other families, and all without a compiler,
+    are computed case by case.
 
     Parameters
     ----------
@@ -284,17 +284,17 @@ def evaluate_cases(name: str, rows: Rows, settings: Sequence[Any]) -> dict[str, 
 
 
 def of_cases(each: Sequence[Iterable[Kpi]]) -> Iterator[KpiOfCases]:
-    """Yield the key figures of cases, each of which gave the same ones, by figure."""
+    """Yield each key figure for all cases; every case has the same figures."""
     for kpis in zip(*each, strict=True):
         values, notes = np.array([kpi.value for kpi in kpis]), [kpi.note for kpi in kpis]
-        first, opened = kpis[0], [kpi.is_open for kpi in kpis]
+        first, is_open = kpis[0], [kpi.is_open for kpi in kpis]
         yield KpiOfCases(
-            first.name, values, first.unit, first.definition, notes.__getitem__, opened.__getitem__
+            first.name, values, first.unit, first.definition, notes.__getitem__, is_open.__getitem__
         )
 
 
 def _in_c(family: LoopFamily, rows: Rows, settings: Sequence[Any]) -> dict[str, KpiOfCases] | None:
-    """Return the figures of cases that look at the same signals, by C; None without a compiler."""
+    """Return the figures of cases with the same signals, by C; None without a compiler."""
     first = settings[0]
     distinct = {id(setting): setting for setting in settings}.values()
     if not family.is_compiled or any(

@@ -1,6 +1,7 @@
 """Samples of signals: sums, moving averages, and defects that leave figures undefined.
 
-Python runs them as they stand, and `bywire.bench.kpis.translator` writes their C.
+The first functions are loops that run in Python, and that `bywire.bench.kpis.translator` translates
+to C.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
 
 Samples = list[float]
-"""a signal, or its times, sample after sample"""
+"""samples of a signal, or their times"""
 
 
 def total(y: Samples) -> float:
-    """Sum of the samples in the order of time: Python's own sum differs between its versions."""
+    """Sum of the samples in the order of time: Python's `sum` differs between its versions."""
     whole = 0.0
     for x in y:
         whole += x
@@ -36,7 +37,7 @@ def integral(t: Samples, y: Samples) -> float:
 
 
 def value_at(t: Samples, y: Samples, instant: float) -> float:
-    """Signal at an instant, straight between samples, as at the ends beyond them."""
+    """Signal at an instant, linear between samples, and constant beyond the ends."""
     k = bisect_right(t, instant) - 1
     if k < 0:
         return y[0]
@@ -54,7 +55,7 @@ def moving_average(t: Samples, y: Samples, period: float) -> Samples:
     for k in range(1, len(t)):
         primitive[k] = primitive[k - 1] + 0.5 * (y[k] + y[k - 1]) * (t[k] - t[k - 1])
     mean = [0.0] * len(t)
-    i = 0  # the intervals in which both ends of the period lie move on with it
+    i = 0  # intervals that contain the two ends of the period
     j = 0
     for k in range(len(t)):
         begin = min(max(t[k] - 0.5 * width, t[0]), t[last] - width)
@@ -71,10 +72,10 @@ def moving_average(t: Samples, y: Samples, period: float) -> Samples:
 
 
 def defect_of_times(t: Samples) -> Undefined | None:
-    """Why no figure is defined over these times; None over sound ones."""
+    """Reason why no figure is defined over these times; None for valid times."""
     if len(t) < 2:
         return Undefined(f"{len(t)} samples are too few: two at least are needed")
-    wrong = 0  # counted to the end, in vectors: almost always there is none
+    wrong = 0  # counted in vectors, without early exit: there is almost never one
     for k in range(1, len(t)):
         wrong += not t[k] > t[k - 1]
     if wrong > 0 or not isfinite(t[0]) or not isfinite(t[-1]):
@@ -83,7 +84,7 @@ def defect_of_times(t: Samples) -> Undefined | None:
 
 
 def defect_of_signal(t: Samples, y: Samples) -> Undefined | None:
-    """Why no figure of a signal is defined; None of a sound one."""
+    """Reason why no figure of a signal is defined; None for a valid signal."""
     wrong = 0
     for x in y:
         wrong += not isfinite(x)
@@ -104,14 +105,14 @@ def signal(recording: xr.Dataset, name: str) -> tuple[Array, str]:
     Returns
     -------
     values
-        Shape ``(time,)``; of the rows of many cases ``(cases, time)``.
+        Shape ``(time,)``; for the rows of many cases ``(cases, time)``.
     unit
-        SI unit, ``"1"`` where none is recorded.
+        SI unit; ``"1"`` if none is recorded.
 
     Raises
     ------
     UnknownNameError
-        When the recording does not hold the signal.
+        When the recording does not contain the signal.
     ParameterError
         When the signal has other dimensions than time.
     """
@@ -121,13 +122,16 @@ def signal(recording: xr.Dataset, name: str) -> tuple[Array, str]:
     if variable.dims != ("time",):
         raise ParameterError(
             f"signal {name!r} has the dimensions {variable.dims}: key figures need time alone; "
-            "select one case first, for instance recording.isel(case=0)"
+            "select one case first, for instance recording.isel(case=0)",
+            name=name,
+            value=str(variable.dims),
+            valid="time",
         )
     return np.asarray(variable.values, dtype=np.float64), str(variable.attrs.get("units", "1"))
 
 
 def defect(t: Array, *signals: Array) -> str:
-    """Return why samples are unusable, or an empty text.
+    """Return the reason why samples are not usable, or an empty text.
 
     Parameters
     ----------
@@ -154,10 +158,10 @@ def smoothed(t: Array, y: Array, period: float) -> Array:
     .. math:: \bar y(t) = \frac{1}{T} \int_{c - T/2}^{c + T/2} y \, d\tau, \quad
               c = \min(\max(t, t_0 + T/2), t_1 - T/2)
 
-    The signal counts as straight between samples and is integrated exactly. A ripple of this
-    period vanishes everywhere. There is no delay, but an edge is smeared over half a period to
-    both sides: a dead time is shortened, a rise time lengthened by up to that. Within half a
-    period of either end the nearest full average holds, so a step should not lie there.
+    The signal is linear between samples and integrated exactly. A ripple of this period vanishes
+    everywhere. There is no delay, but an edge is spread over half a period to both sides: it
+    shortens a dead time and lengthens a rise time by up to that. Within half a period of either
+    end the nearest full average holds, so a step should not be there.
 
     Parameters
     ----------
@@ -183,7 +187,7 @@ def smoothed(t: Array, y: Array, period: float) -> Array:
     np.cumsum(pieces, axis=-1, out=total[..., 1:])
 
     def primitive(at: Array) -> Array:
-        """Return the integral of the piecewise straight signal from ``t[0]`` to each instant."""
+        """Return the integral of the piecewise linear signal from ``t[0]`` to each instant."""
         k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
         d = at - t[k]
         there, linear, bent = (np.take(each, k, axis=-1) for each in (total, y, slope))

@@ -1,4 +1,4 @@
-"""The fault campaign of the wedge brake: a moment held, then a little less, then a ramp."""
+"""The fault campaign of the wedge brake: a moment held, then a reduction, then a ramp."""
 
 from __future__ import annotations
 

@@ -8,8 +8,8 @@ from functools import cached_property
 from itertools import chain
 
 from bywire.core.signals import Signal, signals_of
-from bywire.export.exported import Exported
-from bywire.export.interface import (
+from bywire.export.exported import (
+    Exported,
     Interface,
     Variable,
     leaves_read,

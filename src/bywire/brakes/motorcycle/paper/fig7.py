@@ -14,7 +14,7 @@ from bywire.brakes.motorcycle.linear.pressure_loop import BAND, PressureLoop, ca
 from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, FACTS, REGIONS, table4_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, parameters
 from bywire.brakes.motorcycle.paper.sines import of_set_point
-from bywire.report.bode import Response, bode
+from bywire.report.response_figures import Response, bode
 from bywire.report.step_response import StepFacts, StepLimits, step_response, tracking
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part

@@ -13,7 +13,7 @@ from bywire.brakes.motorcycle.methods.braking.fit import five_of
 from bywire.brakes.motorcycle.paper.facts import FACTS, REGIONS, table4_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, parameters
 from bywire.identification.method import Effort, Identified
-from bywire.report.bode import Response, bode
+from bywire.report.response_figures import Response, bode
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit
 

@@ -13,7 +13,7 @@ from bywire.analysis.response.sweep import Sweep
 from bywire.bench.bench import Bench
 from bywire.brakes.motorcycle.paper.facts import FACTS
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, Runs, parameters
-from bywire.report.bode import Response, bode
+from bywire.report.response_figures import Response, bode
 from bywire.reproduction.item import Item, compared
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.synthesis.bench_figures import bench_figures

@@ -7,7 +7,7 @@ import numpy as np
 from bywire.brakes.motorcycle.linear.brake import Rational, theoretical, two_pole_error
 from bywire.brakes.motorcycle.paper.facts import FACTS, table2_model, table4_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, PRINTED, SETS, Runs, parameters
-from bywire.report.bode import Response, bode
+from bywire.report.response_figures import Response, bode
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 

@@ -13,7 +13,7 @@ from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, FACTS, REGIONS, tab
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, before, parameters
 from bywire.brakes.motorcycle.paper.sines import of_current
 from bywire.brakes.motorcycle.trim import travel_at
-from bywire.report.bode import Response, bode
+from bywire.report.response_figures import Response, bode
 from bywire.reproduction.item import Fact, Item, compared, found, quoted
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import kpis

@@ -22,7 +22,7 @@ from bywire.brakes.motorcycle.paper.facts import FACTS, REGIONS
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.typing import Array, Complex
-from bywire.data.recursive_filter import filtered
+from bywire.data.recursive_filter import low_passed
 from bywire.identification.least_squares import solve
 from bywire.simulation.ensemble import fit_lanes, simulate_group
 from bywire.simulation.run import Run, Trajectory, simulate
@@ -235,8 +235,7 @@ def _runs(cases: Iterable[Case], signals: Sequence[str]) -> Sequence[Trajectory]
 
 def _low_passed(run: Trajectory, f: float) -> Array:
     """Return the measured current behind the first-order low-pass of Fig. 5."""
-    decay = math.exp(-2.0 * math.pi * f * float(run.time[1] - run.time[0]))
-    return filtered([1.0 - decay], [1.0, -decay], run["i_meas"], settled=True)
+    return low_passed(run["i_meas"], f, float(run.time[1] - run.time[0]))
 
 
 def _braking(brakes: Sequence[Par]) -> list[dict[str, float]]:
