@@ -87,13 +87,13 @@ def convert(
     """
     from bywire.api.convert import Conversion, aligned
     from bywire.core.errors import ParameterError
-    from bywire.data.file_format import no_progress
+    from bywire.core.typing import silent
     from bywire.data.format_registry import format_to_write
     from bywire.data.measurement import mapping_of
     from bywire.data.named_columns import read_wanted
     from bywire.data.writing import require_free, write_measurement
 
-    shown = no_progress if progress is None else progress
+    shown = silent if progress is None else progress
     source, target = Path(source), Path(target)
     format_to_write(target, format)
     require_free(target, overwrite=force)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bywire.core.blas import on_one_thread
+from bywire.core.libraries import on_one_thread
 from bywire.usecases.asks import At, Changes, LoopName, ParameterSetName, Side
 from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
 
