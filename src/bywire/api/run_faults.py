@@ -173,7 +173,7 @@ class FaultCampaign(Answer):
             f"{len(plan.faults)} faults, {plan.total} runs of {subject.line}",
             sections=lambda: [
                 Section("Faults", [table]),
-                Section("What else to know", [known]),
+                Section("Notes", [known]),
                 Section("Figures", self._figures()),
                 Section("Residuals", [residuals]),
                 Section("Criteria", [TableBlock(self._criteria_table())]),

@@ -551,7 +551,7 @@ class StudyRun(Answer):
             sections=lambda: [
                 *([Section("Requirements", judged)] if judged else []),
                 tested_section(self.nominal, plan.tested, subject),
-                *([Section("What else to know", [Listing(remarks)])] if remarks else []),
+                *([Section("Notes", [Listing(remarks)])] if remarks else []),
                 *([Section("Key figures", figures)] if figures else []),
                 *(
                     [Section("What drives them", [*drivers, *unexplained])]

@@ -24,9 +24,9 @@ Exclude = Annotated[
     Sequence[str] | None,
     Ask("Leave out gaps, missing (both by default), clipped; or nothing.", is_listing=True),
 ]
-MaxGap = Annotated[str, Ask("Longest pause that is no gap, e.g. '50 ms'; 10 steps by default.")]
+MaxGap = Annotated[str, Ask("Longest pause that is not a gap, e.g. '50 ms'; 10 steps by default.")]
 Format = Annotated[str, Ask("Format to write, e.g. mat73; else by the ending.")]
-Force = Annotated[bool, Ask("Replace a file that is there.")]
+Force = Annotated[bool, Ask("Replace an existing file.")]
 
 
 @use_case(Command("convert", writes=""))

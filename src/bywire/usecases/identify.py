@@ -90,7 +90,7 @@ NoisyOutputs = Annotated[
 Unknowns = Annotated[
     Mapping[str, str],
     Ask(
-        "What is searched, e.g. 'motor.R_m=0.1..1 ohm', offset.i_meas.",
+        "Unknown to estimate, e.g. 'motor.R_m=0.1..1 ohm', offset.i_meas.",
         "Unknowns",
         name="unknown",
         kind="names",
@@ -101,7 +101,7 @@ Unknowns = Annotated[
 Priors = Annotated[
     Mapping[str, str],
     Ask(
-        "What is known of it, e.g. 'motor.R_m=0.35 +- 0.02 ohm'.",
+        "Prior knowledge of an unknown, e.g. 'motor.R_m=0.35 +- 0.02 ohm'.",
         "Known before",
         name="prior",
         kind="pairs",
@@ -131,7 +131,7 @@ Loss = Annotated[
 Holdout = Annotated[
     Path | None,
     Ask(
-        "Measurement that is not fitted: validation.",
+        "Measurement for validation, which is not fitted.",
         "Measurement for validation",
         kind="file",
         panel=_ANY_BENCH,

@@ -28,7 +28,7 @@ ModelChanges = Annotated[Mapping[str, Any], BENCH_CHANGES]
 Outputs = Annotated[
     Sequence[str] | Mapping[str, str],
     Ask(
-        "What is compared, e.g. 'p_mc=Pressure [psi]'; by default all.",
+        "Signals to compare, e.g. 'p_mc=Pressure [psi]'; by default all.",
         "Outputs",
         name="output",
         kind="names",
@@ -51,7 +51,7 @@ Segments = Annotated[
     ),
 ]
 Tracked = Annotated[
-    Sequence[str], Ask("Track a drifting parameter as well, e.g. mu_B.", "Drifting parameters")
+    Sequence[str], Ask("Also track a drifting parameter, e.g. mu_B.", "Drifting parameters")
 ]
 
 
