@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from typing import Any
 
 import pytest
 from matplotlib.figure import Figure
 
-from bywire.report import drawing
+from bywire.report import drawing, page
 
 _drawn = drawing.figure_bytes
 
@@ -18,8 +19,7 @@ _drawn = drawing.figure_bytes
 def undrawn() -> Iterator[None]:
     """Have figures made, and an empty one in their files."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (drawing, drawing):
-            patch.setattr(module, "figure_bytes", lambda figure, kind="png": _empty(kind))
+        patch.setattr(drawing, "figure_bytes", lambda figure, kind="png": _empty(kind))
         yield
 
 
@@ -33,7 +33,7 @@ def drawn_once(laid_out: bool = False) -> Iterator[None]:
         patch.setattr(drawing, "PNG_DPI", 50)
         if not laid_out:
             patch.setattr(drawing, "settle", lambda figure: figure.set_layout_engine("none"))
-        patch.setattr(drawing, "figure_bytes", lambda figure, kind="png": _empty(kind))
+        patch.setattr(page, "inline_figures", _inline)
         yield
 
 
@@ -47,6 +47,10 @@ def undrawn_unless_asked(request: pytest.FixtureRequest) -> Iterator[None]:
     """Have files of figures without what is in them; for the conftest of a folder."""
     with drawn_once() if "drawn" in request.fixturenames else undrawn():
         yield
+
+
+def _inline(figures: list[tuple[Any, str]]) -> list[str]:
+    return drawing.inline_figures([(Figure((1.0, 1.0)), text) for _, text in figures])
 
 
 @cache

@@ -210,7 +210,7 @@ def test_a_static_characteristic_is_compared_by_its_figures():
 
 @pytest.mark.parametrize("count", [0, 1])
 def test_fewer_than_two_are_refused(folders, count):
-    with pytest.raises(ParameterError, match="two at least"):
+    with pytest.raises(ParameterError, match="at least two"):
         bywire.compare(*folders[:count])
 
 

@@ -35,7 +35,7 @@ def test_a_simulated_winding_shows_itself_and_is_written_whole(tmp_path: Path) -
     assert bench.par.leaves()["motor.R_m"] == pytest.approx(found.parameters["motor.R_m"])
     found.write(tmp_path)  # over its own result
     other = bywire.identify("friction-model", synthetic=1, options={"duration": "4 s"})
-    with pytest.raises(bywire.BywireError, match="holds a result of motor-winding"):
+    with pytest.raises(bywire.BywireError, match="contains a result of motor-winding"):
         other.write(tmp_path)
     assert (tmp_path / "parameters.toml").exists()
 
@@ -117,5 +117,5 @@ def test_a_file_is_converted(tmp_path: Path) -> None:
     assert found.alignment.samples == found.recording.sizes["time"] == 25
     assert found.as_object()["files"] == [str(target)]
     assert found.tables()["Signals"]["signal"].to_list() == ["p"]
-    with pytest.raises(bywire.BywireError, match="give the rate too, as rate '1 kHz'"):
+    with pytest.raises(bywire.BywireError, match="also give the rate, as rate '1 kHz'"):
         bywire.convert(source, tmp_path / "other.nc", method="average")

@@ -100,7 +100,7 @@ def test_an_older_result_does_not_stay_beside_a_new_one(bywire: Bywire, tmp_path
     other.write_text("the user's own")
     refused(
         bywire("identify", "friction-model", "--synthetic", "1", "--out", tmp_path),
-        "holds a result of seal-friction",
+        "contains a result of seal-friction",
         "--out",
     )
     assert (tmp_path / "strokes.png").exists()
@@ -122,7 +122,7 @@ def test_a_study_keeps_out_of_other_folders(bywire: Bywire, tmp_path: Path) -> N
     for wanted in (("--study", "2"), ("--synthetic", "1")):
         refused(
             bywire("identify", "friction-model", *wanted, *law),
-            "holds a study of seal-friction",
+            "contains a study of seal-friction",
             "study.json",
         )
     file.unlink()
@@ -132,7 +132,7 @@ def test_a_study_keeps_out_of_other_folders(bywire: Bywire, tmp_path: Path) -> N
     assert found.object["start"] == {}  # it needs none
     refused(
         bywire("identify", "seal-friction", "--study", "2", "--out", tmp_path),
-        "holds a result of friction-model",
+        "contains a result of friction-model",
     )
     page = (tmp_path / "report.html").read_text()
     assert "put in" in page

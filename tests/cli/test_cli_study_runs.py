@@ -45,7 +45,8 @@ def test_from_the_file_to_the_report_and_on(bywire, study, tmp_path, monkeypatch
     assert status["kpis"]["peak_current"] == extended["kpis"]["peak_current"]
     told = bywire("study", "surrogate", out, "--at", "motor.R_m=+1%", "--json").object
     assert 15.0 < told["surrogates"]["peak_current"]["value"] < 25.0
-    refused(bywire("study", "surrogate", out, "--at", "motor.R_m=9ohm"), "9 ohm", "nothing beyond")
+    beyond = bywire("study", "surrogate", out, "--at", "motor.R_m=9ohm")
+    refused(beyond, "9 ohm", "the range of the surrogate")
     assert bywire("run", out / "worst-peak_current.toml").status == 0
     no_half_files(out)
 
@@ -88,7 +89,7 @@ def test_bad_input_is_one_error(bywire, study, tmp_path):
 def test_a_file_is_no_folder_of_a_study(bywire, study, tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     name, *more = command
-    texts = "is a study file, and the folder of a study is wanted", f"'bywire study run {study}' m"
+    texts = "is a study file, not the folder of a study", f"'bywire study run {study}' m"
     refused(bywire("study", name, study, *more), str(study), *texts)
     for kept in (tmp_path / "results" / study.stem, tmp_path / study.stem):
         kept.mkdir(parents=True)
@@ -145,5 +146,7 @@ def test_a_study_that_is_nothing_says_what_is_wanted(bywire, tmp_path, monkeypat
     refused(bywire("study", "foo"), *texts)
     refused(bywire("study", "drive-trian"), "did you mean 'drive-train'?")
     for name in ("foo", "foo.toml", "foo/bar.toml"):
-        refused(bywire("study", "run", name), f"cannot read study file {name}", "check the path")
+        refused(
+            bywire("study", "run", name), f"the study file {name} does not exist", "check the path"
+        )
     assert not any(tmp_path.iterdir())

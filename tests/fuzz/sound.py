@@ -11,8 +11,7 @@ from random import Random
 from bywire.bench.bench import Bench, switches_of
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.core.catalog import PARAMETER_SETS, parameters
-from bywire.core.leaf import Leaf
-from bywire.core.parameters import leaf_fields
+from bywire.core.parameters import Leaf, leaf_fields
 from bywire.core.units import convert
 
 Entries = dict[str, str]

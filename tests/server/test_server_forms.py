@@ -67,10 +67,10 @@ BAD = [
     ("faults", {"campaign": "small.toml", "set": "motor.R_m=1 bar"}, "set", "unit"),
     ("life", {"life": "wedge-pad"}, "life", "wedge-pads"),
     ("life", {"life": "pads.toml"}, "life", "stop.gap"),
-    ("life", {"life": "wedge-pads", "check": "-1"}, "check", "whole number from 0 on"),
-    ("life", {"life": "two-wheeler-pads", "check": "1"}, "check", "fewer than"),
+    ("life", {"life": "wedge-pads", "check": "-1"}, "check", "whole number >= 0"),
+    ("life", {"life": "two-wheeler-pads", "check": "1"}, "check", "it must be 0 or >="),
     ("life", {"life": "wedge-pads", "set": "wear.x=1"}, "set", "unknown"),
-    ("compare", {"runs": "curve.toml"}, "runs", "two at least"),
+    ("compare", {"runs": "curve.toml"}, "runs", "at least two"),
     ("compare", {"runs": "curve.toml\naside"}, "runs", "not a finished result"),
     ("compare", {"runs": "curve.toml\nseal-stribek"}, "runs", "seal-stribeck"),
     ("compare", {"runs": "curve.toml\nseal-stribeck", "set": "motor.x=1"}, "set", "motor.x"),
@@ -281,7 +281,7 @@ def test_what_is_asked_twice_is_computed_once(visit):
     assert first.status == 201
     again = visit.begin("faults", campaign="motorcycle")
     assert again.status == 409
-    assert "motorcycle is being computed" in again.object["error"]
+    assert "motorcycle is already being computed" in again.object["error"]
     visit("POST", f"/api/jobs/{first.object['number']}/cancel", {})
     assert visit.ended(first.object["number"])["state"] == "canceled"
 

@@ -136,7 +136,7 @@ def test_what_is_not_there_and_what_is_not_taken(visit):
 def test_files_that_are_dropped(visit):
     large = visit("PUT", "/api/measurements/a.csv", b"", Content_Length=str(2_000_000_000))
     assert large.status == 413
-    assert "2,000.0 MB, and 3.0 MB are taken" in large.object["error"]
+    assert "2,000.0 MB is too large (at most 3.0 MB)" in large.object["error"]
     assert visit("PUT", "/api/measurements/a.toml", b"x").status == 415
     assert visit("PUT", "/api/measurements/a.csv", b"").status == 400
     assert visit("PUT", "/api/measurements/a.csv", iter([b"x"])).status == 411
@@ -217,8 +217,8 @@ def test_a_port_and_a_folder_that_do_not_do(visit, tmp_path):
     cases = [
         ({"port": visit.server.port}, ParameterError, "--port 0|port=0|port 0"),
         ({"port": 65536}, ParameterError, "0 to 65535"),
-        ({"folder": tmp_path / "none"}, FileError, "is no folder"),
-        ({"subject": "none.toml"}, FileError, "is no file"),
+        ({"folder": tmp_path / "none"}, FileError, "is not a folder"),
+        ({"subject": "none.toml"}, FileError, "does not exist"),
         ({"subject": "hard-brakin"}, UnknownNameError, "hard-braking"),
         ({"subject": visit.folder / "curve.toml"}, FileError, "is not in"),
         ({"subject": visit.folder}, ParameterError, f"or bywire serve {re.escape(str(tmp_path))}$"),

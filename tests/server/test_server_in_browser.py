@@ -52,7 +52,7 @@ def test_forms_files_and_jobs(visit, chromium, tmp_path):
     page.wait_for_selector("text=large.csv has 4 MB, and 3 MB are taken")
     (tmp_path / "text.docx").write_text("x")
     page.set_input_files(upload, tmp_path / "text.docx")
-    page.wait_for_selector("text='text.docx' has the ending of no measurement format")
+    page.wait_for_selector("text='text.docx' does not have the ending of a measurement format")
     assert [path.name for path in (visit.folder / "measurements").iterdir()] == ["a-rig.csv"]
     here = visit.server.link.partition("/?")[0]
     assert [url for url in asked if not url.startswith(here)] == []

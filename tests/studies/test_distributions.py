@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bywire.core.errors import InputError
-from bywire.core.leaf import Leaf
+from bywire.core.parameters import Leaf
 from bywire.core.quantities import Unit
 from bywire.studies.distribution import read_choice, read_distribution
 
@@ -84,13 +84,13 @@ def test_a_normal_tolerance_ends_where_it_says():
         ({"kind": "triangular", "low": "-100 %", "high": "1 ohm"}, ["its end at 0 ohm"]),
         ({"kind": "uniform", "low": "1 ohm", "high": "1 ohm"}, ["must be below"]),
         ({"kind": "discrete", "values": [0.3, 0.4]}, ["motor.R_m.values = 0.3 has"]),
-        ("+- 1e-18 %", ["no wider than the last digit"]),
-        ({"kind": "normal", "sd": "1e-18 %"}, ["no wider than the last digit"]),
-        ({"kind": "log-normal", "sd": "1e-18 %"}, ["no wider than the last digit"]),
-        ({"kind": "discrete", "values": ["0.3 ohm"]}, ["one value alone, 0.3 ohm"]),
+        ("+- 1e-18 %", ["not wider than the last digit"]),
+        ({"kind": "normal", "sd": "1e-18 %"}, ["not wider than the last digit"]),
+        ({"kind": "log-normal", "sd": "1e-18 %"}, ["not wider than the last digit"]),
+        ({"kind": "discrete", "values": ["0.3 ohm"]}, ["only one value, 0.3 ohm"]),
         (
             {"kind": "discrete", "values": ["0.3 ohm", "1 ohm", "300 mohm"]},
-            ["0.3 ohm stands there twice", "weights"],
+            ["lists the value 0.3 ohm twice", "weights"],
         ),
         ({"sd": "5 %"}, ["{ sd = '5 %' }: kind is missing", "'normal' or 'log-normal'"]),
         ({"kind": ["normal"], "sd": "5 %"}, ["unknown kind", "'normal'"]),
@@ -102,13 +102,13 @@ def test_a_normal_tolerance_ends_where_it_says():
         ({"kind": "normal", "sd": "0 %"}, ["width > 0"]),
         ({"kind": "normal", "sigma": "5 %"}, ["'sigma'", "sd"]),
         ({"kind": "norml", "sd": "5 %"}, ["'norml'", "'normal'"]),
-        ({"kind": "triangular", "low": "0.5 ohm", "high": "0.7 ohm"}, ["must rise"]),
+        ({"kind": "triangular", "low": "0.5 ohm", "high": "0.7 ohm"}, ["must increase"]),
         ({"kind": "discrete", "values": ["0.3 ohm"], "weights": [1, 2]}, ["1 numbers > 0"]),
         (
             {"kind": "discrete", "values": ["0.3 ohm", "1 ohm"], "weights": [1, "3"]},
             ["weights = [1, '3']", "2 numbers > 0"],
         ),
-        ({"kind": "normal", "sd": "1 %", "low": "1.5 ohm"}, ["nothing of it is left"]),
+        ({"kind": "normal", "sd": "1 %", "low": "1.5 ohm"}, ["too little to draw from"]),
         ({"kind": "discrete", "values": []}, ["values = [...]"]),
         ({"kind": "tolerance", "tolerance": "5 %", "shape": "cauchy"}, ["'cauchy'", "normal"]),
         ("5 %", ["write a tolerance"]),
@@ -137,7 +137,7 @@ def test_what_is_truncated_at_a_limit_that_is_not_admissible_has_levels_within(l
 
 
 def test_a_share_of_zero_needs_an_amount():
-    with pytest.raises(InputError, match="give an amount"):
+    with pytest.raises(InputError, match="given as an amount"):
         read("+-5 %", nominal=0.0)
 
 

@@ -8,6 +8,7 @@ import pytest
 
 import bywire
 from bywire.core.errors import FileError
+from raising import raises
 
 STUDY = 'bench = "hard-braking"\n[vary]\n"motor.R_m" = "+-5 %"\n'
 
@@ -19,12 +20,12 @@ def test_the_study_that_was_meant_is_named(tmp_path, monkeypatch, named):
     there.parent.mkdir()
     there.write_text(STUDY)
     Path("studies", "rars.toml").write_text('life = "wedge-pads"\n')  # near, and no study
-    with pytest.raises(FileError, match=f"study file {named}: .*: did you mean {there}"):
+    with pytest.raises(FileError, match=f"study file {named} .*: did you mean {there}"):
         bywire.run_study(named)
     assert [each.name for each in tmp_path.iterdir()] == ["studies"]
 
 
 def test_nothing_near_is_no_suggestion(tmp_path):
     (tmp_path / "tolerances.toml").write_text(STUDY)
-    with pytest.raises(FileError, match=r"none.toml: .*: check the path"):
+    with raises(FileError, name="none.toml"):
         bywire.run_study(tmp_path / "none.toml")

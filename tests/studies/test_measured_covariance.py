@@ -84,12 +84,12 @@ def test_some_of_them_and_cut_off(study, written):
 @pytest.mark.parametrize(
     ("content", "text"),
     [
-        ("{", "holds no estimates"),
+        ("{", "contains no estimates"),
         ({"estimates": {}}, "nothing is estimated"),
-        (estimate(value="0.3"), "no number"),
+        (estimate(value="0.3"), "not a number"),
         (estimate(standard_deviation=0.0), "not above zero"),
-        ({"estimates": [1, 2]}, "holds no estimates"),
-        ("[" * 100_000, "holds no estimates"),
+        ({"estimates": [1, 2]}, "contains no estimates"),
+        ("[" * 100_000, "contains no estimates"),
     ],
 )
 def test_what_is_no_estimate_is_said(study, written, content, text):
@@ -105,7 +105,7 @@ def test_what_is_no_estimate_is_said(study, written, content, text):
         ("file = 3", "name the folder"),
         ('file = "id"\nof = ["motor.L_m"]', "motor.L_m"),
         ('file = "id"\nof = ["low:K"]', "parameter of .measured."),
-        ('file = "id"\nof = []', "name some of them"),
+        ('file = "id"\nof = []', "name those of them"),
         ('file = "id"\ntruncate = "yes"', "true or false"),
         ('file = "id"\nonly = ["motor.R_m"]', "'only'"),
         (
@@ -114,7 +114,7 @@ def test_what_is_no_estimate_is_said(study, written, content, text):
         ),
         (
             'file = "id"\n[[correlation]]\nof = ["motor.K_e", "motor.R_m"]\nvalue = 0.1',
-            "stands there twice",
+            "is given twice",
         ),
     ],
 )

@@ -226,8 +226,8 @@ def test_each_requirement_in_turn_shares_the_first_level(study, tmp_path):
     ("old", "new", "why"),
     [
         (" with 99.9 %", "", "none has a probability"),
-        ("cases = 3000", "cases = 600", "at least 640"),
-        ('"subset-simulation"', '"importance-sampling"', "cases_per_level: 'importance-sampling'"),
+        ("cases = 3000", "cases = 600", ">= 640"),
+        ('"subset-simulation"', '"importance-sampling"', "cases_per_level is only for"),
         ('"subset-simulation"', '"subset"', "did you mean 'subset-simulation'"),
         ("cases_per_level = 640", "levels = 3", "levels"),
         (

@@ -110,7 +110,7 @@ def test_more_cases_extend_a_study_and_requirements_may_change(study, tmp_path):
     pd.testing.assert_frame_equal(more.cases[:64], first.cases, check_exact=True)
     assert len(bywire.study_report(out).cases) == 128
     assert len(bywire.run_study(path, out, cases=128).cases) == 128
-    with pytest.raises(ParameterError, match="has 128 already"):
+    with pytest.raises(ParameterError, match="already has 128"):
         bywire.resume_study(out, cases=64)
     path.write_text(path.read_text() + '[requirements]\npeak_current = "<= 1 A"\n')
     assert bywire.study_report(out).status == "failed"
@@ -216,7 +216,7 @@ def test_a_damaged_chunk_is_computed_again_and_that_is_said(study, tmp_path):
     pd.testing.assert_frame_equal(before.cases, after.cases, check_exact=True)
     assert "1 damaged chunk is computed again" in after.notes
     store.path(1).write_bytes(store.path(0).read_bytes())  # sound, and in the wrong place
-    with pytest.raises(FileError, match=r"000001\.parquet is of another study, or another chunk"):
+    with pytest.raises(FileError, match=r"000001\.parquet belongs to another study"):
         bywire.study_report(tmp_path / "out")
 
 

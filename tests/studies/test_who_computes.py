@@ -136,7 +136,7 @@ def test_who_computes_is_chosen_by_the_work(monkeypatch):
     assert isinstance(executor_of(3, "", 100), Pool)
     with pytest.raises(ParameterError, match="workers = 0"):
         executor_of(0, "", 1)
-    with pytest.raises(ParameterError, match="the cluster's own"):
+    with pytest.raises(ParameterError, match="a cluster has its own workers"):
         executor_of(2, "tcp://host:8786", 1)
     alone = executor_of(None, "", 1000, engine="cuda")
     assert isinstance(alone, InProcess)

@@ -84,7 +84,7 @@ def test_a_study_finds_the_worst_bench(study, tmp_path):
     ("old", "new", "why"),
     [
         ("18.9 A", "18.9 A with 99 %", "no probability"),
-        ("cases = 320", "cases = 60", "at least 64"),
+        ("cases = 320", "cases = 60", ">= 64"),
     ],
 )
 def test_what_does_not_fit_is_refused(study, old, new, why):

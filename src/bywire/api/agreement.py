@@ -175,9 +175,11 @@ def compared_responses(
     require_stable(closed)
     if not LoopFigures(gain, closed).answers:
         raise ParameterError(
-            f"loop {case.loop.name!r} at {case.point}: {NO_LOOP}, and the output does not answer "
+            f"loop {case.loop.name!r} at {case.point}: {NO_LOOP}, and the output does not respond "
             f"to the set point; choose other gains with {option('overrides')}, or another point "
-            f"with {option('at')}"
+            f"with {option('at')}",
+            name=f"loop {case.loop.name!r}",
+            value=case.point,
         )
     compared = measuring.agreement(
         case.loop, case.par, case.value, frequencies, amplitudes, progress=progress
@@ -198,8 +200,10 @@ def two_amplitudes(case: LoopCase, text: str) -> tuple[float, float]:
     sizes = spread(text, case.input_unit, "amplitudes")
     if len(sizes) != 2 or not sizes[0] < sizes[1]:
         raise ParameterError(
-            f"{option('amplitudes')} {text}: two are wanted, the small one first: everything off "
-            "is measured with it, every cause with the large one"
+            f"{option('amplitudes')} {text}: give two, the small one first: bywire measures the "
+            "loop without nonlinear causes at the small one, and each cause at the large one",
+            name=option("amplitudes"),
+            value=text,
         )
     return sizes[0], sizes[1]
 

@@ -664,13 +664,17 @@ def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> lis
     """
     if len(runs) < 2:
         raise ParameterError(
-            f"{len(runs)} {'run is' if len(runs) == 1 else 'runs are'} nothing to compare: name "
-            "two at least, bench files, experiments or result folders"
+            f"a comparison needs at least two runs, not {len(runs)}: name bench files, experiments "
+            "or result folders",
+            name="runs",
+            value=str(len(runs)),
+            valid="at least two",
         )
     benches = [each for each in runs if not _was_run(each)]
     if overrides and not benches:
         raise ParameterError(
-            f"{', '.join(overrides)} would have no effect: what is compared was run before"
+            f"{', '.join(overrides)} would have no effect: the compared runs are already computed",
+            name=", ".join(overrides),
         )
     return benches
 

@@ -11,7 +11,7 @@ import xarray as xr
 
 from bywire.core import units
 from bywire.core.callers import option
-from bywire.core.errors import ParameterError
+from bywire.core.errors import not_valid
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Section, TableBlock
 from bywire.report.tables import Cell, Table, text_table
@@ -133,7 +133,7 @@ def aligned(
 
     frequency = units.parse(rate, "Hz", option("rate"))
     if not frequency > 0.0:
-        raise ParameterError(f"{option('rate')} {rate}: it must be > 0 Hz")
+        raise not_valid(option("rate"), str(rate), "> 0 Hz")
     given = {"method": method, "max_gap": max_gap}
     options: dict[str, Any] = {key: value for key, value in given.items() if value}
     if exclude is not None:

@@ -23,7 +23,7 @@ from bywire.bench.bench import Bench
 from bywire.bench.changes import OPTION
 from bywire.bench.requirements import Limit
 from bywire.core.callers import option
-from bywire.core.errors import InputError, ParameterError, quoted
+from bywire.core.errors import InputError, ParameterError, not_valid, quoted
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import Progress, silent
 from bywire.core.units import parse, shown
@@ -221,7 +221,7 @@ def _drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
         which none exists.
     """
     if not 1 <= count <= _MOST:
-        raise ParameterError(f"drawn = {count} is not valid: 1 to {_MOST} models")
+        raise not_valid("drawn", f"{count}", f"1 to {_MOST} models")
     plan = replace(read_study(file), design="monte-carlo")
     _require_fitting(case, plan, file)
     columns = [plan.values(chunk) for chunk in range(-(-(count + _JUDGES) // CHUNK))]
@@ -233,7 +233,7 @@ def _drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
     ]
     designed = tuple(each for each in models[:count] if each is not None)
     if not designed:
-        raise ParameterError(f"{file}: none of {count} models drawn of it exists")
+        raise ParameterError(f"{file}: none of {count} models drawn from it exists", name=str(file))
     judges = tuple(models[count : count + _JUDGES])
     return DrawnModels(plan.name, designed, count - len(designed), judges, plan.confidence)
 
@@ -250,21 +250,23 @@ def _probability(text: str) -> float | None:
         return None
     wanted = parse(text, "1", "probability")
     if not 0.0 < wanted < 1.0:
-        raise ParameterError(f"probability = {quoted(text)} must lie between 0 and 100 %")
+        raise not_valid("probability", quoted(text), "between 0 and 100 %")
     return wanted
 
 
 def _require_fitting(case: LoopCase, plan: StudyPlan, file: str | Path) -> None:
     if type(plan.bench.par) is not type(case.par):
         raise ParameterError(
-            f"{file}: its bench is of {plan.bench.system}, and loop {case.loop.name!r} of another "
-            "brake: name a study of this one"
+            f"{file}: its bench is of {plan.bench.system}, but loop {case.loop.name!r} belongs to "
+            "another brake: name a study of that brake",
+            name=str(file),
         )
     for name in (name for v in plan.varied for name in (v.name, *v.together)):
         if name.startswith(OPTION):
             raise ParameterError(
                 f"{file}: {name} is an option of the experiment, which the loop does not have: "
-                "leave it out"
+                "leave it out",
+                name=name,
             )
         require_given(case.loop, name)
 
@@ -297,11 +299,14 @@ def _left_to_choose(
         When nothing is left.
     """
     if not spans:
-        raise ParameterError(f"loop {loop!r} has no gains to design")
+        raise ParameterError(f"loop {loop!r} has no gains to design", name="loop", value=loop)
     left = {name: span for name, span in spans.items() if name not in changes}
     if not left:
         raise ParameterError(
-            f"{option('overrides')} fixes all of {', '.join(spans)}: leave out what is to be chosen"
+            f"{option('overrides')} fixes all of {', '.join(spans)}: leave out those that bywire "
+            "should choose",
+            name=option("overrides"),
+            value=", ".join(spans),
         )
     return left
 
@@ -351,13 +356,18 @@ def _from_file(path: Path | None) -> list[str]:
     section = read_toml(path, "file of requirements").get("requirements")
     if not isinstance(section, dict) or not section:
         raise ParameterError(
-            f'{path}: a section [requirements] is wanted, with lines such as bandwidth = ">= 10 Hz"'
+            f'{path} needs a section [requirements], with lines such as bandwidth = ">= 10 Hz"',
+            name="[requirements]",
         )
     wanted = []
     for figure, limits in section.items():
         for limit in limits if isinstance(limits, list) else [limits]:
             if not isinstance(limit, str):
-                raise ParameterError(f'{path}: {figure} = {limit}: write a text such as ">= 10 Hz"')
+                raise ParameterError(
+                    f'{path}: {figure} = {limit}: write a text such as ">= 10 Hz"',
+                    name=figure,
+                    value=str(limit),
+                )
             wanted.append(f"{figure} {limit}")
     return wanted
 
@@ -643,7 +653,9 @@ def designed_at_point(
     least = _probability(probability)
     if least is not None and not vary:
         raise ParameterError(
-            f"probability needs drawn models: name a study file, {option('vary')} FILE"
+            f"probability needs drawn models: name a study file, {option('vary')} FILE",
+            name="probability",
+            value=probability,
         )
     case, overrides, limits = _for_ecu(case, overrides, free_derivative)
     tunables = _left_to_choose(case.loop.name, _narrowed(_tunables_of(case), limits), overrides)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
+from bywire.core.catalog import Cited
 from bywire.core.errors import CompilerError, FileError, ModelError
-from bywire.core.provenance import Cited
 from bywire.core.scratch import made_folder
 from bywire.core.units import shown
 from bywire.report.answer import Answer
@@ -44,7 +44,8 @@ def export_folder(out: str | Path) -> Iterator[Path]:
     except OSError as error:
         raise FileError(
             f"{folder} cannot be written: {error.strerror or error}; make room there, or name "
-            "another folder"
+            "another folder",
+            name=str(folder),
         ) from None
 
 

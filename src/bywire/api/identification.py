@@ -22,13 +22,13 @@ from bywire.core.callers import is_command_line, option
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import FileError, InputError, ParameterError, unknown_name, unknown_of_few
 from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.typing import Progress, silent
 from bywire.core.values import parsed
-from bywire.data.file_format import Progress, no_progress
 from bywire.data.named_columns import NamedColumns
 from bywire.identification.estimate import Estimate, as_object
-from bywire.identification.fitting.question import BENCH_METHODS, BenchMethod, Question, find_method
 from bywire.identification.measured import Measured, measured, name_of, require_signals
 from bywire.identification.method import Effort, Identified
+from bywire.identification.question import BENCH_METHODS, BenchMethod, Question, find_method
 from bywire.identification.trust import displaced, put_in
 from bywire.report.answer import Answer
 from bywire.report.document import (
@@ -114,7 +114,7 @@ def choose(
     measurements: Sequence[Source] = (),
     mapping: str | Path | None = None,
     time: str = "",
-    progress: Progress = no_progress,
+    progress: Progress = silent,
 ) -> ChosenMethod:
     """Return the method of a name with what it needs.
 
@@ -147,12 +147,18 @@ def choose(
         chosen = {"parameters": parameters} if parameters else {}
         method = _on_bench(bench_method, question, {**chosen, **overrides}, mapping, time, progress)
     if len(measurements) > 1 and not method.several:
-        raise ParameterError(f"{name} takes one measurement, not {len(measurements)}")
+        raise ParameterError(
+            f"{name} takes one measurement, not {len(measurements)}",
+            name="measurements",
+            value=str(len(measurements)),
+            valid="one",
+        )
     idle = [key for key in options if key.split(".")[0] in method.simulated]
     if measurements and idle:
         raise ParameterError(
             f"option {idle[0]} of {name} only shapes simulated experiments: leave it out for "
-            "measurement files"
+            "measurement files",
+            name=idle[0],
         )
     loss = {"loss": question.loss} if question.loss else {}
     return _with_parameters(method, _options(method, {**options, **loss}), parameters, overrides)
@@ -172,7 +178,8 @@ def _require_columns_alone(method: Method, question: Question) -> None:
         raise ParameterError(
             f"{option(beyond[0] if beyond else 'outputs')}{'' if beyond else ' with a noise'} is "
             f"for methods of any bench "
-            f"({', '.join(BENCH_METHODS.all())}): leave it out for {method.name}"
+            f"({', '.join(BENCH_METHODS.all())}): leave it out for {method.name}",
+            name=option(beyond[0] if beyond else "outputs"),
         )
     signals = {**method.signals, **method.optional}
     for name in (*question.inputs, *question.columns):
@@ -211,7 +218,8 @@ def _with_parameters(
         if parameters or overrides:
             raise ParameterError(
                 f"{method.name} needs no parameters: leave out {option('parameters')} and "
-                f"{option('overrides')}"
+                f"{option('overrides')}",
+                name=option("parameters" if parameters else "overrides"),
             )
         return ChosenMethod(method, options)
     if method.bench is not None:
@@ -241,12 +249,15 @@ def _options(method: Method, values: Mapping[str, Any]) -> ParameterSet:
 def _require_not_fitted(holdout: Source, measurements: Sequence[Source]) -> None:
     """Refuse a held-out measurement that is fitted too, or none beside it: it proves nothing."""
     if not measurements:
-        raise ParameterError(f"{option('holdout')} is for measurement files: leave it out")
+        raise ParameterError(
+            f"{option('holdout')} is for measurement files: leave it out", name=option("holdout")
+        )
     for fitted in measurements:
         if isinstance(holdout, xr.Dataset) or isinstance(fitted, xr.Dataset):
             if isinstance(fitted, xr.Dataset) and fitted is holdout:
                 raise ParameterError(
-                    f"{option('holdout')} is fitted too: hold out a record that is not"
+                    f"{option('holdout')} is also fitted: hold out a record that is not",
+                    name=option("holdout"),
                 )
             continue
         try:
@@ -257,7 +268,9 @@ def _require_not_fitted(holdout: Source, measurements: Sequence[Source]) -> None
             same = "is" if Path(fitted).samefile(holdout) else "has the same content as"
             raise ParameterError(
                 f"{option('holdout')} {holdout} {same} {fitted}, which is fitted: hold out a "
-                "record that is not"
+                "record that is not",
+                name=option("holdout"),
+                value=str(holdout),
             )
 
 
@@ -273,7 +286,8 @@ def _on_bench(
     if question.bench is None:
         raise ParameterError(
             f"{method.name} needs {option('bench')}: a bench file (TOML), or an experiment of "
-            "'bywire list'"
+            "'bywire list'",
+            name=option("bench"),
         )
     bench = driven_bench(question.bench, changes)
     on_bench = method.on(bench, replace(question, holdout=None))
@@ -395,7 +409,9 @@ def _require_one_source(
         )
     for name, given in {"mapping": mapping is not None, "time": bool(time)}.items():
         if given and not sources:
-            raise ParameterError(f"{option(name)} is for measurement files: leave it out")
+            raise ParameterError(
+                f"{option(name)} is for measurement files: leave it out", name=option(name)
+            )
 
 
 def _data_of(
@@ -587,8 +603,10 @@ def require_own(out: Path, method: str) -> None:
         if earlier is None or earlier.get("method") == method:
             continue
         raise FileError(
-            f"{out} holds a {what} of {earlier.get('method') or 'something else'}: name another "
-            f"folder with {option('folder')} for {method}, or remove {path} with what belongs to it"
+            f"{out} contains a {what} of {earlier.get('method') or 'something else'}: name another "
+            f"folder with {option('folder')} for {method}, or remove {path} and its files",
+            name=option("folder"),
+            value=str(out),
         )
 
 
@@ -648,11 +666,12 @@ def _read(path: Path) -> dict[str, Any] | None:
     try:
         earlier = json.loads(path.read_text(encoding="utf-8"))
         if not (isinstance(earlier, dict) and isinstance(earlier.get("files", []), list)):
-            raise ValueError("it is no result of bywire identify")
+            raise ValueError("it is not a result of bywire identify")
     except (OSError, ValueError) as error:
         raise FileError(
             f"{path} cannot be read ({error}): name another folder with {option('folder')}, or "
-            "remove it"
+            "remove it",
+            name=str(path),
         ) from None
     return earlier
 

@@ -271,6 +271,9 @@ def require_checkable(check: int, plan: LifePlan) -> None:
     whole_number("check", check, 0, _MOST)
     if 0 < check < plan.count:
         raise ParameterError(
-            f"check = {check}: fewer than the {plan.count} stops that stand for the population say "
-            "nothing of it; give as many at least"
+            f"check = {check} is not valid: it must be 0 or >= {plan.count}, the number of stops "
+            "that represent the population",
+            name="check",
+            value=f"{check}",
+            valid=f"0 or >= {plan.count}",
         )

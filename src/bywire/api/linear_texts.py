@@ -157,7 +157,10 @@ def reduced(model: LinearModel, text: str, band: float | None = None) -> Reduced
         if not order:
             raise ParameterError(
                 f"{option('reduce')} {quoted(text)}: an order is a whole number >= 1 of at most "
-                f"{DIGITS} digits; with a unit, it is a band, for instance '150 Hz'"
+                f"{DIGITS} digits; a band has a unit, for instance '150 Hz'",
+                name=option("reduce"),
+                value=quoted(text),
+                valid="a whole number >= 1",
             )
         return reduce(model, order=order, band=band)
     return reduce(model, band=number(text, "Hz", option("reduce")), tolerance=TOLERANCE)

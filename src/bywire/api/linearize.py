@@ -292,7 +292,12 @@ def _operating_point(plant: Plant, at: str) -> tuple[Quantity, float]:
         except UnitError:
             continue
     known = ", ".join(f"{quantity.name} in {quantity.unit}" for quantity in plant.at)
-    raise UnitError(f"{option('at')} {at!r}: {plant.name} takes one of {known}")
+    raise UnitError(
+        f"{option('at')} {at!r}: {plant.name} takes one of {known}",
+        name=option("at"),
+        value=repr(at),
+        valid=known,
+    )
 
 
 def _friction(friction: str, speed: str) -> tuple[Friction, float]:
@@ -304,13 +309,16 @@ def _friction(friction: str, speed: str) -> tuple[Friction, float]:
     if kind == "sliding" and omega == 0.0:
         raise ParameterError(
             f"{option('friction', 'sliding')}: friction at rest has no slope; give the motors' "
-            f"speed with {option('speed')}, for instance '5 rad/s', positive toward clamping"
+            f"speed with {option('speed')}, for instance '5 rad/s', positive toward clamping",
+            name=option("speed"),
         )
     if kind != "sliding" and omega != 0.0:
         raise ParameterError(
             f"{option('speed')} {speed}: only sliding friction depends on it: add "
             f"{option('friction', 'sliding')}, or "
-            "leave it out"
+            "leave it out",
+            name=option("speed"),
+            value=speed,
         )
     return kind, omega
 
@@ -525,10 +533,14 @@ def linearized(
     if isinstance(case, LoopCase):
         return _linearized_loop(case, locus, reduce, dither)
     if dither:
-        raise ParameterError(f"{option('dither', True)} is for loops: leave it out, or name a loop")
+        raise ParameterError(
+            f"{option('dither', True)} is for loops: leave it out, or name a loop",
+            name=option("dither", True),
+        )
     if locus and reduce:
         raise ParameterError(
-            f"{option('reduce')} and {option('locus')} exclude each other: ask for one of them"
+            f"{option('reduce')} and {option('locus')} exclude each other: give only one of them",
+            name=option("reduce"),
         )
     return _plant_locus(case, locus) if locus else _linearized_plant(case, reduce)
 
@@ -575,7 +587,9 @@ def linear_case(
         if text:
             raise ParameterError(
                 f"{option(argument)} is for plants ({', '.join(PLANTS.all())}): controllers are "
-                "linearized without dry friction; leave it out"
+                "linearized without dry friction; leave it out",
+                name=option(argument),
+                value=text,
             )
     return loop_case(name, parameters, at, overrides, side)
 
@@ -600,9 +614,10 @@ def _followed(case: LoopCase, range_: str) -> Locus:
 def _dithered(case: LoopCase) -> PeriodicModel:
     if not case.loop.whole(case.par):
         raise ParameterError(
-            f"{option('dither', True)}: loop {case.loop.name!r} of {case.name} has none; it takes "
-            f"a loop through which a dither runs ({_dithered_loops()}), switched on in the "
-            "parameters of its ECU"
+            f"{option('dither', True)}: loop {case.loop.name!r} of {case.name} has no dither; name "
+            f"a loop with dither ({_dithered_loops()}), switched on in the parameters of its ECU",
+            name=option("dither", True),
+            valid=_dithered_loops(),
         )
     return dithered_loop(case.loop, case.par, case.value)
 

@@ -137,20 +137,32 @@ def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> lis
     if count is None or not 2 <= count <= _MOST:
         raise ParameterError(
             f"{name} = {quoted(text)}: write LOW:HIGH:COUNT with 2 to {_MOST} values, or "
-            "values with commas"
+            "values with commas",
+            name=name,
+            value=quoted(text),
+            valid=f"2 to {_MOST} values",
         )
     low, high = (number(part, unit, name) for part in parts[:2])
     if logarithmic and low <= 0:
         raise ParameterError(
-            f"{name} = {quoted(text)}: the range is logarithmic, and must start above 0 {unit}"
+            f"{name} = {quoted(text)}: the range is logarithmic, and must start above 0 {unit}",
+            name=name,
+            value=quoted(text),
+            valid=f"above 0 {unit}",
         )
     if low == high:
         raise ParameterError(
             f"{name} = {quoted(text)}: the range is a single value: write it alone, "
-            f"{name}={quoted(parts[0])[1:-1]}"
+            f"{name}={quoted(parts[0])[1:-1]}",
+            name=name,
+            value=quoted(text),
         )
     if not low < high:
-        raise ParameterError(f"{name} = {quoted(text)}: the first value must be below the second")
+        raise ParameterError(
+            f"{name} = {quoted(text)}: the first value must be below the second",
+            name=name,
+            value=quoted(text),
+        )
     between = np.geomspace if logarithmic else np.linspace
     return [float(value) for value in between(low, high, count)]
 
@@ -172,7 +184,12 @@ def range_of(
     """
     name, equals, values = (part.strip() for part in text.partition("="))
     if not equals:
-        raise ParameterError(f"{option(argument)} {text}: write NAME=LOW:HIGH:COUNT")
+        raise ParameterError(
+            f"{option(argument)} {text}: write NAME=LOW:HIGH:COUNT",
+            name=option(argument),
+            value=text,
+            valid="NAME=LOW:HIGH:COUNT",
+        )
     if name in ("at", quantity.name):
         return quantity.name, quantity.unit, spread(values, quantity.unit, quantity.name)
     if name not in par.leaves():

@@ -96,9 +96,11 @@ def write_package(name: str, folder: Path) -> Path:
     package = module_name(name)
     target = folder / name
     if target.exists() or target.is_symlink():
-        raise FileError(f"{target} exists already: choose another name, or another folder")
+        raise FileError(
+            f"{target} already exists: choose another name, or another folder", name=str(target)
+        )
     if folder.exists() and not folder.is_dir():
-        raise FileError(f"{folder} is no folder: choose another one")
+        raise FileError(f"{folder} is not a folder: choose another one", name=str(folder))
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with scratch_folder(folder) as scratch:
@@ -110,7 +112,8 @@ def write_package(name: str, folder: Path) -> Path:
     except OSError as error:
         raise FileError(
             f"{target} cannot be written: {error.strerror or error}: make room there, or choose "
-            "another folder"
+            "another folder",
+            name=str(target),
         ) from None
     return target
 
@@ -133,7 +136,7 @@ def module_name(name: str) -> str:
     if not _ALLOWED.fullmatch(name):
         reason = "small letters and digits are wanted, with single dashes between, a letter first"
     elif len(name) > _LONGEST:
-        reason = f"at most {_LONGEST} characters are wanted"
+        reason = f"a name has at most {_LONGEST} characters"
     elif keyword.iskeyword(package) or keyword.issoftkeyword(package):
         reason = f"{package} is a word of Python"
     elif package in sys.stdlib_module_names:
@@ -144,7 +147,10 @@ def module_name(name: str) -> str:
         reason = f"a module {package} is installed already"
     if reason:
         raise ParameterError(
-            f"{quoted(name)} cannot name a new brake: {reason}; front-caliper, for instance, can"
+            f"{quoted(name)} cannot be the name of a new brake: {reason}; choose one such as "
+            "front-caliper",
+            name="name",
+            value=quoted(name),
         )
     return package
 

@@ -29,7 +29,9 @@ def set_for(subject: str, assembly: str, name: str) -> CitedSet:
     if cited.assembly != assembly:
         raise ParameterError(
             f"{subject} is for a {assembly}, but parameter set {cited.name!r} is for a "
-            f"{cited.assembly}"
+            f"{cited.assembly}",
+            name="parameters",
+            value=cited.name,
         )
     return cited
 

@@ -61,12 +61,16 @@ def require_scene(bench: Bench, over: str = "") -> None:
     assembly, known = bench.definition.assembly, SCENES.all()
     if assembly not in known:
         raise ParameterError(
-            f"{bench.experiment}: runs of {assembly} have no animation, those of "
-            f"{' and '.join(known)} have: leave animate out, or declare a SceneKind in a module "
-            "'animations' of the brake"
+            f"{bench.experiment}: runs of {assembly} have no animation, only those of "
+            f"{' and '.join(known)}: leave animate out, or declare a SceneKind in a module "
+            "'animations' of the brake",
+            name="animate",
+            valid=", ".join(known),
         )
     if over:
-        raise ParameterError("an animation shows single runs: leave either animate or over out")
+        raise ParameterError(
+            "an animation shows single runs: leave out animate or over", name="animate"
+        )
 
 
 def _playable(result: Result) -> list[str]:

@@ -310,13 +310,18 @@ def run_over(
     name, equals, text = (part.strip() for part in over.partition("="))
     if not equals:
         raise ParameterError(
-            f"over {over!r}: write NAME=LOW:HIGH:COUNT, for instance motor.R_m=0.2ohm:0.6ohm:9"
+            f"over {over!r}: write NAME=LOW:HIGH:COUNT, for instance motor.R_m=0.2ohm:0.6ohm:9",
+            name="over",
+            value=repr(over),
+            valid="NAME=LOW:HIGH:COUNT",
         )
     leaf = varied_leaf(bench, name)
     bench.require_effect(name)
     values = spread(text, leaf.unit.symbol, name)
     if len({*values}) < 2:
-        raise ParameterError(f"over {over!r}: name two different values at least")
+        raise ParameterError(
+            f"over {over!r}: give at least two different values", name="over", value=repr(over)
+        )
     benches = [changed(bench, {name: value}) for value in values]
     results = run_benches(benches, progress, engine, estimate_error=estimate_error)
     return BenchRange(bench, name, leaf.unit.symbol, tuple(values), results)

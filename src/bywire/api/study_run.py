@@ -44,7 +44,7 @@ from bywire.bench.running import Result
 from bywire.core.brake import loaded_files
 from bywire.core.callers import is_command_line
 from bywire.core.errors import FileError, InputError, ParameterError, unknown_name
-from bywire.core.field_notes import field_notes
+from bywire.core.parameters import field_notes
 from bywire.core.typing import Progress, silent
 from bywire.core.units import shown
 from bywire.report.answer import Answer
@@ -509,7 +509,9 @@ class StudyRun(Answer):
             raise unknown_name("key figure of a requirement", str(kpi), required)
         if kpi not in self._shown.benches:
             raise ParameterError(
-                f"there is no {self._shown.kind} case by {kpi}: none has a result, or all are alike"
+                f"there is no {self._shown.kind} case of {kpi}: none has a result, or all are "
+                "equal",
+                name=kpi,
             )
         return self._shown.benches[kpi]
 
@@ -674,8 +676,9 @@ def kept_plan(store: StudyStore) -> tuple[StudyPlan, Origin]:
     origin = Origin(Path(said["source"]), said["set"])
     if not origin.file.is_file():
         raise FileError(
-            f"the study file {origin.file} of {store.folder} is gone: run it from where it is now, "
-            f"bywire study run FILE --out {store.folder}"
+            f"the study file {origin.file} of {store.folder} no longer exists: run the study from "
+            f"its new place, bywire study run FILE --out {store.folder}",
+            name=str(origin.file),
         )
     try:
         plan = read_study(origin.file, origin.overrides)

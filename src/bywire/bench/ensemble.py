@@ -33,8 +33,7 @@ from bywire.bench.running import (
 from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, abandoned, steps_of, unestimated
 from bywire.core.arguments import checked
 from bywire.core.errors import InputError, ParameterError, unknown_name
-from bywire.core.leaf import Leaf
-from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
+from bywire.core.parameters import Leaf, ParameterSet, choice_fields, choices_of, leaf_fields
 from bywire.core.typing import Array
 from bywire.simulation import ensemble
 from bywire.simulation.engine import CUDA

@@ -19,7 +19,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.core import units
 from bywire.core.arguments import checked
 from bywire.core.errors import ModelError, StepError, not_valid, quoted
-from bywire.core.machine_memory import machine_memory as _memory
+from bywire.core.machine import machine_memory as _memory
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.quantities import display_unit

@@ -198,7 +198,7 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
     if "file" not in values:
         return dict(values)
     from bywire.data.mapping import mapping_from, signal_mapping  # most benches have no file
-    from bywire.data.trace import read_trace, trace_names
+    from bywire.data.measurement import read_trace, trace_names
 
     keys = ("file", "max_gap", *_FILE, *_CLOCK, *_SIGNAL)
     rest = {key: value for key, value in values.items() if key not in keys}

@@ -68,8 +68,8 @@ def _benchmarks() -> ModuleType:
     clone = Path(__file__).parents[3]
     if not (clone / "benchmarks" / "suite.py").is_file():
         raise InputError(
-            "the benchmarks come with a clone of bywire's repository: run python3 tasks.py demo in "
-            "it, then .venv/bin/bywire benchmark"
+            "the benchmarks are only in a clone of bywire's repository: run python3 tasks.py demo "
+            "there, then .venv/bin/bywire benchmark"
         )
     sys.path.insert(0, str(clone))
     return import_module("benchmarks.suite")
@@ -124,7 +124,7 @@ class StudyGroup(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # types of typer's own click
         """Return the command of the first word; see click."""
         if args and args[0].endswith(".toml"):
-            raise ParameterError(f"a study file is run by 'bywire study run {args[0]}'")
+            raise ParameterError(f"to run a study file, type 'bywire study run {args[0]}'")
         if args and not args[0].startswith("-") and args[0] not in self.commands:
             args = [_SIZE, *args]
         return super().resolve_command(ctx, args)

@@ -123,7 +123,7 @@ def require_unit(value: Any, symbol: str, name: str, nominal: float = 1.0) -> No
     except OverflowError:  # a whole number of 309 digits or more
         return
     if is_plain:
-        units.parse(plain_text(value), symbol, name, nominal)
+        units.parse(_plain_text(value), symbol, name, nominal)
 
 
 class _Unquoted(str):
@@ -135,7 +135,7 @@ class _Unquoted(str):
         return str(self)
 
 
-def plain_text(value: float) -> str:
+def _plain_text(value: float) -> str:
     """Return a plain number of a file as a text, which errors quote as it stands there.
 
     Texts are refused where a unit is missing, and numbers are taken as SI.

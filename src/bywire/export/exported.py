@@ -18,9 +18,7 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.bench.running import run_of
 from bywire.core.errors import BywireError, ParameterError, unknown_name
-from bywire.core.field_notes import field_notes
-from bywire.core.leaf import Leaf
-from bywire.core.parameters import leaf_fields
+from bywire.core.parameters import Leaf, field_notes, leaf_fields
 from bywire.core.signals import ranges_of, signals_of
 from bywire.simulation.emit_single import EXPORTED, emit_single
 from bywire.simulation.engine import prepare
@@ -112,8 +110,10 @@ def cases_of(bench: Bench) -> tuple[Case, ...]:
     cases = bench.cases()
     if not cases:
         raise ParameterError(
-            f"experiment {bench.experiment!r} computes a characteristic without any run, and "
-            "there is nothing to export: take another experiment, for instance 'open-loop'"
+            f"experiment {bench.experiment!r} computes a characteristic without any run, so that "
+            "there is nothing to export: take another experiment, for instance 'open-loop'",
+            name="experiment",
+            value=repr(bench.experiment),
         )
     return cases
 
@@ -139,15 +139,18 @@ def exported(bench: Bench, label: str = "") -> Exported:
         raise unknown_name("run", label, labels)
     if not label and len(cases) > 1:
         raise ParameterError(
-            f"the bench makes {len(cases)} runs, and one is exported: choose it, "
-            f"case = {' or '.join(map(repr, labels))}"
+            f"the bench makes {len(cases)} runs, but only one is exported: choose it, "
+            f"case = {' or '.join(map(repr, labels))}",
+            name="case",
+            valid=", ".join(labels),
         )
     number = labels.index(label) if label else 0
     run = run_of(bench, cases[number], number)
     if run.changes:
         raise ParameterError(
             "parameters of this bench change during the run, which cannot be exported: leave out "
-            "its [[faults]], or export it with the changed parameters"
+            "its [[faults]], or export it with the changed parameters",
+            name="[[faults]]",
         )
     return Exported(bench, number, cases[number], run)
 

@@ -1,1 +1,1 @@
-"""Life: what changes a little with every stop, projected over thousands of them."""
+"""Life of a brake: small changes by every stop, projected over thousands of stops."""

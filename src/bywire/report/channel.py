@@ -62,10 +62,13 @@ def channel(recording: xr.Dataset, name: str) -> Channel:
     if array.dims != ("time",):
         raise ParameterError(
             f"{name} has the dimensions {', '.join(map(str, array.dims)) or 'none'}: a figure "
-            "needs time only; select one case first, for instance recording.isel(case=0)"
+            "needs time only; select one case first, for instance recording.isel(case=0)",
+            name=name,
+            value=", ".join(map(str, array.dims)),
+            valid="time",
         )
     if array.size == 0:
-        raise ParameterError(f"{name} holds no samples: there is nothing to draw")
+        raise ParameterError(f"{name} has no samples: there is nothing to draw", name=name)
     symbol = str(array.attrs.get("units", "1"))
     unit = display_unit(symbol)
     return Channel(

@@ -34,8 +34,8 @@ from matplotlib.text import Text
 
 from bywire.core.copies import may_copy, processes
 from bywire.core.errors import FileError
+from bywire.core.machine import worker_count
 from bywire.core.scratch import replacing
-from bywire.core.workers import worker_count
 from bywire.report.document import Picture
 from bywire.report.wording import clean
 
@@ -312,7 +312,7 @@ def figure_bytes(figure: Figure | Picture, kind: str = "png") -> bytes:
         For any other kind.
     """
     if kind not in _KINDS:
-        raise FileError(f"figures are written as .png or .svg, not as {kind!r}: change the ending")
+        raise FileError(f"figures are not written as {kind!r}: change the ending to .png or .svg")
     if isinstance(figure, Picture):
         return figure.png if kind == "png" else figure.svg
     if figure.stale or figure not in _drawn:

@@ -105,7 +105,7 @@ def ledger_bars(books: Ledger) -> Figure:
     given, taken = _sides(books)
     total = max(sum(e.energy for e in given), sum(e.energy for e in taken))
     if not total > 0:
-        raise ParameterError("energy_balance: the recording turned over no energy")
+        raise ParameterError("energy_balance: no energy flows in the recording")
     figure, (axes,) = style.new_figure(2.9)
     _stack(axes, 1.0, _gathered(given, total), total)
     _stack(axes, 0.0, _gathered(taken, total), total)

@@ -170,7 +170,9 @@ def stribeck_curve(
     array = curve[friction]
     if array.ndim != 2 or array.size == 0:
         raise ParameterError(
-            f"{friction} has the shape {array.shape}: a Stribeck curve needs a level and a speed"
+            f"{friction} has the shape {array.shape}: a Stribeck curve needs a level and a speed",
+            name=friction,
+            value=str(array.shape),
         )
     level, speed = (array[name] for name in array.dims)
     unit = str(level.attrs.get("units", "1"))

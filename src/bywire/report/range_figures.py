@@ -166,7 +166,10 @@ def contour(data: xr.Dataset, shown: Map) -> Figure:
     z = _displayed(data[shown.values].transpose(shown.y, shown.x))
     known = z[np.isfinite(z)]
     if not known.size:
-        raise ParameterError(f"contour: {shown.values} holds no number: there is nothing to draw")
+        raise ParameterError(
+            f"contour: {shown.values} contains no number: there is nothing to draw",
+            name=shown.values,
+        )
     figure, (axes,) = style.new_figure(4.4)
     levels = levels_between(float(known.min()), float(known.max()))
     colors = mpl.colormaps["viridis_r"]

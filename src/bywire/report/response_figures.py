@@ -52,12 +52,17 @@ class Response:
         if np.shape(self.frequency) != np.shape(self.value):
             raise ParameterError(
                 f"response {self.label!r} has {np.size(self.value)} values for "
-                f"{np.size(self.frequency)} frequencies: give one per frequency"
+                f"{np.size(self.frequency)} frequencies: give one per frequency",
+                name=self.label,
+                value=str(np.size(self.value)),
+                valid=str(np.size(self.frequency)),
             )
         if not bool(np.all(np.asarray(self.frequency) > 0)):
             raise ParameterError(
                 f"response {self.label!r} has a frequency that is not above 0 Hz: "
-                "a logarithmic axis cannot show it"
+                "a logarithmic axis cannot show it",
+                name=self.label,
+                valid="above 0 Hz",
             )
 
     @property

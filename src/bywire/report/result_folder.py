@@ -49,7 +49,8 @@ class ResultFolder:
             if (self.folder / name).is_dir():
                 raise FileError(
                     f"cannot write {self.folder / name}: there is a folder of that name: remove "
-                    "it, or name another folder for the result"
+                    "it, or name another folder for the result",
+                    name=str(self.folder / name),
                 )
         old = earlier_files(self.folder)
         marker = self.scratch / UNFINISHED
@@ -78,7 +79,9 @@ def result_folder(folder: Path) -> Iterator[ResultFolder]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise FileError(f"cannot make the output folder {folder}: {reason}") from None
+        raise FileError(
+            f"cannot make the output folder {folder}: {reason}", name=str(folder)
+        ) from None
     try:
         with scratch_folder(folder) as scratch:
             place = ResultFolder(folder, scratch)
@@ -96,7 +99,8 @@ def result_folder(folder: Path) -> Iterator[ResultFolder]:
         reason = error.strerror or str(error)
         raise FileError(
             f"cannot write the result to {folder}: {reason}: make room there, or name another "
-            "folder"
+            "folder",
+            name=str(folder),
         ) from None
 
 

@@ -53,7 +53,9 @@ class StepLimits:
     def __post_init__(self) -> None:
         if self.before == self.after:
             raise ParameterError(
-                f"StepLimits: before and after are both {self.after:g}: that is no step"
+                f"StepLimits: before and after are both {self.after:g}: they must differ",
+                name="after",
+                value=f"{self.after:g}",
             )
 
     def level(self, share: float) -> float:
@@ -296,8 +298,11 @@ def tracking(recording: xr.Dataset, variable: str, set_point: str) -> Figure:
     shown, wanted = channel(recording, variable), channel(recording, set_point)
     if shown.unit != wanted.unit:
         raise ParameterError(
-            f"{variable} is in {shown.unit} and {set_point} in {wanted.unit}: name a set point "
-            f"of {variable}"
+            f"{variable} is in {shown.unit} but {set_point} in {wanted.unit}: name a set point "
+            f"of {variable}",
+            name=set_point,
+            value=wanted.unit,
+            valid=shown.unit,
         )
     error = replace(shown, label="set point less value", values=wanted.values - shown.values)
     figure, (upper, lower) = style.new_figure(4.6, (2.0, 1.0))

@@ -255,7 +255,10 @@ def _draw_traces(
         if shown.unit != first.unit:
             raise ParameterError(
                 f"panel {panel.quantity!r}: {shown.name} is in {shown.unit}, {first.name} in "
-                f"{first.unit}; put them into two panels"
+                f"{first.unit}; put them into two panels",
+                name=shown.name,
+                value=shown.unit,
+                valid=first.unit,
             )
         if measured is None or trace.role is Role.SET_POINT:
             style.draw_channel(axes, shown, trace.role)
@@ -515,7 +518,7 @@ def overlaid_panels(
     if not present:
         raise ParameterError(
             f"the {len(recordings)} recordings share no signal over time that moves: there is "
-            "nothing to lay on top of each other"
+            "nothing to overlay"
         )
     looks = _looks(list(recordings), scale, skipped)
     heights = [panel.height for panel, _ in present]

@@ -94,7 +94,7 @@ class Request:
         except (ValueError, RecursionError):
             said = None
         if not isinstance(said, dict):
-            raise RefusedError(400, "the form is no JSON object: use the page's button")
+            raise RefusedError(400, "the form is not a JSON object: use the page's button")
         return said
 
     def require_length(self, most: int, what: str) -> None:
@@ -110,8 +110,9 @@ class Request:
         if self.length > most:
             raise RefusedError(
                 413,
-                f"{what} of {self.length / 1e6:,.1f} MB, and {most / 1e6:,.1f} MB are taken: copy "
-                "it into the folder that is served, or make it smaller with 'bywire convert'",
+                f"{what} of {self.length / 1e6:,.1f} MB is too large (at most "
+                f"{most / 1e6:,.1f} MB): copy it into the served folder, or make it smaller with "
+                "'bywire convert'",
             )
 
 

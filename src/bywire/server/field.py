@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bywire.bench.bench_file import PATHS
-from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.core.errors import ParameterError, not_valid, quoted, unknown_name
 from bywire.core.pairs import changes, named, read_count
 from bywire.server.contents import Contents
 from bywire.server.place import Place, require_inside
@@ -66,17 +66,14 @@ class Field:
         """
         if self.kind == "flag":
             if not isinstance(given, (bool, type(None))):
-                raise ParameterError(f"{self.name} = {quoted(given)}: true or false is wanted")
+                raise not_valid(self.name, quoted(given), "true or false")
             return bool(self.default) if given is None else given
         text = "" if given is None else given
         if not isinstance(text, str) or len(text) > _LONGEST or "\0" in text:
-            raise ParameterError(
-                f"{self.name} = {quoted(given)}: a text of at most {_LONGEST:,} characters is "
-                "wanted"
-            )
+            raise not_valid(self.name, quoted(given), f"a text of at most {_LONGEST:,} characters")
         lines = [line.strip() for line in text.splitlines() if line.strip()]
         if self.is_required and not lines:
-            raise ParameterError(f"{self.label} is missing: fill it in")
+            raise ParameterError(f"{self.label} is missing: fill it in", name=self.label)
         return self._checked(lines, text.strip(), place)
 
     def _checked(self, lines: list[str], text: str, place: Place) -> Any:
@@ -110,9 +107,7 @@ class Field:
             return self.default
         number = read_count(text)
         if number is None or number < self.least:
-            raise ParameterError(
-                f"{self.label} = {quoted(text)}: a whole number from {self.least} on is wanted"
-            )
+            raise not_valid(self.label, quoted(text), f"a whole number >= {self.least}")
         return number
 
     def _thing(self, text: str, place: Place) -> str:

@@ -48,10 +48,14 @@ def require_place(method: str, headers: Message, port: int) -> None:
         )
     origin = headers.get("Origin")
     if origin is not None and origin != f"http://{host}":
-        raise RefusedError(403, "a page of another site asked: use the pages of this server")
+        raise RefusedError(
+            403, "another site's page sent this request: use the pages of this server"
+        )
     is_visit = method in ("GET", "HEAD") and headers.get("Sec-Fetch-Mode") == "navigate"
     if headers.get("Sec-Fetch-Site", "none") not in _HERE and not is_visit:
-        raise RefusedError(403, "a page of another site asked: use the pages of this server")
+        raise RefusedError(
+            403, "another site's page sent this request: use the pages of this server"
+        )
 
 
 def require_token(headers: Message, query: Mapping[str, str], port: int, token: str) -> None:

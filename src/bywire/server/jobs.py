@@ -140,14 +140,14 @@ class Jobs:
         with self._lock:
             active = [each for each in self._jobs.values() if each.state not in _ENDED]
             if not self._is_open:
-                raise RefusedError(503, "the server is ending")
+                raise RefusedError(503, "the server is shutting down")
             if len(active) >= MOST:
-                raise RefusedError(429, f"{MOST} jobs wait already: cancel some, or wait")
+                raise RefusedError(429, f"{MOST} jobs are already waiting: cancel some, or wait")
             same = [each.out for each in active if each.task is task and each.asked == asked]
             out = out or (same[0] if task.case.holds and same else self._folder(task, asked))
             if any(each.out == out for each in active):
                 raise RefusedError(
-                    409, f"{task.said_of(asked)} is being computed: wait, or cancel it"
+                    409, f"{task.said_of(asked)} is already being computed: wait, or cancel it"
                 )
             job = Job(max(self._jobs, default=0) + 1, task, asked, out)
             self._jobs[job.number] = job

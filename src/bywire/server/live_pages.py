@@ -93,7 +93,7 @@ def experiments() -> dict[str, str]:
     try:
         every: dict[str, str] = dict(overview().things["experiments"])
     except OSError as error:
-        raise FileError(f"experiments cannot be listed: {error}") from None
+        raise FileError(f"cannot list experiments: {error}") from None
     return every
 
 

@@ -106,7 +106,9 @@ class Place:
             except OSError as error:
                 raise _unwritable(folder, error) from None
             return folder
-        raise FileError(f"{parent} holds 9,999 results of {stem}: move them elsewhere")
+        raise FileError(
+            f"{parent} contains 9,999 results of {stem}: move them elsewhere", name=str(parent)
+        )
 
     def same_folder(self, name: str) -> Path:
         """Return the one folder of a file's result that is gone on with."""
@@ -152,7 +154,10 @@ class Place:
             names = (each for each in (plain.name, *numbered) if each.casefold() not in taken)
             path = claim(fresh, (parent / each for each in names))
         if path is None:
-            raise FileError(f"{parent} holds 9,999 files named {plain.name}: move them elsewhere")
+            raise FileError(
+                f"{parent} contains 9,999 files named {plain.name}: move them elsewhere",
+                name=str(parent),
+            )
         return path
 
     def _made(self, name: str) -> Path:
@@ -213,8 +218,9 @@ def place_of(folder: Path) -> Place:
     """
     if not folder.is_dir():
         raise FileError(
-            f"{folder} is no folder: name the one to serve with "
-            f"{'--folder' if is_command_line() else 'folder'}"
+            f"{folder} is not a folder: name the one to serve with "
+            f"{'--folder' if is_command_line() else 'folder'}",
+            name=str(folder),
         )
     return Place(folder.resolve())
 

@@ -40,7 +40,7 @@ def uploaded(place: Place, request: Request, name: str, largest: int) -> Path:
     if Path(safe_name(name)).suffix.lower() not in endings():
         raise RefusedError(
             415,
-            f"{name[:100]!r} has the ending of no measurement format: known are "
+            f"{name[:100]!r} does not have the ending of a measurement format: known are "
             f"{', '.join(endings())}",
         )
     request.require_length(largest, "a measurement")
@@ -112,7 +112,7 @@ def answer(service: Service, request: Request) -> Reply:
             if first == "/" and request.path != "/":
                 continue
             return route[method](service, request, request.path.removeprefix(first))
-    raise RefusedError(404, f"there is no page {quoted(request.path)}: the start page leads to all")
+    raise RefusedError(404, f"there is no page {quoted(request.path)}: begin at the start page")
 
 
 def _index(service: Service, request: Request, rest: str) -> Reply:
@@ -154,7 +154,9 @@ def _study(service: Service, request: Request, rest: str) -> Reply:
     name, there = _subject(request), contents(service.place)
     service.place.file(name)
     if name not in there.studies:
-        raise ParameterError(f"{name} is no study file: it has no bench and section [vary]")
+        raise ParameterError(
+            f"{name} is not a study file: it has no bench and no section [vary]", name=name
+        )
     folder = f"{RESULTS}/{folder_name(name)}"
     said = how_far(service.place.root / folder)
     text = study_page(
@@ -212,7 +214,7 @@ def _job(service: Service, request: Request, rest: str) -> Reply:
 def _cancel(service: Service, request: Request, rest: str) -> Reply:
     number, slash, word = rest.partition("/")
     if not slash or word != "cancel":
-        raise RefusedError(404, f"there is no {quoted(request.path)}: jobs take /cancel")
+        raise RefusedError(404, f"there is no {quoted(request.path)}: jobs only have /cancel")
     job = service.jobs.find(number)
     service.jobs.cancel(job)
     return plain(job.shown(service.place))

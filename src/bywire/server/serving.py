@@ -25,7 +25,14 @@ from urllib.parse import parse_qsl, quote, unquote, urlsplit
 from bywire.core.arguments import checked
 from bywire.core.callers import is_command_line
 from bywire.core.clean_text import shortened
-from bywire.core.errors import BywireError, FileError, ParameterError, quoted, unknown_name
+from bywire.core.errors import (
+    BywireError,
+    FileError,
+    ParameterError,
+    not_valid,
+    quoted,
+    unknown_name,
+)
 from bywire.core.version import __version__
 from bywire.server import guard
 from bywire.server.address import HERE, PORT
@@ -290,7 +297,7 @@ def opened(
     """
     place, bench = _asked(str(subject), str(folder))
     if not 0 <= port < 65536:
-        raise ParameterError(f"{_flag('port')} {port} is not valid: it must be 0 to 65535")
+        raise not_valid(_flag("port"), f"{port}", "0 to 65535")
     try:
         handler = type("FolderHandler", (Handler,), {})
         server = _Server((HERE, port), handler)
@@ -378,8 +385,10 @@ def _asked(subject: str, folder: str) -> tuple[Place, str]:
     if subject and Path(subject).is_dir():
         if folder and Path(folder).resolve() != Path(subject).resolve():
             raise ParameterError(
-                f"{subject} and {_flag('folder')} {folder} are two folders, and but one is "
-                f"served, with all below it: bywire serve {subject}, or bywire serve {folder}"
+                f"{subject} and {_flag('folder')} {folder} are two folders, but only one is "
+                f"served, with all below it: bywire serve {subject}, or bywire serve {folder}",
+                name=_flag("folder"),
+                value=str(folder),
             )
         return place_of(Path(subject)), ""
     if not is_file_name(subject):
@@ -388,11 +397,16 @@ def _asked(subject: str, folder: str) -> tuple[Place, str]:
         return place_of(Path(folder or ".")), subject
     file = Path(subject).resolve()
     if not file.is_file():
-        raise FileError(f"{subject} is no file: name a bench file, an experiment or a folder")
+        raise FileError(
+            f"{subject} does not exist: name a bench file, an experiment or a folder",
+            name=str(subject),
+        )
     place = place_of(Path(folder) if folder else file.parent)
     if not file.is_relative_to(place.root):
         raise FileError(
-            f"{subject} is not in {place.root}: name the folder of both with {_flag('folder')}"
+            f"{subject} is not in {place.root}: name a folder that contains both with "
+            f"{_flag('folder')}",
+            name=str(subject),
         )
     return place, place.named(file)
 

@@ -17,7 +17,7 @@ import scipy
 from numpy.typing import NDArray
 from scipy import special
 
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, not_valid
 from bywire.core.typing import Array
 from bywire.data.file_format import library
 from bywire.studies.distribution import TAIL, Distribution, normal_quantile
@@ -143,7 +143,9 @@ def spanned(
     if kind == "corners" and len(distributions) > _CORNERS:
         raise ParameterError(
             f"[design] corners of {len(distributions)} quantities are too many (at most "
-            f"{_CORNERS}): take 'latin-hypercube', or 'one-at-a-time' to see which matter"
+            f"{_CORNERS}): take 'latin-hypercube', or 'one-at-a-time' to see which matter",
+            name="[design] kind",
+            value=kind,
         )
     each = [d.levels(2 if kind == "corners" else levels) for d in distributions]
     if kind == "one-at-a-time":
@@ -157,7 +159,9 @@ def spanned(
         if count > MOST:
             raise ParameterError(
                 f"[design] a grid of {count:.3g} cases is too large (at most {MOST:.0e}): take "
-                "fewer levels, or 'latin-hypercube'"
+                "fewer levels, or 'latin-hypercube'",
+                name="[design] kind",
+                value=kind,
             )
         rows = [list(row) for row in product(*each)]
     rows.insert(0, list(nominal))
@@ -228,12 +232,14 @@ class SensitivityDesign:
         """
         groups, least = self.budget // self.group, _LEAST[self.kind]
         if groups < least:
-            raise ParameterError(
-                f"[design] cases = {self.budget} is too few: {self.kind!r} of {self.quantities} "
-                f"quantities needs at least {least * self.group} ({least} groups of {self.group})"
+            raise not_valid(
+                "[design] cases",
+                f"{self.budget}",
+                f">= {least * self.group}",
+                f"{least} groups of {self.group} for {self.kind!r} of {self.quantities} quantities",
             )
         if self.budget > MOST:
-            raise ParameterError(f"[design] cases = {self.budget} is too many (at most {MOST:.0e})")
+            raise not_valid("[design] cases", f"{self.budget}", f"<= {MOST:.0e}")
         # Even points are even only in powers of two.
         return 1 << (groups.bit_length() - 1) if self.kind == "sobol-indices" else groups
 
@@ -387,12 +393,12 @@ class SoughtDesign:
             library("openturns", *OPENTURNS)
         least = {SUBSET: self.level, IMPORTANCE: _WHOLE}.get(self.kind, self.together)
         if self.budget < least:
-            raise ParameterError(
-                f"[design] cases = {self.budget} is too few: {self.kind!r} needs at least {least} "
-                + ("(one level of cases_per_level)" if self.kind == SUBSET else "")
+            level = ", one level of cases_per_level" if self.kind == SUBSET else ""
+            raise not_valid(
+                "[design] cases", f"{self.budget}", f">= {least}", f"for {self.kind!r}{level}"
             )
         if self.budget > MOST:
-            raise ParameterError(f"[design] cases = {self.budget} is too many (at most {MOST:.0e})")
+            raise not_valid("[design] cases", f"{self.budget}", f"<= {MOST:.0e}")
 
 
 def population(quantities: int) -> int:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy import special
 
 from bywire.bench.changes import refuse_share_of_temperature, share_of
-from bywire.core.errors import ParameterError, quoted, unknown_name
-from bywire.core.leaf import Leaf
+from bywire.core.errors import ParameterError, not_valid, quoted, unknown_name
+from bywire.core.parameters import Leaf
 from bywire.core.quantities import Unit
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, parse, shown
@@ -306,13 +306,19 @@ def read_choice(name: str, entry: Any, admitted: Sequence[Any]) -> Distribution:
         raise ParameterError(
             f"[vary] {name} = {quoted(entry)}: a choice varies among values, "
             f"{{ kind = '{DISCRETE}', values = [...] }}"
-            + (f", of {', '.join(map(repr, texts))}" if texts else "")
+            + (f", of {', '.join(map(repr, texts))}" if texts else ""),
+            name=f"[vary] {name}",
+            value=quoted(entry),
+            valid=", ".join(map(repr, texts)),
         )
     for key in entry.keys() - {*KEYS, "kind", "together"}:
         raise unknown_name(f"key of [vary] {name} (a choice)", key, (*KEYS, "kind"))
     if entry.get("kind", DISCRETE) != DISCRETE:
         raise ParameterError(
-            f"[vary] {name} is a choice: its kind is '{DISCRETE}', not {quoted(entry['kind'])}"
+            f"[vary] {name} is a choice: its kind is '{DISCRETE}', not {quoted(entry['kind'])}",
+            name=f"[vary] {name}",
+            value=quoted(entry["kind"]),
+            valid=f"'{DISCRETE}'",
         )
     given = list(map(choice_text, values))
     for text in given:
@@ -351,14 +357,18 @@ def require_several(where: str, values: Sequence[Any], shown: Sequence[str]) -> 
     """
     if len(values) == 1:
         raise ParameterError(
-            f"{where} has one value alone, {shown[0]}: nothing varies; name two at least, or "
-            "give it this value in [set]"
+            f"{where} has only one value, {shown[0]}, so nothing varies: list at least two, or "
+            "set this value in [set]",
+            name=where,
+            value=shown[0],
         )
     for value, text in zip(values, shown, strict=True):
         if values.count(value) > 1:
             raise ParameterError(
-                f"{where}: the value {text} stands there twice: name it once; weights = "
-                "[...] say how often each comes"
+                f"{where} lists the value {text} twice: list it once, and give its frequency by "
+                "weights = [...]",
+                name=where,
+                value=text,
             )
 
 
@@ -416,9 +426,7 @@ def weights_of(where: str, section: Mapping[str, Any], count: int) -> Array:
     is_listed = isinstance(given, list) and all(type(each) in (int, float) for each in given)
     weights = np.array(given if is_listed else [], dtype=float)
     if weights.shape != (count,) or not (weights > 0).all() or not np.isfinite(weights).all():
-        raise ParameterError(
-            f"{where}.weights = {quoted(given)}: {count} numbers > 0 are wanted, one a value"
-        )
+        raise not_valid(f"{where}.weights", quoted(given), f"{count} numbers > 0, one per value")
     shares = weights / weights.max()  # whose sum is finite
     return np.asarray(shares / shares.sum())
 
@@ -462,12 +470,15 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
         return made
     assert made.below is not None
     assert made.above is not None
-    wanted, advice = leaf.range_text, advice or _NEXT[made.kind]
+    valid, advice = leaf.range_text, advice or _NEXT[made.kind]
     beyond = made.below(leaf.low) + made.above(leaf.high)
     if beyond > NEVER:
         often = f", with a probability of {beyond:.2g}" if beyond < 1.0 else ""
         raise ParameterError(
-            f"{where}: {made.text} leaves the valid range, {wanted}{often}: {advice}"
+            f"{where}: {made.text} leaves the valid range, {valid}{often}: {advice}",
+            name=where,
+            value=made.text,
+            valid=valid,
         )
     low, high = (_at_limit(end, leaf, made.high - made.low) for end in (made.low, made.high))
     if made.kind == "normal":
@@ -477,7 +488,10 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
         if math.isfinite(end) and not leaf.admits(end):
             raise ParameterError(
                 f"{where}: {made.text}: its end at {shown(end, leaf.unit.symbol)} is not "
-                f"valid: it must be {wanted}; {advice}"
+                f"valid: it must be {valid}; {advice}",
+                name=where,
+                value=shown(end, leaf.unit.symbol),
+                valid=valid,
             )
     return replace(made, low=low, high=high)
 
@@ -502,8 +516,11 @@ def _require_single_values(where: str, kind: str, leaf: Leaf, nominal: float) ->
     near = [x for x in (nominal - 1.0, nominal, nominal + 1.0) if leaf.admits(x)]
     raise ParameterError(
         f"{where} is a whole number, {leaf.range_text}, and kind {kind!r} has values in between: "
-        f"vary it by kind = '{DISCRETE}', values = [{', '.join(f'{x:g}' for x in near)}] for "
-        "instance"
+        f"vary it for instance by kind = '{DISCRETE}', values = "
+        f"[{', '.join(f'{x:g}' for x in near)}]",
+        name=where,
+        value=kind,
+        valid=f"'{DISCRETE}'",
     )
 
 
@@ -519,9 +536,8 @@ def whole(where: str, values: Sequence[float], leaf: Leaf) -> list[float]:
         return list(values)
     for value in values:
         if not math.isfinite(value) or abs(value - round(value)) > _ROUNDING * abs(value):
-            raise ParameterError(
-                f"{where}.values: {value:.10g} is not valid: it must be a whole number, "
-                f"{leaf.range_text}"
+            raise not_valid(
+                f"{where}.values", f"{value:.10g}", f"a whole number, {leaf.range_text}"
             )
     return [float(round(value)) for value in values]
 
@@ -556,7 +572,10 @@ def _require_singles(where: str, values: Sequence[float], leaf: Leaf) -> None:
         texts = [", ".join(shown(x, leaf.unit.symbol) for x in each) for each in (values, beyond)]
         raise ParameterError(
             f"{where}: one of {texts[0]} leaves the valid range, {leaf.range_text}: leave out "
-            f"{texts[1]}"
+            f"{texts[1]}",
+            name=where,
+            value=texts[1],
+            valid=leaf.range_text,
         )
 
 
@@ -604,7 +623,9 @@ def read_distribution(
     if not isinstance(entry, Mapping):
         raise ParameterError(
             f"{title} {name} = {quoted(entry)}: write a tolerance such as '+-5 %', or a section "
-            "such as { kind = 'normal', sd = '5 %' }"
+            "such as { kind = 'normal', sd = '5 %' }",
+            name=f"{title} {name}",
+            value=quoted(entry),
         )
     if "kind" not in entry:
         raise _without_kind(f"{title} {name}", entry, leaf)
@@ -620,8 +641,10 @@ def read_distribution(
     first, *_, last = made.levels(2)
     if not made.singles and not first < last:
         raise ParameterError(
-            f"{title} {name}: {made.text}: it is no wider than the last digit of a number, and "
-            "nothing varies: give it a larger width"
+            f"{title} {name}: {made.text} is not wider than the last digit of a number, so "
+            "nothing varies: give it a larger width",
+            name=f"{title} {name}",
+            value=made.text,
         )
     return admitted(f"{title} {name}", made, leaf, advice)
 
@@ -665,10 +688,8 @@ class _Entry:
         else:
             width = self._number(key, text, difference_unit(self.leaf.unit.symbol))
         if not width > 0.0 or not math.isfinite(width):
-            raise ParameterError(
-                f"{self.where}.{key} = {quoted(text)}: a width > 0 is wanted"
-                + ("; a share of 0 is none: give an amount" if not of else "")
-            )
+            advice = "" if of else "given as an amount: a share of 0 is 0"
+            raise not_valid(f"{self.where}.{key}", quoted(text), "a width > 0", advice)
         return width
 
     def amount(self, value: float) -> str:
@@ -680,7 +701,9 @@ class _Entry:
 
     def _given(self, key: str) -> Any:
         if key not in self.section:
-            raise ParameterError(f"{self.where} of kind {self.section['kind']} needs {key!r}")
+            raise ParameterError(
+                f"{self.where} of kind {self.section['kind']} needs {key!r}", name=key
+            )
         return self.section[key]
 
     def breadth(self, value: float) -> str:
@@ -694,7 +717,7 @@ class _Entry:
 
     def refused(self, why: str) -> ParameterError:
         """Return the error of a section that contradicts itself."""
-        return ParameterError(f"{self.where} (kind {self.section['kind']}): {why}")
+        return ParameterError(f"{self.where} (kind {self.section['kind']}): {why}", name=self.where)
 
 
 def _frozen(
@@ -739,8 +762,8 @@ def _normal(entry: _Entry) -> Distribution:
     kept = law.sf(low) - law.sf(high) if low > mean else law.cdf(high) - law.cdf(low)
     if kept < NEVER:
         raise entry.refused(
-            f"what lies within low and high has a probability of {kept:.2g} of {text}: nothing of "
-            "it is left; give other ends, or another mean"
+            f"only a probability of {kept:.2g} of {text} lies between low and high, too little to "
+            "draw from: give other ends, or another mean"
         )
     cut = truncated_normal((low - mean) / sd, (high - mean) / sd, mean, sd)
     sides = [
@@ -764,7 +787,7 @@ def _triangular(entry: _Entry) -> Distribution:
     mode = entry.level("mode", entry.nominal)
     ends = f"{entry.amount(low)}, {entry.amount(mode)}, {entry.amount(high)}"
     if not low <= mode <= high or not low < high:
-        raise entry.refused(f"low, mode and high must rise, got {ends}")
+        raise entry.refused(f"low, mode and high must increase, but are {ends}")
     law = Triangular((mode - low) / (high - low), low, high - low)
     return _frozen(entry, law, f"triangular, {ends}", low, high)
 

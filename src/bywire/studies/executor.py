@@ -17,12 +17,11 @@ from typing import Any, Generic, Protocol, TypeVar
 from bywire.cases.runner import as_completed
 from bywire.core.arguments import whole_number
 from bywire.core.brake import load_brakes, loaded_files
-from bywire.core.callers import option
+from bywire.core.callers import heard_warnings, option
 from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.errors import ParameterError, RunError
-from bywire.core.heard_warnings import heard_warnings
-from bywire.core.unneeded import allow_dask
-from bywire.core.workers import worker_count
+from bywire.core.libraries import allow_dask
+from bywire.core.machine import worker_count
 from bywire.data.file_format import library
 from bywire.simulation.engine import CUDA
 from bywire.studies.plan import StudyPlan
@@ -161,7 +160,7 @@ def _client(address: str) -> Iterator[Any]:
     except (OSError, ValueError, TimeoutError) as error:
         raise RunError(
             f"no cluster answers at {address!r} ({error}): start one with 'dask scheduler' and "
-            "'dask worker', and give the address that the scheduler says"
+            "'dask worker', and give the address that the scheduler prints"
         ) from None
     log = logging.getLogger("distributed.client")  # it would print how a connection is lost
     before = log.level
@@ -342,10 +341,14 @@ def require_workers(workers: int | None, cluster: str, engine: str) -> None:
     if engine == CUDA and (workers is not None or cluster):
         raise ParameterError(
             "engine = 'cuda' computes all cases on one graphics processor: leave out "
-            f"{option('cluster' if cluster else 'workers')}"
+            f"{option('cluster' if cluster else 'workers')}",
+            name=option("cluster" if cluster else "workers"),
         )
     if cluster and workers is not None:
-        raise ParameterError("workers of a cluster are the cluster's own: leave one out")
+        raise ParameterError(
+            f"a cluster has its own workers: leave out {option('workers')} or {option('cluster')}",
+            name=option("workers"),
+        )
 
 
 # What a process of a pool computes: given once, and not with every job.

@@ -376,7 +376,10 @@ class Findings:
         known, design = self._sensitivities, self.plan.sensitivity
         if design is None:
             raise ParameterError(
-                f"a study of {self.plan.design!r} has no indices: 'sobol-indices' and 'morris' have"
+                f"a study of {self.plan.design!r} has no indices: take 'sobol-indices' or 'morris'",
+                name="[design] kind",
+                value=self.plan.design,
+                valid="'sobol-indices', 'morris'",
             )
         if name not in known:
             names = [v.name for v in self.plan.varied]

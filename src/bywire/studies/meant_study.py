@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from bywire.core.errors import FileError
-from bywire.data.file_kinds import STUDY, first_there, kind_of_file, near_files
+from bywire.data.toml_file import STUDY, first_there, kind_of_file, near_files
 
 _FOLDER = Path("studies")  # where study files usually are
 _NEAR = 0.8  # resemblance of a study file that was meant
@@ -26,7 +26,7 @@ def require_study_file(file: Path) -> None:
     if meant is None and os.path.exists(file):
         return  # whoever reads it says what it is
     advice = "check the path" if meant is None else f"did you mean {meant}?"
-    raise FileError(f"cannot read study file {file}: there is none: {advice}")
+    raise FileError(f"the study file {file} does not exist: {advice}", name=str(file))
 
 
 def meant_study(file: Path) -> Path | None:
@@ -66,4 +66,4 @@ def require_no_file(folder: Path) -> None:
         else "name the one that 'bywire study run' has written"
     )
     kind = "study file" if is_study else "file"
-    raise FileError(f"{folder} is a {kind}, and the folder of a study is wanted: {advice}")
+    raise FileError(f"{folder} is a {kind}, not the folder of a study: {advice}", name=str(folder))

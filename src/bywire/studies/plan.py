@@ -78,8 +78,11 @@ def correlation_factor(
         least = float(np.linalg.eigvalsh(matrix)[0])
         told = "; ".join(f"{a}, {b}: {value:g}" for (a, b), value in correlations.items())
         raise ParameterError(
-            f"[[correlation]] {told}: no quantities can be correlated so, for the matrix is not "
-            f"positive definite (least eigenvalue {least:.2g}): take values closer to zero"
+            f"[[correlation]] {told}: no quantities can have these correlations, because their "
+            f"matrix is not positive definite (least eigenvalue {least:.2g}): take values closer "
+            "to zero",
+            name="[[correlation]]",
+            value=told,
         ) from None
 
 

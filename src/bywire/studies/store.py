@@ -454,12 +454,14 @@ class StudyStore(PieceFolder):
         except Exception as error:  # the library raises what it likes of damaged files
             raise FileError(
                 f"{path} is damaged ({type(error).__name__}): '{self.resume_command}' computes it "
-                "again"
+                "again",
+                name=str(path),
             ) from None
         if any(marks.get(key) != value for key, value in self._marks(chunk).items()):
             raise FileError(
-                f"{path} is of another study, or another chunk of this one: "
-                f"'{self.resume_command}' computes it again"
+                f"{path} belongs to another study, or is another chunk of this one: "
+                f"'{self.resume_command}' computes it again",
+                name=str(path),
             )
         return columns
 
@@ -504,8 +506,11 @@ def with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPl
         asked, computed = store.asked_and_computed(plan)
         if cases is not None and cases < computed:
             raise ParameterError(
-                f"cases = {cases}: {store.folder} has {computed} already, and none are taken off: "
-                "name more of them, or another folder"
+                f"cases = {cases}: {store.folder} already has {computed}, and bywire removes none: "
+                "ask for more, or name another folder",
+                name="cases",
+                value=str(cases),
+                valid=f"{computed}",
             )
         extended = replace(plan, cases=max(plan.cases, asked) if cases is None else cases)
         if extended.sought is not None:
@@ -532,6 +537,8 @@ def require_extensible(plan: StudyPlan, cases: int) -> None:
         else "its groups belong together"
     )
     raise ParameterError(
-        f"cases = {cases}: none are added to a study of {plan.design!r}, for {why}: change the "
-        "study file, and run it into another folder"
+        f"cases = {cases}: a study of {plan.design!r} cannot be extended, because {why}: change "
+        "the study file, and run it into another folder",
+        name="cases",
+        value=str(cases),
     )

@@ -16,12 +16,11 @@ from bywire.bench.bench import Bench
 from bywire.bench.bench_file import names_experiment
 from bywire.bench.requirements import Limit, read_limit
 from bywire.core.callers import option
-from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
+from bywire.core.errors import InputError, ParameterError, not_valid, quoted, unknown_name
 from bywire.core.quantities import Unit
 from bywire.core.section import Hint, Name, Names, Section, Table
 from bywire.core.units import parse
-from bywire.data.file_kinds import STUDY, require_kind
-from bywire.data.toml_file import read_toml
+from bywire.data.toml_file import STUDY, read_toml, require_kind
 from bywire.studies.designs import (
     DEFAULT_CASES,
     IMPORTANCE,
@@ -89,19 +88,23 @@ def _read_correlations(
     for section in sections:
         pair = section.of
         if len(pair) != 2 or pair[0] == pair[1]:
-            raise ParameterError(f"[[correlation]] of = {quoted(list(pair))}: two names are wanted")
+            raise not_valid("[[correlation]] of", quoted(list(pair)), "two different names")
         for name in pair:
             if name not in names:
                 raise unknown_name("quantity of [[correlation]]", name, names)
             if not names[name].unit:
                 raise ParameterError(
-                    f"[[correlation]] of {pair[0]} and {pair[1]}: {name} is a choice, and what has "
-                    "no order neither rises nor falls with another: leave it out, or make a study "
-                    "for each of its values"
+                    f"[[correlation]] of {pair[0]} and {pair[1]}: {name} is a choice; choices have "
+                    "no order, so that they cannot be correlated: leave it out, or make a study "
+                    "for each of its values",
+                    name=name,
                 )
         first, second = sorted(pair)
         if (first, second) in {**known, **pairs}:
-            raise ParameterError(f"[[correlation]] of {first} and {second} stands there twice")
+            raise ParameterError(
+                f"[[correlation]] of {first} and {second} is given twice: leave one out",
+                name=f"{first}, {second}",
+            )
         pairs[first, second] = section.value
     correlation_factor(list(names), {**known, **pairs})
     return pairs
@@ -137,14 +140,19 @@ def _probability(kpi: str, text: str, given: str) -> float:
     if not _PERCENT.fullmatch(given):  # 0.9 may be a share, or 0.9 %
         example = f"{100.0 * float(given):.10g} %" if _SHARE.fullmatch(given) else _DEMAND
         raise ParameterError(
-            f"requirement {kpi} = {quoted(text)}: behind 'with' stands {quoted(given)}, and a "
-            f"probability in percent is wanted: write for instance 'with {example}'"
+            f"requirement {kpi} = {quoted(text)}: the probability after 'with' must be in percent, "
+            f"not {quoted(given)}: write for instance 'with {example}'",
+            name=kpi,
+            value=quoted(given),
         )
     share = parse(given, "1", f"probability of requirement {kpi}")
     if not 0.0 < share < 1.0:
         raise ParameterError(
-            f"requirement {kpi}: a probability of {given} is not valid: it must lie between 0 "
-            "and 100 %, as 'with 99.9 %'; leave it out where every case has to meet the limit"
+            f"requirement {kpi}: a probability of {given} is not valid: it must be between 0 "
+            "and 100 %, as 'with 99.9 %'; leave it out where every case must meet the limit",
+            name=kpi,
+            value=given,
+            valid="between 0 and 100 %",
         )
     return share
 
@@ -176,29 +184,36 @@ def _require_agreement(plan: StudyPlan) -> None:
             else "goes to the ends of each quantity for itself"
         )
         raise ParameterError(
-            f"[[correlation]]: {plan.design!r} {why}: leave it out, or take {others}"
+            f"[[correlation]]: {plan.design!r} {why}: leave it out, or take {others}",
+            name="[[correlation]]",
+            valid=others,
         )
     if plan.design == MORRIS:
         for each in plan.varied:
             if (count := len(each.distribution.singles)) > LEVELS:
                 raise ParameterError(
-                    f"[vary] {each.name} has {count} values, and {plan.design!r} steps on {LEVELS} "
-                    f"levels: some would never be taken; name {LEVELS} of them, or take "
-                    "'sobol-indices'"
+                    f"[vary] {each.name} has {count} values, but {plan.design!r} takes only "
+                    f"{LEVELS} levels: list {LEVELS} of them, or take 'sobol-indices'",
+                    name=f"[vary] {each.name}",
+                    value=str(count),
+                    valid=str(LEVELS),
                 )
     for demand in plan.demands:
         if demand.probability is not None:
             why = _DEPENDENT if plan.design == "sobol-indices" else "draws nothing"
             raise ParameterError(
                 f"requirement {str(demand)!r}: {plan.design!r} {why}, so that its cases "
-                f"have no probability: take {others}, or leave 'with ...' out: every case then has "
-                "to meet the limit"
+                f"have no probability: take {others}, or leave out 'with ...', so that every case "
+                "must meet the limit",
+                name=demand.figure,
+                value=str(demand),
             )
     if plan.sought is not None:
         if not plan.demands:
             raise ParameterError(
-                f"[requirements]: {plan.design!r} searches for the worst case of each, and there "
-                'is none: write for instance overshoot = "<= 15 %"'
+                f"[requirements]: {plan.design!r} searches for the worst case of each requirement, "
+                'but there is none: write for instance overshoot = "<= 15 %"',
+                name="[requirements]",
             )
         plan.sought.require_budget()
         return
@@ -209,14 +224,17 @@ def _require_rare(plan: StudyPlan, design: SoughtDesign) -> None:
     """Refuse rare failures of nothing, and the search of a design point among single values."""
     if not plan.judged_demands:
         raise ParameterError(
-            f"[requirements]: {plan.design!r} asks how probable it is that one is missed, and none "
-            'has a probability: write for instance "<= 15 % with 99.99 %"'
+            f"[requirements]: {plan.design!r} computes the probability that a requirement is "
+            'missed, but none has a probability: write for instance "<= 15 % with 99.99 %"',
+            name="[requirements]",
         )
     singles = [each.name for each in plan.varied if each.distribution.is_discrete]
     if singles and plan.design == IMPORTANCE:
         raise ParameterError(
             f"[vary] {', '.join(singles)}: {plan.design!r} follows derivatives, and single values "
-            f"have none: take {SUBSET!r}"
+            f"have none: take {SUBSET!r}",
+            name=f"[vary] {', '.join(singles)}",
+            valid=repr(SUBSET),
         )
     design.require_budget()
 
@@ -262,19 +280,24 @@ def _require_of_use(kind: str, section: Mapping[str, Any]) -> None:
     if "levels" in section and kind not in _WITH_LEVELS:
         raise ParameterError(
             f"[design] levels: {kind!r} has none to choose"
-            + (f", it steps on {LEVELS}" if kind == "morris" else "")
-            + ": leave them out"
+            + (f", it always takes {LEVELS}" if kind == "morris" else "")
+            + ": leave them out",
+            name="[design] levels",
         )
     if "cases_per_level" in section and kind != SUBSET:
         raise ParameterError(
-            f"[design] cases_per_level: {kind!r} has no levels to fill, {SUBSET!r} has: leave it "
-            "out"
+            f"[design] cases_per_level is only for {SUBSET!r}, not for {kind!r}: leave it out",
+            name="[design] cases_per_level",
         )
     if "time" in section and kind in SOUGHT:
-        raise ParameterError(f"[design] time: the budget of {kind!r} is its 'cases': leave it out")
+        raise ParameterError(
+            f"[design] time: the budget of {kind!r} is its 'cases': leave it out",
+            name="[design] time",
+        )
     if "cases" in section and kind in SPANNED:
         raise ParameterError(
-            f"[design] cases: {kind!r} lists its cases by quantities and levels: leave them out"
+            f"[design] cases: quantities and levels determine those of {kind!r}: leave it out",
+            name="[design] cases",
         )
 
 
@@ -338,7 +361,9 @@ def _plan(content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]) 
     bench = replace(bench, requirements=limits, name=bench.name or study.name)
     varied, measured = read_all_varied(bench, study.vary, study.measured, file.parent)
     if not varied:
-        raise ParameterError("[vary] is empty: say what varies, such as \"motor.R_m\" = '+-10 %'")
+        raise ParameterError(
+            "[vary] is empty: write what varies, such as \"motor.R_m\" = '+-10 %'", name="[vary]"
+        )
     correlations = {**measured, **_read_correlations(study.correlation, varied, measured)}
     plan = StudyPlan(
         study.name,
@@ -359,9 +384,11 @@ def _require_no_bench(content: Mapping[str, Any]) -> None:
     for key in content:
         if key in bench_file.SECTIONS and key not in keys:
             raise ParameterError(
-                f"[{key}] is of the bench, not of a study: write it into the bench file, or change "
-                f'single values in [set], as "{key}.NAME" = "VALUE"; a study file has '
-                f"{', '.join(keys)}"
+                f"[{key}] belongs into the bench file, not into a study file: write it there, or "
+                f'change single values in [set], as "{key}.NAME" = "VALUE"; a study file has '
+                f"{', '.join(keys)}",
+                name=f"[{key}]",
+                valid=", ".join(keys),
             )
 
 
@@ -374,7 +401,9 @@ def read_bench(
         if not isinstance(value, str):
             raise ParameterError(
                 f"[set] {key} = {quoted(value)}: write the value as a text, "
-                f"with its unit, as {option('overrides')} takes it"
+                f"with its unit, as {option('overrides')} takes it",
+                name=f"[set] {key}",
+                value=quoted(value),
             )
     there = source if names_experiment(source) else folder / source
     return bench_file.read(there, {**flat, **overrides})

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.core.errors import ParameterError, not_valid, quoted, unknown_name
 from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.data.file_format import library
@@ -84,7 +84,7 @@ class Surrogate:
         """
         if not isinstance(values, Mapping):
             raise ParameterError(
-                f"{quoted(values)}: SI numbers by the name of their quantity are wanted, such as "
+                f"{quoted(values)} must be SI numbers by the names of quantities, such as "
                 f"{{{next(iter(self.nominal))!r}: {next(iter(self.nominal.values())):g}}}"
             )
         for name in values:
@@ -95,9 +95,7 @@ class Surrogate:
             try:
                 column = np.asarray(values.get(name, nominal), dtype=float)
             except (TypeError, ValueError):
-                raise ParameterError(
-                    f"{name} = {quoted(values[name])}: SI numbers are wanted"
-                ) from None
+                raise not_valid(name, quoted(values[name]), "SI numbers") from None
             self._require_seen(name, column)
             columns.append(column)
         try:
@@ -115,9 +113,11 @@ class Surrogate:
         beyond = values[~((low <= values) & (values <= high) | at_end)]
         if beyond.size:
             unit = self.units[name]
-            raise ParameterError(
-                f"{name} = {shown(float(beyond[0]), unit)}: the surrogate of {self.kpi} knows "
-                f"{shown(low, unit)} to {shown(high, unit)}, and nothing beyond"
+            raise not_valid(
+                name,
+                shown(float(beyond[0]), unit),
+                f"{shown(low, unit)} to {shown(high, unit)}",
+                f"the range of the surrogate of {self.kpi}",
             )
         singles = np.asarray(self.singles.get(name, ()))
         if not singles.size or not values.size:
@@ -127,10 +127,11 @@ class Surrogate:
         between = ~np.isclose(flat, nearest, rtol=_SAME, atol=0.0)
         if between.any():
             unit, k = self.units[name], int(between.argmax())
-            raise ParameterError(
-                f"{name} = {shown(float(flat[k]), unit)}: in the cases it has single values, "
-                f"{_listed(singles, unit)}, and nothing is known between them; the nearest is "
-                f"{shown(float(nearest[k]), unit)}"
+            raise not_valid(
+                name,
+                shown(float(flat[k]), unit),
+                f"one of the values of the cases, {_listed(singles, unit)}",
+                f"the nearest is {shown(float(nearest[k]), unit)}",
             )
 
 
@@ -179,10 +180,13 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
     x, y = np.column_stack(list(columns.values()))[known], y[known]
     if y.size < _FEWEST:
         raise ParameterError(
-            f"{kpi} is defined in {y.size} of the cases: a surrogate needs {_FEWEST} at least"
+            f"{kpi} is defined in {y.size} of the cases: a surrogate needs at least {_FEWEST}",
+            name=kpi,
+            value=str(y.size),
+            valid=str(_FEWEST),
         )
     if np.ptp(y) == 0.0:
-        raise ParameterError(f"{kpi} is the same in all cases: there is nothing to tell")
+        raise ParameterError(f"{kpi} is the same in all cases: there is nothing to fit", name=kpi)
     errors, best = min(
         (_of_unseen(plan.varied, x, y, degree, 0) for degree in _degrees(x.shape)),
         key=lambda told: float(np.mean(told[0] ** 2)),
@@ -220,12 +224,16 @@ def require_fittable(plan: StudyPlan) -> None:
     if plan.design in _LACKING:
         raise ParameterError(
             f"the cases of {plan.design!r} do not show what lies between them: a surrogate "
-            "takes 'monte-carlo', 'latin-hypercube', 'sobol', 'sobol-indices' or 'grid'"
+            "takes 'monte-carlo', 'latin-hypercube', 'sobol', 'sobol-indices' or 'grid'",
+            name="[design] kind",
+            value=plan.design,
         )
     choices = [v.name for v in plan.varied if not v.unit]
     if choices:
         raise ParameterError(
-            f"{', '.join(choices)}: a choice has no polynomial; make a study for each of its values"
+            f"{', '.join(choices)}: a choice has no polynomial: make a study for each of its "
+            "values",
+            name=", ".join(choices),
         )
 
 

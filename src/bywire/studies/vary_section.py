@@ -15,7 +15,14 @@ import numpy as np
 from bywire.bench.bench import Bench
 from bywire.bench.changes import OPTION
 from bywire.bench.ensemble import varied_choices, varied_leaf
-from bywire.core.errors import FileError, InputError, ParameterError, quoted, unknown_name
+from bywire.core.errors import (
+    FileError,
+    InputError,
+    ParameterError,
+    not_valid,
+    quoted,
+    unknown_name,
+)
 from bywire.core.parameters import leaf_fields
 from bywire.core.section import Hint, Name, Names, Section
 from bywire.studies.distribution import (
@@ -110,7 +117,9 @@ def _varied_as_measured(
     if not of:
         raise ParameterError(
             f"[measured] {section.file} has estimates of {', '.join(measured.values)}: "
-            "name some of them with of = [...] that the bench has too"
+            "name those of them that the bench has too with of = [...]",
+            name="[measured] of",
+            valid=", ".join(measured.values),
         )
     chosen = measured.only(of)
     varied = []
@@ -157,7 +166,8 @@ def _read_measured(path: Path) -> Measured:
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(
             f"cannot read {file}: {reason}: name the folder that 'bywire identify --out' has "
-            "written"
+            "written",
+            name=str(file),
         ) from None
     try:
         if len(data) > _LARGEST:
@@ -166,8 +176,9 @@ def _read_measured(path: Path) -> Measured:
         return _joined(list(_estimates(said["estimates"])))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise FileError(
-            f"{file} holds no estimates of an identification ({type(error).__name__}: "
-            f"{quoted(str(error))}): name the folder that 'bywire identify --out' has written"
+            f"{file} contains no estimates of an identification ({type(error).__name__}: "
+            f"{quoted(str(error))}): name the folder that 'bywire identify --out' has written",
+            name=str(file),
         ) from None
 
 
@@ -209,7 +220,7 @@ def _joined(each: Sequence[Measured]) -> Measured:
 
 def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ValueError(f"{quoted(value)} is no number")
+        raise ValueError(f"{quoted(value)} is not a number")
     return float(value)
 
 
@@ -253,7 +264,8 @@ def _put_once(places: dict[str, str], name: str, place: str) -> None:
     """Note where a quantity varies, or refuse one that varies elsewhere too."""
     if name in places:
         raise ParameterError(
-            f"[vary] {name} varies twice, by {places[name]} and by {place}: leave one of both out"
+            f"[vary] {name} varies twice, by {places[name]} and by {place}: leave one of them out",
+            name=f"[vary] {name}",
         )
     places[name] = place
 
@@ -273,7 +285,9 @@ def read_varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
         together = _together(name, entry, bench, values)
         if name in choices:
             if together:
-                raise ParameterError(f"[vary] {name} is a choice: nothing varies by its ratio")
+                raise ParameterError(
+                    f"[vary] {name} is a choice: nothing varies by its ratio", name=f"[vary] {name}"
+                )
             law = read_choice(name, entry, choices[name])
             _require_alike(bench, name, law.singles)
             yield Varied(name, "", choice_text(values[name]), law)
@@ -281,10 +295,15 @@ def read_varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
         if isinstance(values[name], (str, bool)):
             raise ParameterError(
                 f"[vary] {name} = {quoted(values[name])} names a signal or a file: only numbers "
-                "vary, and choices among what is listed"
+                "vary, and choices among listed values",
+                name=f"[vary] {name}",
+                value=quoted(values[name]),
             )
         if isinstance(values[name], tuple):
-            raise ParameterError(f"[vary] {name} is a table: single numbers vary, and choices")
+            raise ParameterError(
+                f"[vary] {name} is a table: only single numbers and choices vary",
+                name=f"[vary] {name}",
+            )
         leaf = varied_leaf(bench, name)
         nominal = float(values[name])
         if not choices.keys() & section.keys():  # one of them may switch it on
@@ -328,7 +347,9 @@ def _require_alike(bench: Bench, name: str, values: Sequence[str]) -> None:
             raise ParameterError(
                 f"[vary] {name} = {value!r}: {bench.experiment!r} has other key figures with it "
                 f"than with the bench's own ({', '.join(differing)}): vary it among values that "
-                "have the same, or make it a study of its own"
+                "have the same, or make a study for each",
+                name=f"[vary] {name}",
+                value=repr(value),
             )
 
 
@@ -352,7 +373,8 @@ def entries_of(section: Mapping[str, Any], known: Collection[str]) -> dict[str, 
         if name in entries:
             raise ParameterError(
                 f'[vary] {name} varies twice, by {name} and by "{name}" in quotation marks: '
-                "leave one of both out"
+                "leave one of them out",
+                name=f"[vary] {name}",
             )
         entries[name] = entry
     return entries
@@ -379,19 +401,28 @@ def _is_entry(name: str, value: Mapping[str, Any], known: Collection[str]) -> bo
 def _together(name: str, entry: Any, bench: Bench, values: Mapping[str, Any]) -> tuple[str, ...]:
     given = entry.get("together", []) if isinstance(entry, Mapping) else []
     if not isinstance(given, Sequence) or isinstance(given, str):
-        raise ParameterError(f"[vary] {name}.together = {quoted(given)}: a list of names is wanted")
+        raise not_valid(f"[vary] {name}.together", quoted(given), "a list of names")
     leaves = leaf_fields(type(bench.par))
     for each in given:
         if not isinstance(each, str) or each not in leaves:
             kind = f"parameter that varies together with {name}"
             raise unknown_name(kind, choice_text(each), leaves)
         if isinstance(values[each], tuple):
-            raise ParameterError(f"[vary] {name}.together {each} is a table: single numbers vary")
+            raise ParameterError(
+                f"[vary] {name}.together {each} is a table: only single numbers vary",
+                name=f"[vary] {name}.together",
+                value=each,
+            )
         if leaves[each].is_whole:
             raise ParameterError(
                 f"[vary] {name}.together {each} is a whole number, which keeps no ratio: vary it "
-                "by itself, or leave it as in the bench"
+                "by itself, or leave it as in the bench",
+                name=f"[vary] {name}.together",
+                value=each,
             )
     if given and not values.get(name):
-        raise ParameterError(f"[vary] {name} is zero in the bench: nothing can keep its ratio")
+        raise ParameterError(
+            f"[vary] {name} is zero in the bench: nothing can keep its ratio to it",
+            name=f"[vary] {name}",
+        )
     return tuple(given)

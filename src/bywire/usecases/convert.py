@@ -87,13 +87,13 @@ def convert(
     """
     from bywire.api.convert import Conversion, aligned
     from bywire.core.errors import ParameterError
-    from bywire.data.file_format import no_progress
+    from bywire.core.typing import silent
     from bywire.data.format_registry import format_to_write
     from bywire.data.measurement import mapping_of
     from bywire.data.named_columns import read_wanted
     from bywire.data.writing import require_free, write_measurement
 
-    shown = no_progress if progress is None else progress
+    shown = silent if progress is None else progress
     source, target = Path(source), Path(target)
     format_to_write(target, format)
     require_free(target, overwrite=force)
@@ -101,8 +101,10 @@ def convert(
     for name, value in {"method": method, "exclude": left_out, "max_gap": max_gap}.items():
         if value and rate is None:
             raise ParameterError(
-                f"{option(name)} {value}: it says how to resample: give the rate too, as "
-                f"{option('rate')} '1 kHz'"
+                f"{option(name)} {value} is only for resampling: also give the rate, as "
+                f"{option('rate')} '1 kHz'",
+                name=option(name),
+                value=str(value),
             )
     dataset, notes = read_wanted(source, mapping_of(mapping), signals, time, shown)
     report = None

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bywire.core.blas import on_one_thread
+from bywire.core.libraries import on_one_thread
 from bywire.usecases.asks import At, Changes, LoopName, ParameterSetName, Side
 from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
 
@@ -149,7 +149,10 @@ def design(
 
     whole_number("seed", seed, 0, 2**63 - 1)
     if schedule and vary:
-        raise ParameterError("schedule and vary: gains by region are not chosen for drawn models")
+        raise ParameterError(
+            "schedule and vary exclude each other: gains by region are not chosen for drawn models",
+            name="schedule",
+        )
     sizes = None if linear_only else amplitudes
     if schedule:
         return designed_by_region(

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
+from bywire.core.errors import not_valid
 from bywire.usecases.asks import BenchName, ExportFolder, LastBenchChanges, NeededCase
 from bywire.usecases.declare import NOTHING, Ask, Command, use_case
 
@@ -84,11 +85,14 @@ def export_fmu(
         raise unknown_name("part", part, PARTS)
     if kind == "model-exchange" and part != "plant":
         raise ParameterError(
-            f"part = {part!r}: model exchange is for the plant, the ECU works in ticks; export "
-            "that for co-simulation beside it"
+            f"part = {part!r}: model exchange is only for the plant, because the ECU runs in "
+            "ticks; export the ECU separately, for co-simulation",
+            name="part",
+            value=repr(part),
+            valid="plant",
         )
     if fmi not in (2, 3):
-        raise ParameterError(f"fmi = {quoted(fmi)}: FMUs of version 2 (2.0) and 3 (3.0) are made")
+        raise not_valid("fmi", quoted(fmi), "2 (version 2.0) or 3 (version 3.0)")
     systems = tuple(dict.fromkeys(targets)) or (this_platform(),)
     for each in systems:
         if each not in PLATFORMS:

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bywire.core.blas import on_one_thread
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError
+from bywire.core.libraries import on_one_thread
 from bywire.usecases.asks import (
     CaseName,
     Changes,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bywire.api.identification import Identification
     from bywire.api.trust import TrustStudy
     from bywire.core.typing import Progress
-    from bywire.identification.fitting.question import Question
+    from bywire.identification.question import Question
 
 _ANY_BENCH = "Methods of any bench"
 MethodName = Annotated[str, Ask("Method, see 'bywire list'.", "Method", known=("methods",))]
@@ -168,7 +168,7 @@ def _asked(
     A command names what a `Question` holds one by one.
     """
     from bywire.api.trust import trust
-    from bywire.identification.fitting.question import Question
+    from bywire.identification.question import Question
 
     question = Question(bench, inputs, outputs, unknowns, priors, states, case, holdout, loss)
     shared: dict[str, Any] = {
@@ -193,11 +193,14 @@ def _asked(
     if measurements or synthetic is not None:
         raise ParameterError(
             f"{method}: give only one of measurement files, {option('synthetic')} SEED, "
-            f"{option('study')} COUNT"
+            f"{option('study')} COUNT",
+            name=option("study"),
         )
     for name, value in {"mapping": mapping, "time": time or None, "holdout": holdout}.items():
         if value is not None:
-            raise ParameterError(f"{option(name)} is for measurement files: leave it out")
+            raise ParameterError(
+                f"{option(name)} is for measurement files: leave it out", name=option(name)
+            )
     return trust(method, study, starts=starts or 1, **shared)
 
 
@@ -303,12 +306,12 @@ def identify(
     ['A', 'F_0', 'f']
     """
     from bywire.api.identification import Source, choose, identified
-    from bywire.data.file_format import no_progress
-    from bywire.identification.fitting.question import Question
+    from bywire.core.typing import silent
+    from bywire.identification.question import Question
 
     question = Question() if question is None else question
     sources = [measurements] if isinstance(measurements, Source) else list(measurements)
-    shown = no_progress if progress is None else progress
+    shown = silent if progress is None else progress
     chosen = choose(
         method,
         parameters,

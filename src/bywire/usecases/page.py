@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from bywire.core.errors import not_valid
 from bywire.usecases.asks import BenchName, LastBenchChanges, NeededCase
 from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
 
@@ -76,7 +77,7 @@ def page(
     from bywire.report.time_traces import shown_panels
 
     if Path(out).suffix.lower() not in (".html", ".htm"):
-        raise ParameterError(f"out = {str(out)!r} is no page: give a file that ends in .html")
+        raise not_valid("out", repr(str(out)), "a file that ends in .html")
     bench = bench_of(bench, overrides)
     made = exported(bench, case)
     _, reads = start_source(made)
@@ -85,7 +86,9 @@ def page(
         if name not in leaf_fields(type(bench.par)):
             raise unknown_name("parameter", name, used)
         if name not in used:
-            raise ParameterError(f"{name} has no effect in this bench: leave it out of vary")
+            raise ParameterError(
+                f"{name} has no effect in this bench: leave it out of vary", name=name
+            )
     result = run(bench)
     panels = shown_panels(result.recordings[made.case.label])
     content = page_text(made, panels, result, vary).encode()

@@ -39,7 +39,10 @@ def _read(bench: Path, overrides: Mapping[str, str], faults: Sequence[str]) -> N
 def _require_folder(animate: bool, out: Path | None, **others: Any) -> None:
     del others
     if animate and out is None:
-        raise InputError(f"{option('animate')} writes into a folder: give one by {option('out')}")
+        raise InputError(
+            f"{option('animate')} writes into a folder: give one by {option('out')}",
+            name=option("animate"),
+        )
 
 
 @overload

@@ -66,7 +66,7 @@ class Memory(NamedTuple):
     phase_x: Annotated[float, Signal("1", "phase of the rules", 3.0)]
     since_x: Annotated[float, Signal("s", "time since the rules' last phase or step", 0.1)]
     p_left_x: Annotated[float, Signal("Pa", "demand that rules left", 1e6)]
-    p_hat_x: Annotated[float, Signal("Pa", "pressure as rules believe it", 1e6)]
+    p_hat_x: Annotated[float, Signal("Pa", "pressure as rules estimate it", 1e6)]
     p_held_x: Annotated[float, Signal("Pa", "pressure that the wheel's road held", 1e6)]
     rise_x: Annotated[float, Signal("Pa", "next step of the pressure", 1e5)]
     slowing_x: Annotated[float, Signal("m/s**2", "wheel's deceleration, filtered", 10.0)]

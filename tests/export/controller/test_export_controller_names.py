@@ -193,7 +193,7 @@ int main(void)
         ("a b", "is not an identifier"),
         ("_a", "is not an identifier"),
         ("é", "is not an ident"),
-        ("a" * 61, "has 61 characters, and 60 are the most"),
+        ("a" * 61, "has 61 characters, more than 60"),
         ("../x", "is not an identifier"),
     ],
 )

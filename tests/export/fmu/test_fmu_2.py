@@ -289,7 +289,7 @@ def test_the_same_bench_gives_the_same_bytes(motorcycle: ExportedFmu, tmp_path: 
 
 
 def test_what_cannot_be_exported_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ParameterError, match="makes 9 runs, and one is exported"):
+    with pytest.raises(ParameterError, match="makes 9 runs, but only one is exported"):
         export_fmu("friction-sweep", tmp_path)
     with pytest.raises(ParameterError, match="without any run"):
         export_fmu("seal-stribeck", tmp_path)

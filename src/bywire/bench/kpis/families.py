@@ -63,8 +63,9 @@ def _declared(module: ModuleType) -> Iterator[Family]:
                 name="Setting",
             )
         loops = None if select else LoopFamily(module)
-        if loops is not None and not module.__name__.startswith("bywire."):
-            loops.translate()  # an author sees a mistake at once, not in a study
+        if loops is not None and not module.__name__.startswith("bywire.bench."):
+            # A brake's: its author sees a mistake in the first run, and not in the first study.
+            loops.translate()
         yield Family(name, summary, module.Setting, figures, select, loops)
 
 

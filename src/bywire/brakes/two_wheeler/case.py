@@ -14,8 +14,6 @@ from bywire.bench.experiment import Case
 from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.families import FamilyJudge
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire, at_speed
-from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
-from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
 from bywire.core.typing import Array
@@ -25,7 +23,6 @@ from bywire.vehicle import ideal_stop
 from bywire.vehicle.surfaces import laid
 from bywire.vehicle.two_wheeler import VehicleParameters
 
-RidingSpeed = ideal_stop.RidingSpeed
 Course = Callable[[Array], Array]
 Vehicle = tuple[type[Any], Callable[..., tuple[Any, Any]]]
 Demand = Annotated[float, Unit("Pa", 4e6), Field(ge=0, allow_inf_nan=False)]
@@ -81,14 +78,6 @@ def on_surface(first: SurfaceName, further: SurfaceName | None = None) -> dict[s
     return laid("vehicle.road", first, further)
 
 
-def parameters_of(run: xr.Dataset) -> TwoWheelerParameters:
-    """Return the parameters with which a recording was made."""
-    par = getattr(run, "par", None)  # plain rows carry them
-    if isinstance(par, TwoWheelerParameters):
-        return par
-    return TwoWheelerParameters.model_validate_json(run.attrs["parameters"])
-
-
 def vehicle_of(run: xr.Dataset) -> VehicleParameters:
     """Return the parameters of the vehicle with which a recording was made, whatever its brakes."""
     par = getattr(run, "par", None)
@@ -108,15 +97,3 @@ def _levels(run: xr.Dataset, options: Any) -> dict[str, dict[str, float]]:
 
 JUDGE = FamilyJudge(lambda _: {"vehicle_stop": vehicle_stop.Setting()}, levels=_levels)
 """the judge of a stop from the speed ``options.v_0``"""
-
-
-def locked_stop(v_0: float, par: VehicleParameters) -> float:
-    """Return a time [s] in which locked wheels stop a vehicle, on most roads even one wheel."""
-    road_ahead, body = par.road, par.body
-    slope = road.slope(0.0, road_ahead)
-    locked = adhesion.adhesion(1.0, road.surface(0.0, road_ahead), par.front_tyre)
-    held = locked * slope.cosine + slope.sine
-    if not held > 0.0:
-        advice = "the time to record, as locked wheels do not stop on this slope"
-        raise not_valid("options.duration", "0 s", "> 0 s", advice)
-    return round(v_0 / (0.7 * held * body.g) + 1.0, 1)

@@ -64,7 +64,7 @@ RESIDUALS = (
     ),
     Residual(
         "speed",
-        "speed of the wheels and what the accelerometer shows",
+        "speed of the wheels and reading of the accelerometer",
         VEHICLES,
         "m/s",
         ("v_hat", "a_hat"),

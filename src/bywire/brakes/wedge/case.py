@@ -10,10 +10,8 @@ import numpy as np
 import xarray as xr
 from pydantic import AfterValidator, Field
 
-from bywire.bench.energy_ledger import energy_residual
 from bywire.bench.experiment import Case
-from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.elements import wedge
+from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.wedge.laws.moment_control import PARKED
 from bywire.brakes.wedge.model import WedgeBrake, memory_at, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
@@ -21,23 +19,6 @@ from bywire.core.quantities import Unit
 from bywire.core.typing import Array
 
 Signals = Mapping[str, Array]
-
-BRAKING = Figures(
-    contact_time=("s", "Time until the pads press on the disc."),
-    time_to_90=("s", "Time until the moment sensor first shows 90 % of the demand."),
-    peak_power=("W", "Largest power at the drives' input."),
-    peak_power_filtered=("W", "Largest power at the drives' input, as the rig measures it."),
-    peak_normal_force=("N", "Largest normal force."),
-    caliper_energy=("J", "Largest energy of the caliper before the demand changes."),
-    disc_share=("%", "Share of that energy supplied by the disc (self-reinforcement)."),
-    rate_limited=("%", "Share of the time on the software rate limit, until the demand changes."),
-    peak_speed=("rad/s", "Largest speed of motor 1."),
-    energy_in=("J", "Energy at the drives' input, standby included."),
-    energy_braked=("J", "Energy taken from the disc."),
-    energy_left=("J", "Largest residual of the energy balance: the numerical error."),
-    undefined="the signal does not reach the level in this time",
-)
-"""key figures of :func:`braking`"""
 
 
 def case_from_parked(
@@ -79,53 +60,12 @@ def steps(t: Array, levels: Mapping[float, float]) -> Array:
     return y
 
 
-def braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
-    """Return the key figures of a braking that begins at time zero, in the disc's direction.
-
-    ``target``: moment demanded [N m]; ``end``: time [s] at which the demand changes for the first
-    time.
-    """
-    run = along_disc(run)
-    after = run.sel(time=slice(-1e-9, None))
-    held = run.sel(time=slice(-1e-9, end + 1e-9))
-    peak = int(np.argmax(held["U_caliper"].values))
-    stored = float(held["U_caliper"].values[peak])
-    work = float(held["W_disc"].values[peak] - held["W_disc"].values[0])
-    share = (
-        (100.0 * work / stored, "") if stored > 0 else (math.nan, "the caliper stores no energy")
-    )
-    return BRAKING(
-        contact_time=_contact(held),
-        time_to_90=first(held, "y_M", 0.9 * target),
-        peak_power=after["P_in"].max(),
-        peak_power_filtered=after["P_meas"].max(),
-        peak_normal_force=after["F_N"].max(),
-        caliper_energy=stored,
-        disc_share=share,
-        rate_limited=100.0 * float(held["sat_rate"].mean()),
-        peak_speed=np.abs(after["omega_1"]).max(),
-        energy_in=_gained(after, "W_supply"),
-        energy_braked=_gained(after, "W_brake"),
-        energy_left=np.abs(energy_residual(run)).max(),
-    )
-
-
-def _contact(held: xr.Dataset) -> float:
-    """Return when the pads first press [s]; without clearance they touch from the start."""
-    return 0.0 if parameters_of(held).caliper.clearance == 0.0 else first(held, "F_N", 0.0)
-
-
 def parameters_of(run: xr.Dataset) -> WedgeParameters:
     """Return the parameters with which a recording was made."""
     par = getattr(run, "par", None)  # plain rows carry them
     if isinstance(par, WedgeParameters):
         return par
     return WedgeParameters.model_validate_json(run.attrs["parameters"])
-
-
-def clearance(x: float, par: WedgeParameters) -> float:
-    """Return the clearance of the pads [m] at a wedge travel [m], run-out left out."""
-    return par.caliper.clearance - abs(x) * wedge.slope(par.wedge)
 
 
 def release_time(run: xr.Dataset, begin: float, name: str = "release_time") -> Kpi:
@@ -179,10 +119,6 @@ def swing(run: xr.Dataset, name: str, begin: float, end: float) -> float:
     return float(np.ptp(values)) if values.size else math.nan
 
 
-def _gained(run: xr.Dataset, name: str) -> float:
-    return float(run[name].values[-1] - run[name].values[0])
-
-
 # --- Reading recordings: the disc's direction, its revolutions, their rows
 
 
@@ -192,38 +128,6 @@ def along_disc(run: xr.Dataset) -> xr.Dataset:
         return run
     # Not negated, which would make negative zeros.
     return run.assign({name: 0.0 - run[name] for name in ("M_B", "y_M", "Omega")})
-
-
-def last_turn(run: xr.Dataset, begin: float, end: float) -> float | None:
-    """Return when the disc's last revolution before a time begins [s]; None if before another."""
-    nearest = int(np.abs(run["time"].values - end).argmin())
-    speed = abs(float(run["Omega"].values[nearest]))
-    if speed * (end - begin) < 2.0 * math.pi:
-        return None
-    return end - 2.0 * math.pi / speed
-
-
-def too_coarse(run: xr.Dataset, begin: float, end: float, rows: int = 1) -> str:
-    """Return why rows are too far apart to judge a moment between two times [s]; else "".
-
-    Parameters
-    ----------
-    rows
-        Least number of rows in that time. A revolution of the disc takes five: fewer would
-        alias the run-out's oscillation.
-    """
-    t = run["time"].values
-    apart = float(np.diff(t).max()) if t.size > 1 else math.inf
-    speed = float(np.abs(run["Omega"].values).max())
-    fifth = 0.4 * math.pi / speed if speed > 0 else math.inf
-    inside = np.count_nonzero((t >= begin - 1e-9) & (t <= end + 1e-9))
-    if inside >= rows and apart <= 1.05 * fifth:  # the message rounds the interval
-        return ""
-    interval = min((end - begin) / rows, fifth)
-    return (
-        f"rows {apart:.3g} s apart are too few between t = {begin:.4g} s and {end:.4g} s: "
-        f"record every {interval:.2g} s or more often"
-    )
 
 
 # --- Several friction coefficients
@@ -244,22 +148,19 @@ FRICTIONLESS = {
 counts of an encoder would keep the shafts moving"""
 
 
-def _distinct(values: tuple[float, ...]) -> tuple[float, ...]:
-    tags = [tag(value) for value in values]
-    for k, value in enumerate(values):
-        if tags[k] in tags[:k]:
-            raise ValueError(f"{value:g} is given twice: leave one out")
-    return values
+def distinct(
+    name: Callable[[float], str], unit: str = ""
+) -> Callable[[tuple[float, ...]], tuple[float, ...]]:
+    """Return a validator of values whose names in labels must differ."""
 
+    def check(values: tuple[float, ...]) -> tuple[float, ...]:
+        names = [name(value) for value in values]
+        for k, value in enumerate(values):
+            if names[k] in names[:k]:
+                raise ValueError(f"{value:g}{unit} is given twice: leave one out")
+        return values
 
-Coefficient = Annotated[float, Field(gt=0, le=2, allow_inf_nan=False)]
-Coefficients = Annotated[
-    tuple[Coefficient, ...],
-    Unit("1", 0.35),
-    Field(min_length=1, max_length=100),
-    AfterValidator(_distinct),
-]
-"""friction coefficients of the pads, in any order, each once"""
+    return check
 
 
 def tag(mu_B: float) -> str:
@@ -271,6 +172,15 @@ def tag(mu_B: float) -> str:
     ('mu35', 'mu35p5')
     """
     return f"mu{100.0 * mu_B:.10g}".replace(".", "p")
+
+
+Coefficients = Annotated[
+    tuple[Annotated[float, Field(gt=0, le=2, allow_inf_nan=False)], ...],
+    Unit("1", 0.35),
+    Field(min_length=1, max_length=100),
+    AfterValidator(distinct(tag)),
+]
+"""friction coefficients of the pads, in any order, each once"""
 
 
 def with_friction(par: WedgeParameters, mu_B: float, known: bool) -> dict[str, Any]:

@@ -47,11 +47,6 @@ class RigParameters(ParameterSet):
     sensor: force_sensor.Parameters
 
 
-def dummy_inertia(par: RigParameters) -> float:
-    """Return the inertia [kg m^2] that the rig adds; the screw's own is in the motor's."""
-    return par.J_dummy if par.load == "dummy" else 0.0 * par.J_dummy
-
-
 # --- The brake
 
 

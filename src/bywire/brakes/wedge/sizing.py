@@ -7,12 +7,11 @@ parameters follow from them. The speeds of the reference make every design respo
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
 
@@ -21,20 +20,17 @@ from bywire.brakes.wedge.case import case_from_parked, steps
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.model import force_for, travel_for
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.core.interrupts import thread_pool
 from bywire.core.quantities import Unit
 from bywire.core.typing import Array
-from bywire.data.labeled import Labeled, labeled
 from bywire.plant import roller_screw
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run
-from bywire.synthesis.study import variable
 
 Slope = Annotated[float, Unit("1", 0.3), Field(gt=0, le=2, allow_inf_nan=False)]
 Count = Annotated[int, Unit("1", 11.0), Field(ge=3, le=101)]
 
 
-PHASES = tuple(0.5 * math.pi * k for k in range(4))
+_PHASES = tuple(0.5 * math.pi * k for k in range(4))
 """angles of the disc [rad] at which a run begins"""
 
 
@@ -71,7 +67,7 @@ class Demand:
     known: bool
     enforced: bool
     whole: bool = False
-    phases: Sequence[float] = PHASES
+    phases: Sequence[float] = _PHASES
 
 
 @dataclass(frozen=True)
@@ -125,9 +121,9 @@ class Answer:
 
 Efficiency = Literal["friction-angle", "as-given"]
 """constant property of the screw over the lead: the friction angle, or the efficiency"""
-SPEEDS = ("omega_gap", "a_gap", "omega_creep", "rate_max")
+_SPEEDS = ("omega_gap", "a_gap", "omega_creep", "rate_max")
 """parameters of the moment control that set how fast the reference moves"""
-SIGNALS = (
+_SIGNALS = (
     "y_M",
     "P_in",
     "P_meas",
@@ -175,13 +171,13 @@ def redesigned(
         "control.offset.k_hat": par.control.offset.k_hat * k / roller_screw.slope(par.screw),
         "control.moment.slope_hat": control.slope_hat / ratio,
     }
-    speeds = {f"control.moment.{name}": getattr(control, name) * ratio for name in SPEEDS}
+    speeds = {f"control.moment.{name}": getattr(control, name) * ratio for name in _SPEEDS}
     if efficiency == "friction-angle":
-        changes |= efficiencies(par, lead)
+        changes |= _efficiencies(par, lead)
     return par.replace(changes | speeds)
 
 
-def efficiencies(par: WedgeParameters, lead: float) -> dict[str, float]:
+def _efficiencies(par: WedgeParameters, lead: float) -> dict[str, float]:
     r"""Return the efficiencies of a screw of another lead [m] with the same friction angle.
 
     With the lead angle :math:`\lambda` and the friction angle :math:`\rho`, both small, as in a
@@ -248,7 +244,7 @@ def _variations(par: WedgeParameters, demand: Demand, factors: Array) -> Mapping
     )
     control = par.control.moment
     cases = {"wedge.mu_B": mu}
-    cases |= {f"control.moment.{name}": getattr(control, name) * factor for name in SPEEDS}
+    cases |= {f"control.moment.{name}": getattr(control, name) * factor for name in _SPEEDS}
     if demand.known:
         cases["control.moment.slope_hat"] = control.slope_hat * mu / par.wedge.mu_B
     return cases
@@ -274,7 +270,7 @@ def _judged(par: WedgeParameters, demand: Demand, factor: float) -> Answer:
     cases = _variations(par, demand, np.array([factor]))
     whole = demand.t_hold + demand.t_release
     runs = [
-        simulate_ensemble(_run(par, demand, phase, whole), cases, SIGNALS, threads=1)
+        simulate_ensemble(_run(par, demand, phase, whole), cases, _SIGNALS, threads=1)
         for phase in demand.phases
     ]
     time = runs[0].time - _SETTLE
@@ -318,94 +314,3 @@ def _times(time: Array, y: Array, level: float) -> Array:
             share = (level - row[k - 1]) / (row[k] - row[k - 1])
             times[n] = time[k - 1] + share * (time[k] - time[k - 1]) - _SETTLE
     return times
-
-
-# --- Many drive trains as a dataset
-
-LATE = 1.02
-"""share of the demanded time up to which a design answers equally fast"""
-HELD = 0.95
-"""share of the demand that counts as held"""
-LEFT = 0.05
-"""share of the demand below which the brake counts as released"""
-_NEVER = 10.0  # lateness of a moment that is never reached
-
-_PER_CASE = {
-    "t_90": ("s", "time to 90 % of the demand"),
-    "filtered": ("W", "largest power, filtered"),
-    "instantaneous": ("W", "largest power"),
-    "release": ("W", "largest power of the release, filtered"),
-    "current": ("A", "largest current demand"),
-    "speed": ("rad/s", "largest motor speed"),
-    "copper": ("J", "copper loss"),
-    "friction": ("J", "friction of bearings and screws"),
-    "held": ("N*m", "mean moment at the end of the stop"),
-    "left": ("N*m", "moment left at the end"),
-    "stop": ("N", "force on the end stops"),
-}
-
-
-def mapped(
-    par: WedgeParameters,
-    demand: Demand,
-    slopes: Array,
-    leads: Array,
-    progress: Callable[[float], None] = lambda share: None,
-    efficiency: Efficiency = "friction-angle",
-) -> xr.Dataset:
-    """Return the responses of all designs on a grid, computed on all cores; can be interrupted.
-
-    ``slopes``, ``leads``: slopes of the wedge, shape (n,), and leads of the screws [m], shape (m,);
-    ``progress``: called with the finished share, 0 to 1; ``efficiency``: see `redesigned`.
-
-    Returns
-    -------
-    xarray.Dataset
-        Dimensions ``tan_alpha``, ``lead`` and ``mu_B``. Per case the fields of `Answer`; per
-        design ``closing_speed``, ``lateness`` (slowest time over the demanded one), ``infeasible``
-        (0 or 1), and ``worst_filtered`` and ``worst_instantaneous``, NaN where infeasible, with
-        ``mu_B_filtered`` and ``mu_B_instantaneous``, where each occurs.
-    """
-    designs = [(float(a), float(b)) for a in slopes for b in leads]
-    answers: list[Answer] = []
-    with thread_pool() as pool:
-        every = pool.map(
-            lambda design: answer(redesigned(par, design[0], design[1], efficiency), demand),
-            designs,
-        )
-        for k, judged in enumerate(every):
-            answers.append(judged)
-            progress((k + 1) / len(designs))
-    axes = {
-        "tan_alpha": (slopes, "1", "slope of the wedge"),
-        "lead": (leads, "m", "lead of the screws"),
-        "mu_B": (np.asarray(demand.mu_B), "1", "friction coefficient of the pads"),
-    }
-    return _dataset(answers, demand, axes)
-
-
-def _dataset(answers: Sequence[Answer], demand: Demand, axes: Mapping[str, Labeled]) -> xr.Dataset:
-    plane, shape = ("tan_alpha", "lead"), [len(each[0]) for each in axes.values()]
-    cases = {
-        name: np.array([getattr(each, name) for each in answers]).reshape(shape)
-        for name in _PER_CASE
-    }
-    data = labeled(axes, {name: (cases[name], *_PER_CASE[name]) for name in _PER_CASE})
-    slowest = cases["t_90"].max(axis=2)  # NaN where one case does not reach it
-    lateness = np.where(np.isnan(slowest), _NEVER, slowest / demand.t_90)
-    in_time = (lateness <= LATE) if demand.enforced else (lateness < _NEVER)
-    holds = cases["held"].min(axis=2) >= HELD * demand.moment
-    released = cases["left"].max(axis=2) <= LEFT * demand.moment
-    feasible = in_time & holds & released & (cases["stop"].max(axis=2) == 0.0)
-    speeds = np.array([each.closing_speed for each in answers]).reshape(shape[:2])
-    data["closing_speed"] = variable(speeds, plane, "m/s", "closing speed of the pads")
-    data["lateness"] = variable(lateness, plane, "1", "slowest time over the demanded time")
-    data["infeasible"] = variable(1.0 - feasible, plane, "1", "late, not held, or at a stop")
-    for name in ("filtered", "instantaneous"):
-        worst = np.where(feasible, cases[name].max(axis=2), np.nan)
-        mu_B = np.asarray(demand.mu_B)[cases[name].argmax(axis=2)]
-        label = f"largest {name} power, worst mu_B"
-        data[f"worst_{name}"] = variable(worst, plane, "W", label)
-        data[f"mu_B_{name}"] = variable(mu_B, plane, "1", "worst friction coefficient")
-    data.attrs["unsettled_substeps"] = sum(each.unsettled for each in answers)
-    return data

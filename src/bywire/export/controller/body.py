@@ -280,7 +280,7 @@ class Body:
             return self._compound(self.structs.of_group(built_shape(value)), numbers)
         if isinstance(value, Update):
             return self.rvalue(self.variable(f"{c_name(value.record.expr.text)}_new", value))
-        raise TypeError(f"{type(value).__name__} is no value that C has")
+        raise TypeError(f"{type(value).__name__} has no value in C")
 
     def _compound(self, struct: Any, items: Mapping[str, Any]) -> Expr:
         uses: set[Any] = set()

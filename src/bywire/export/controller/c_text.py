@@ -60,10 +60,10 @@ class Precision:
         number = float(value)
         if self.suffix and number != 0.0 and not 2.0**-126 <= abs(number) < 2.0**128:
             raise ModelError(
-                f"{number!r} is no number of single precision: export with precision = 'double'"
+                f"{number!r} has no single precision: export with precision = 'double'"
             )
         if not math.isfinite(number):
-            raise ModelError(f"{number!r} stands in the laws: C has no literal for it")
+            raise ModelError(f"{number!r} is in the laws, but C has no literal for it")
         text = str(np.float32(number)) if self.suffix else repr(number)
         return text + self.suffix
 
@@ -100,11 +100,13 @@ def checked_name(name: str) -> str:
     elif name in _RESERVED:
         fault = "is a word that C, C++ or the export itself uses"
     elif len(name) > _LONGEST_NAME:
-        fault = f"has {len(name)} characters, and {_LONGEST_NAME} are the most"
+        fault = f"has {len(name)} characters, more than {_LONGEST_NAME}"
     else:
         return name
-    wanted = "a letter, then letters, digits and underscores, for instance front_brake"
-    raise ParameterError(f"name = {quoted(name)} {fault}: use {wanted}")
+    valid = "a letter, then letters, digits and underscores, for instance front_brake"
+    raise ParameterError(
+        f"name = {quoted(name)} {fault}: use {valid}", name="name", value=quoted(name), valid=valid
+    )
 
 
 def unique(name: str, taken: Container[str]) -> str:

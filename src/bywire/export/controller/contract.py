@@ -104,7 +104,9 @@ def commands(model: Model, renewed: Iterable[str], structs: Structs, shape: Shap
         if limit is None:
             raise ModelError(
                 f"{place_of(model.Memory)}: {model.Memory.__qualname__}.{name} is limited by "
-                f"{by!r}, which is neither a parameter nor a stimulus: name one of them"
+                f"{by!r}, which is neither a parameter nor a stimulus: name one of them",
+                name=f"{model.Memory.__qualname__}.{name}",
+                value=repr(by),
             )
         found.append(Command(name, by, limit, False))
     return found

@@ -274,7 +274,7 @@ def _connected(at: Context, node: ast.BoolOp, values: Iterable[Any]) -> Any:
             continue
         expr = at.number(each, value)
         if not expr.truth:
-            raise at.refuse(each, "a number stands for a truth value")
+            raise at.refuse(each, "a number is used as a truth value")
         parts.append(expr)
     if not parts:
         return value
@@ -290,7 +290,7 @@ def chosen(at: Context, node: ast.AST, condition: Any, then: Any, otherwise: Any
         return then if condition.value else otherwise
     test = at.number(node, condition)
     if not test.truth:
-        raise at.refuse(node, "a number stands for a truth value")
+        raise at.refuse(node, "a number is used as a truth value")
     a, b = (at.number(node, each) for each in (then, otherwise))
     text = f"{test.at(PRIMARY)} ? {a.at(CHOICE + 1)} : {b.at(CHOICE + 1)}"
     return Expr(text, CHOICE, test.uses | a.uses | b.uses, a.truth and b.truth)
@@ -557,7 +557,7 @@ class Evaluator:
             return value
         if isinstance(value, Known) and (is_number(value) or isinstance(value.value, bool)):
             return literal(value, self.body.structs)
-        raise self.refuse(node, "a number is wanted here")
+        raise self.refuse(node, "this must be a number")
 
     def known(self, node: ast.AST, value: Any, why: str) -> Any:
         """Return the object of a value that export has to know."""
@@ -582,7 +582,7 @@ class Evaluator:
             return tuple(Known(name) for name in value.items)
         if isinstance(value, Known) and hasattr(value.value, "__iter__"):
             return tuple(lifted(Known(each)) for each in value.value)
-        raise self.refuse(node, "loops run over tuples of a known length only")
+        raise self.refuse(node, "loops can only run over tuples of a known length")
 
     def _constant(self, node: ast.Constant) -> Any:
         return Known(node.value)
@@ -627,7 +627,7 @@ class Evaluator:
         value = lifted(value)
         if isinstance(value, Table):
             return value.items
-        raise self.refuse(node, "a dictionary with known keys is wanted here")
+        raise self.refuse(node, "this must be a dictionary with known keys")
 
     def _joinedstr(self, node: ast.JoinedStr) -> Any:
         parts = []

@@ -197,9 +197,9 @@ def program(model: Model, par: ParameterSet, precision: str = "double", name: st
     for sub in getattr(model, "subs", {}).values():
         if any(sub.tasks(par)):
             raise ModelError(
-                f"{model.name} holds a {sub.assembly.name} ({sub.label}) with an ECU of its own: "
-                "two ECUs are no single one in C; export that of each from an experiment in which "
-                f"it stands alone, as those of {sub.assembly.name}"
+                f"{model.name} contains a {sub.assembly.name} ({sub.label}) with its own ECU: "
+                "two ECUs cannot be one in C; export each from an experiment with that ECU alone, "
+                f"such as those of {sub.assembly.name}"
             )
     short = checked_name(name) if name else c_name(model.name).lower()
     used: frozenset[Use] | None = None

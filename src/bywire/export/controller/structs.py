@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from bywire.core.field_notes import field_notes
-from bywire.core.parameters import leaf_fields
+from bywire.core.parameters import field_notes, leaf_fields
 from bywire.core.signals import signal_in
 from bywire.export.controller.c_text import Precision, c_name, unique
 from bywire.export.controller.derived import Derivations
@@ -235,7 +234,7 @@ def literal(value: Known, structs: Structs) -> Expr:
     if isinstance(value.value, bool):
         return Expr("true" if value.value else "false", truth=True)
     if not is_number(value):
-        raise TypeError(f"{value.value!r} is no number")
+        raise TypeError(f"{value.value!r} is not a number")
     if value.name:
         return Expr(value.name, uses=frozenset({("constant", value.name, float(value.value))}))
     text = structs.precision.literal(value.value)

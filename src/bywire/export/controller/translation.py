@@ -83,14 +83,14 @@ def node_of(function: types.FunctionType) -> Function:
     except OSError:
         raise ModelError(
             f"{place_of(function)}: the ECU cannot be exported as C: the source of "
-            f"{function.__qualname__} is not there; put it into a file"
+            f"{function.__qualname__} is missing; put it into a file"
         ) from None
     matches = [node for node in here if _is_of(node, code)]
     if len(matches) != 1:
         raise ModelError(
             f"{code.co_filename}, line {code.co_firstlineno}: the ECU cannot be exported as C: "
-            f"{len(matches)} functions stand on the line of {function.__qualname__}; give it a "
-            "line of its own"
+            f"{len(matches)} functions are on the line of {function.__qualname__}; give it a "
+            "separate line"
         )
     return matches[0]
 
@@ -193,7 +193,7 @@ class Executor(Evaluator):
 
     def _do_return(self, node: ast.Return) -> Returned:
         if node.value is None:
-            raise self.refuse(node, "a law returns a value")
+            raise self.refuse(node, "a law must return a value")
         return Returned(self.value(node.value), node.value)
 
     def _do_if(self, node: ast.If) -> Returned | None:
@@ -216,7 +216,7 @@ class Executor(Evaluator):
             self.scope[each.asname or each.name] = Known(getattr(home, each.name))
 
     def _do_raise(self, node: ast.Raise) -> None:
-        raise self.refuse(node, "the law refuses these parameters")
+        raise self.refuse(node, "the law rejects these parameters")
 
     def _do_annassign(self, node: ast.AnnAssign) -> None:
         if node.value is not None:
@@ -475,7 +475,7 @@ class Translation:
             return Returned(at.value(node.body), node.body)
         returned = at.run(node.body)
         if returned is None:
-            raise at.refuse(node, "a law returns a value")
+            raise at.refuse(node, "a law must return a value")
         return returned
 
     def inlined(
@@ -485,7 +485,7 @@ class Translation:
         names = [each.arg for each in closure.node.args.args]
         values = {**dict(zip(names, given, strict=False)), **named}
         if set(values) != set(names):
-            raise at.refuse(node, "an inner function is called with all its arguments")
+            raise at.refuse(node, "an inner function must be called with all its arguments")
         inner = Executor(self, at.body, closure.file, closure.module, dict(closure.scope))
         inner.scope |= {n: at.body.settled(v, n) for n, v in values.items()}
         self.depth += 1
@@ -521,5 +521,5 @@ def _rooted(
         entries = value.items.items()
         return Table({n: _rooted(at, node, v, arguments, memories) for n, v in entries})
     if isinstance(value, Array):
-        raise at.refuse(node, "a law returns numbers, not a table of parameters")
+        raise at.refuse(node, "a law must return numbers, not a table of parameters")
     return value

@@ -144,15 +144,18 @@ def _compiler_for(target: str) -> tuple[Compiler, tuple[str, ...]]:
         compiler = find_compiler()
         if compiler is None:
             raise CompilerError(
-                "an FMU has a compiled model, and there is no C compiler: install one, or the "
+                "an FMU contains a compiled model, but there is no C compiler: install one, or the "
                 "extra bywire[compiler]"
             )
         return compiler, ()
     command = bundled_compiler()
     if command is None:
         raise CompilerError(
-            f"target {target}: this system's compiler makes {this_platform()} only; install the "
-            "extra bywire[compiler], which compiles for all"
+            f"target {target}: this system's compiler only compiles for {this_platform()}; install "
+            "the extra bywire[compiler], which compiles for all",
+            name="target",
+            value=target,
+            valid=this_platform(),
         )
     return Compiler(command, "clang of the extra compiler"), ("-target", PLATFORMS[target].triple)
 
@@ -167,7 +170,7 @@ def _call(compiler: Compiler, cross: tuple[str, ...], arguments: list[str]) -> N
         raise CompilerError(f"{compiler.label} did not run ({error.strerror or error})") from None
     if done.returncode != 0:
         message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
-        raise CompilerError(f"{compiler.label} refused the sources of an FMU:\n{message}")
+        raise CompilerError(f"{compiler.label} rejected the sources of an FMU:\n{message}")
 
 
 # --- The archive

@@ -217,7 +217,7 @@ def _packed(made: _Table, leaves: int, numbers: list[int], constants: Sequence[f
     count = max(len(made.tokens), len(made.operands), len(numbers) + len(made.operands))
     if count > _MOST or len(kinds) > 255:
         raise CompilerError(
-            f"a module has room for {_MOST} operands of its formulas, and these have {count}: "
+            f"the formulas of this run have {count} operands, but a module has room for {_MOST}: "
             "export the run as an FMU, whose kernel is compiled"
         )
     far = Counter(name for name, count in made.operands if not _is_near(name, count, leaves))
@@ -476,7 +476,7 @@ def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
             raise CompilerError(f"the compiler took longer than {TIMEOUT:g} s") from None
         if done.returncode != 0:
             message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
-            raise CompilerError(f"the compiler refused the kernel for WebAssembly:\n{message}")
+            raise CompilerError(f"the compiler rejected the kernel for WebAssembly:\n{message}")
         return made.read_bytes()
 
 

@@ -74,9 +74,8 @@ function judge() {
     const computed = followed.length && following.includes(figure.name)
       ? { value: NaN, reason: `an option follows ${followed}: save the bench file and run it`, open: true }
       : run.figures[figure.name];
-    const unit = figure.unit && ` ${figure.unit}`;
     const value = computed.reason ? element("td", { class: "number", title: computed.reason }, "–")
-      : element("td", { class: "number" }, digits(shownOf(computed.value, figure)) + unit);
+      : element("td", { class: "number" }, readable(shownOf(computed.value, figure), figure.unit));
     const met = figure.limit && isMet(computed, figure.limit);
     const outcome = computed.open ? "undecided" : met ? "met" : "missed";
     const mark = { undecided: "?", met: "✓", missed: "✗" }[outcome];
@@ -84,7 +83,7 @@ function judge() {
       ? element("td", { class: outcome, title: computed.reason }, `${mark} ${figure.text}`)
       : element("td", {}, computed.reason);
     const { text, where } = figure.stated ?? { text: "", where: "" };
-    const stated = isStated ? [element("td", {}, text, element("span", { class: "meaning" }, ` ${where}`))] : [];
+    const stated = isStated ? [element("td", { title: where }, text)] : [];
     return element("tr", {}, element("th", { scope: "row", title: figure.definition }, figure.name), value, verdict, ...stated);
   }));
 }

@@ -123,5 +123,5 @@ def test_a_stuck_adjuster_costs_every_third_application():
 
 
 def test_its_faults_want_an_adjuster():
-    with pytest.raises(ParameterError, match=r"nothing to fail.*adjuster.law.*screw"):
+    with pytest.raises(ParameterError, match=r"control\.adjuster\.stuck.*adjuster\.law"):
         bywire.run("moment-ramp", faults=["control.adjuster.stuck"])

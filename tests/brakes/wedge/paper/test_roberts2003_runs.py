@@ -7,7 +7,8 @@ import pytest
 import xarray as xr
 
 from bywire.brakes.wedge.figures import FARTHEST, WedgeForces, brake_factor
-from bywire.brakes.wedge.paper.statements import order_spectrum, settled, stacked
+from bywire.brakes.wedge.paper.moment_tests import order_spectrum
+from bywire.brakes.wedge.paper.statements import settled, stacked
 from bywire.core.errors import ParameterError
 
 

@@ -1,1 +1,1 @@
-"""Experiments, one file each."""
+"""Experiments; those of one test family share a file."""

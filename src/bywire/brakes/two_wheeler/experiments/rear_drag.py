@@ -7,13 +7,14 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.two_wheeler.case import Demand, RidingSpeed, on_surface, rolling_case
+from bywire.brakes.two_wheeler.case import Demand, on_surface, rolling_case
 from bywire.brakes.two_wheeler.parameters import WholeRearParameters
 from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear, at_speed
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 from bywire.plant.road import SurfaceName
+from bywire.vehicle.ideal_stop import RidingSpeed
 
 _LEFT = 0.1  # share of the torque below which the brake counts as released
 _END = 0.1  # s at the end over which the drag is averaged

@@ -9,10 +9,11 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.two_wheeler.case import Demand, RidingSpeed, rolling_case, vehicle_of
+from bywire.brakes.two_wheeler.case import Demand, rolling_case, vehicle_of
 from bywire.brakes.two_wheeler.parameters import PressureRate, TwoWheelerParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Factor
+from bywire.vehicle.ideal_stop import RidingSpeed
 
 FIGURES = Figures(
     undefined="the rear wheel stays on the ground",

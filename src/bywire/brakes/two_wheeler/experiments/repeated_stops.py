@@ -22,7 +22,7 @@ from scipy.integrate import solve_ivp
 from bywire.bench.experiment import Case, Experiment, Recordings, as_run
 from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.two_wheeler.case import RidingSpeed, rolling_case
+from bywire.brakes.two_wheeler.case import rolling_case
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.errors import ParameterError
@@ -34,6 +34,7 @@ from bywire.core.typing import Array
 from bywire.plant import brake_disc, disc_heat
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import simulate
+from bywire.vehicle.ideal_stop import RidingSpeed
 from bywire.vehicle.two_wheeler import cold_start
 
 Heat = Mapping[str, disc_heat.State]

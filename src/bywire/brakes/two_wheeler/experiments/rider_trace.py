@@ -14,19 +14,13 @@ from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.families import units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.bench.stimulus import Stimulus
-from bywire.brakes.two_wheeler.case import (
-    JUDGE,
-    Course,
-    RidingSpeed,
-    on_surface,
-    parameters_of,
-    rolling_case,
-)
+from bywire.brakes.two_wheeler.case import JUDGE, Course, on_surface, rolling_case
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.plant import brake_disc
 from bywire.plant.road import SurfaceName
+from bywire.vehicle.ideal_stop import RidingSpeed
 
 # Built-in ride, our choice: a light pull, a short hesitation, then the full force of the hand.
 _TIMES = (0.0, 0.25, 0.9, 1.1, 1.3, 1.5, 3.0)  # s
@@ -74,13 +68,21 @@ def _course(values: tuple[float, ...]) -> Course:
     return lambda t: np.interp(t, _TIMES, values)
 
 
+def _parameters_of(run: xr.Dataset) -> TwoWheelerParameters:
+    """Return the parameters with which a recording was made."""
+    par = getattr(run, "par", None)  # plain rows carry them
+    if isinstance(par, TwoWheelerParameters):
+        return par
+    return TwoWheelerParameters.model_validate_json(run.attrs["parameters"])
+
+
 def rider_shares(run: xr.Dataset, _: Options) -> tuple[Kpi, ...]:
     """Return the remaining shares of the rider's demand."""
     return FIGURES(**_shares(run))
 
 
 def _shares(run: xr.Dataset) -> dict[str, float]:
-    par = parameters_of(run)
+    par = _parameters_of(run)
     t = run["time"].values
     end = vehicle_stop.standstill(t, run["v"].values)
     braked = (t >= 0.0) & (t <= (end if math.isfinite(end) else math.inf))

@@ -10,7 +10,7 @@ import xarray as xr
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.two_wheeler.case import Course, Demand, RidingSpeed, rolling_case, vehicle_of
+from bywire.brakes.two_wheeler.case import Course, Demand, rolling_case, vehicle_of
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
@@ -18,6 +18,7 @@ from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 from bywire.plant import road, two_wheeler_body
 from bywire.plant.road import Gradient
+from bywire.vehicle.ideal_stop import RidingSpeed
 from bywire.vehicle.two_wheeler import VehicleParameters
 
 _CALM = 2.0  # s after the stop

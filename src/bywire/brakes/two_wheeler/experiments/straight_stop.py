@@ -18,21 +18,16 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.families import units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.two_wheeler.case import (
-    JUDGE,
-    Demand,
-    RidingSpeed,
-    locked_stop,
-    on_surface,
-    rolling_case,
-    vehicle_of,
-)
+from bywire.brakes.two_wheeler.case import JUDGE, Demand, on_surface, rolling_case, vehicle_of
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters, WholeRearParameters
 from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear, at_speed
+from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Nodes, TimeConstant, Unit
 from bywire.plant import adhesion, road
 from bywire.plant.road import Distance, SurfaceName
+from bywire.vehicle.ideal_stop import RidingSpeed
+from bywire.vehicle.two_wheeler import VehicleParameters
 
 
 class PanicOptions(ParameterSet):
@@ -48,6 +43,18 @@ class PanicOptions(ParameterSet):
 
 def _demands(options: PanicOptions) -> dict[str, float]:
     return {"p_f_set": options.p_front, "p_r_set": options.p_rear}
+
+
+def _locked_stop(v_0: float, par: VehicleParameters) -> float:
+    """Return a time [s] in which locked wheels stop a vehicle, on most roads even one wheel."""
+    road_ahead, body = par.road, par.body
+    slope = road.slope(0.0, road_ahead)
+    locked = adhesion.adhesion(1.0, road.surface(0.0, road_ahead), par.front_tyre)
+    held = locked * slope.cosine + slope.sine
+    if not held > 0.0:
+        advice = "the time to record, as locked wheels do not stop on this slope"
+        raise not_valid("options.duration", "0 s", "> 0 s", advice)
+    return round(v_0 / (0.7 * held * body.g) + 1.0, 1)
 
 
 # --- On one surface
@@ -67,7 +74,7 @@ def straight_stop(
 ) -> tuple[Case, ...]:
     """Return the single run."""
     changes = on_surface(options.surface)
-    duration = options.duration or locked_stop(options.v_0, par.replace(changes).vehicle)
+    duration = options.duration or _locked_stop(options.v_0, par.replace(changes).vehicle)
     return (rolling_case(par, options.v_0, _demands(options), duration, changes),)
 
 
@@ -104,7 +111,7 @@ def whole_rear_stop(
 ) -> tuple[Case, ...]:
     """Return the single run."""
     changes = {**on_surface(options.surface), "rear.actuator.drive.mode": "pressure"}
-    duration = options.duration or locked_stop(options.v_0, par.replace(changes).vehicle)
+    duration = options.duration or _locked_stop(options.v_0, par.replace(changes).vehicle)
     vehicle = (TwoWheelerWholeRear, at_speed)
     return (rolling_case(par, options.v_0, _demands(options), duration, changes, vehicle=vehicle),)
 

@@ -1,1 +1,1 @@
-"""Rigs: parts of the vehicle by themselves."""
+"""A wheel on a drum, and the vehicle with a whole brake at its rear wheel."""

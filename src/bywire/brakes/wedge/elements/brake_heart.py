@@ -160,7 +160,7 @@ def solve(d: Overlaps, par: Parameters) -> Forces:
     Notes
     -----
     The two wedge contacts do not share a compliance, so they follow from the tips' force:
-    f_k = max(0, d_k + c_s f_12) / c_w. What remains is one increasing, piecewise linear equation
+    f_k = max(0, d_k + c_s f_12) / c_w. This leaves one increasing, piecewise linear equation
     in f_12, solved on the piece that holds its root: none, one or both of the contacts pressing.
     """
     c = compliances(par)

@@ -63,7 +63,7 @@ def _stop_case(
 _CALM = 1.0  # s from the stop on, in which tyre and brake come to rest
 
 STOP_FIGURES = Figures(
-    undefined="the vehicle does not stop before the brake lets go",
+    undefined="the vehicle does not stop before the release",
     stopping_distance=("m", "Distance from the demand to the first standstill."),
     stopping_time=("s", "Time from the demand to the first standstill."),
     moment_before_stop=("N*m", "Mean moment of the sensor in the last half second of braking."),

@@ -17,12 +17,12 @@ from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.wedge.case import (
     along_disc,
     case_from_parked,
-    clearance,
     parameters_of,
     parking_time,
     release_time,
     steps,
 )
+from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
@@ -99,13 +99,18 @@ def judge_release(recordings: Recordings, options: ReleaseOptions) -> tuple[Kpi,
         *FREEDOM(
             drag_moment=(drag, home.note),
             travel_left=abs(end),
-            clearance_regained=clearance(end, par),
+            clearance_regained=_clearance(end, par),
             clearance_nominal=par.caliper.clearance,
             travel_beyond=max(0.0, -float(_toward(run).min())),
             peak_current=max(float(np.abs(run[name]).max()) for name in ("i_1", "i_2")),
             energy_in=(energy, counted),
         ),
     )
+
+
+def _clearance(x: float, par: WedgeParameters) -> float:
+    """Return the clearance of the pads [m] at a wedge travel [m], run-out left out."""
+    return par.caliper.clearance - abs(x) * wedge.slope(par.wedge)
 
 
 def _toward(run: xr.Dataset) -> xr.DataArray:
@@ -139,7 +144,7 @@ MOMENT_RELEASE = Experiment(
 )
 
 
-# --- Power off: what dry friction holds, for how long
+# --- Power off: dry friction holds the brake
 
 POWER_OFF_FIGURES = Figures(
     time_to_rest=("s", "Time from power off until shafts and wedge stick permanently."),
@@ -199,7 +204,7 @@ def judge_power_off(recordings: Recordings, options: PowerOffOptions) -> tuple[K
 POWER_OFF_HOLD = Experiment(
     name="power-off-hold",
     assembly="wedge-brake",
-    summary="power off at {M_hold}: what dry friction holds, for how long",
+    summary="power off at {M_hold}: moment held by dry friction, and its duration",
     options=PowerOffOptions,
     defaults=PowerOffOptions(M_hold=500.0, settle=0.6, duration=2.0),
     cases=power_off,

@@ -12,20 +12,19 @@ import numpy as np
 import xarray as xr
 from pydantic import Field, model_validator
 
+from bywire.bench.energy_ledger import energy_residual
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.wedge.case import (
-    BRAKING,
     along_disc,
-    braking,
     case_from_parked,
-    last_turn,
+    first,
     mean,
+    parameters_of,
     parking_time,
     release_time,
     steps,
     swing,
-    too_coarse,
 )
 from bywire.brakes.wedge.laws.moment_control import SomeMoment, SpeedLimit
 from bywire.brakes.wedge.parameters import WedgeParameters
@@ -34,6 +33,88 @@ from bywire.core.quantities import Duration, Fraction, Unit
 from bywire.core.typing import Array
 
 Count = Annotated[int, Unit("1", 3.0), Field(ge=1, le=100)]
+
+# --- Common figures of a braking
+
+BRAKING_FIGURES = Figures(
+    contact_time=("s", "Time until the pads press on the disc."),
+    time_to_90=("s", "Time until the moment sensor first shows 90 % of the demand."),
+    peak_power=("W", "Largest power at the drives' input."),
+    peak_power_filtered=("W", "Largest power at the drives' input, as the rig measures it."),
+    peak_normal_force=("N", "Largest normal force."),
+    caliper_energy=("J", "Largest energy of the caliper before the demand changes."),
+    disc_share=("%", "Share of that energy supplied by the disc (self-reinforcement)."),
+    rate_limited=("%", "Share of the time on the software rate limit, until the demand changes."),
+    peak_speed=("rad/s", "Largest speed of motor 1."),
+    energy_in=("J", "Energy at the drives' input, standby included."),
+    energy_braked=("J", "Energy taken from the disc."),
+    energy_left=("J", "Largest residual of the energy balance: the numerical error."),
+    undefined="the signal does not reach the level in this time",
+)
+"""key figures of a braking"""
+
+
+def _braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
+    """Return the key figures of a braking that begins at time zero.
+
+    ``run``: along the disc's direction; ``target``: demanded moment [N m]; ``end``: time of the
+    first change of the demand [s].
+    """
+    after = run.sel(time=slice(-1e-9, None))
+    held = run.sel(time=slice(-1e-9, end + 1e-9))
+    peak = int(np.argmax(held["U_caliper"].values))
+    stored = float(held["U_caliper"].values[peak])
+    work = float(held["W_disc"].values[peak] - held["W_disc"].values[0])
+    share = (
+        (100.0 * work / stored, "") if stored > 0 else (math.nan, "the caliper stores no energy")
+    )
+    return BRAKING_FIGURES(
+        contact_time=_contact(held),
+        time_to_90=first(held, "y_M", 0.9 * target),
+        peak_power=after["P_in"].max(),
+        peak_power_filtered=after["P_meas"].max(),
+        peak_normal_force=after["F_N"].max(),
+        caliper_energy=stored,
+        disc_share=share,
+        rate_limited=100.0 * float(held["sat_rate"].mean()),
+        peak_speed=np.abs(after["omega_1"]).max(),
+        energy_in=_gained(after, "W_supply"),
+        energy_braked=_gained(after, "W_brake"),
+        energy_left=np.abs(energy_residual(run)).max(),
+    )
+
+
+def _contact(held: xr.Dataset) -> float:
+    """Return when the pads first press [s]; without clearance they touch from the start."""
+    return 0.0 if parameters_of(held).caliper.clearance == 0.0 else first(held, "F_N", 0.0)
+
+
+def _gained(run: xr.Dataset, name: str) -> float:
+    return float(run[name].values[-1] - run[name].values[0])
+
+
+def _too_coarse(run: xr.Dataset, begin: float, end: float, rows: int = 1) -> str:
+    """Return why rows are too far apart to judge a moment between two times [s]; else "".
+
+    Parameters
+    ----------
+    rows
+        Least number of rows in that time. A revolution of the disc takes five: fewer would
+        alias the run-out's oscillation.
+    """
+    t = run["time"].values
+    apart = float(np.diff(t).max()) if t.size > 1 else math.inf
+    speed = float(np.abs(run["Omega"].values).max())
+    fifth = 0.4 * math.pi / speed if speed > 0 else math.inf
+    inside = np.count_nonzero((t >= begin - 1e-9) & (t <= end + 1e-9))
+    if inside >= rows and apart <= 1.05 * fifth:  # the message rounds the interval
+        return ""
+    interval = min((end - begin) / rows, fifth)
+    return (
+        f"rows {apart:.3g} s apart are too few between t = {begin:.4g} s and {end:.4g} s: "
+        f"record every {interval:.2g} s or more often"
+    )
+
 
 # --- A step, then pulses to 80 % (Fig. 7)
 
@@ -98,7 +179,7 @@ def judge_pulses(recordings: Recordings, options: PulsesOptions) -> tuple[Kpi, .
     """Return the figures of the braking, of its hold and of its pulses."""
     run = along_disc(recordings["run"])
     begin, end = _turn(run, 0.0, options.t_hold, 0.5)
-    held = too_coarse(run, begin, end)
+    held = _too_coarse(run, begin, end)
     hold, power = (math.nan if held else mean(run, name, begin, end) for name in ("M_B", "P_in"))
     ripple = math.nan if held else swing(run, "M_B", begin, end)
     figures = PULSES_FIGURES(
@@ -109,7 +190,7 @@ def judge_pulses(recordings: Recordings, options: PulsesOptions) -> tuple[Kpi, .
         brake_power=(hold * mean(run, "Omega", begin, end), held),
         pulse_moment=_pulse(run, options),
     )
-    return (*braking(run, options.M_high, options.t_hold), *figures)
+    return (*_braking(run, options.M_high, options.t_hold), *figures)
 
 
 def _turn(run: xr.Dataset, begin: float, end: float, last: float) -> tuple[float, float]:
@@ -118,15 +199,17 @@ def _turn(run: xr.Dataset, begin: float, end: float, last: float) -> tuple[float
     It is the disc's last revolution, over which the run-out averages out. Without a whole
     revolution it is the ``last`` share of the time.
     """
-    turn = last_turn(run, begin, end)
-    start = end - last * (end - begin) if turn is None else turn
+    nearest = int(np.abs(run["time"].values - end).argmin())
+    speed = abs(float(run["Omega"].values[nearest]))
+    whole = speed * (end - begin) >= 2.0 * math.pi
+    start = end - (2.0 * math.pi / speed if whole else last * (end - begin))
     return start + 2e-9, end - 2e-9
 
 
 def _pulse(run: xr.Dataset, options: PulsesOptions) -> tuple[float, str]:
     """Return the moment in the first pulse; over less than a revolution the run-out would show."""
     begin, end = _turn(run, options.t_hold, options.t_hold + options.t_low, 0.2)
-    problem = too_coarse(run, begin, end)
+    problem = _too_coarse(run, begin, end)
     return math.nan if problem else mean(run, "M_B", begin, end), problem
 
 
@@ -140,7 +223,7 @@ MOMENT_PULSES = Experiment(
     ),
     cases=pulses,
     judge=judge_pulses,
-    kpis=BRAKING.units | PULSES_FIGURES.units,
+    kpis=BRAKING_FIGURES.units | PULSES_FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )
 
@@ -214,14 +297,14 @@ def judge_ramp(recordings: Recordings, options: RampOptions) -> tuple[Kpi, ...]:
     run = along_disc(recordings["run"])
     begin = options.t_hold + options.t_low
     end = begin + options.t_ramp
-    problem = too_coarse(run, begin, end, _ROWS)
+    problem = _too_coarse(run, begin, end, _ROWS)
     error, rms, slope = (math.nan,) * 3 if problem else _followed(run, begin, end)
     figures = RAMP_FIGURES(
         ramp_error_mean=(error, problem),
         ramp_error_rms=(rms, problem),
         ramp_slope=(slope, problem),
     )
-    return (*braking(run, options.M_high, options.t_hold), *figures)
+    return (*_braking(run, options.M_high, options.t_hold), *figures)
 
 
 def _followed(run: xr.Dataset, begin: float, end: float) -> tuple[float, float, float]:
@@ -242,7 +325,7 @@ MOMENT_RAMP = Experiment(
     ),
     cases=ramp,
     judge=judge_ramp,
-    kpis=BRAKING.units | RAMP_FIGURES.units,
+    kpis=BRAKING_FIGURES.units | RAMP_FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )
 
@@ -291,7 +374,7 @@ def judge_large_pulse(recordings: Recordings, options: LargePulseOptions) -> tup
     """Return the figures of the braking and of the release."""
     run = along_disc(recordings["run"])
     return (
-        *braking(run, options.M_high, options.t_pulse),
+        *_braking(run, options.M_high, options.t_pulse),
         *LARGE_PULSE_FIGURES(
             peak_moment=run["M_B"].max(), peak_angle=np.abs(run["theta_ref"]).max()
         ),
@@ -308,6 +391,8 @@ MOMENT_PULSE_950 = Experiment(
     defaults=LargePulseOptions(M_high=950.0, t_pulse=0.2, t_end=0.3, omega_gap=60.0, settle=0.05),
     cases=large_pulse,
     judge=judge_large_pulse,
-    kpis=BRAKING.units | LARGE_PULSE_FIGURES.units | {"release_time": "s", "parking_time": "s"},
+    kpis=BRAKING_FIGURES.units
+    | LARGE_PULSE_FIGURES.units
+    | {"release_time": "s", "parking_time": "s"},
     figures=("time-traces", "energy-balance"),
 )

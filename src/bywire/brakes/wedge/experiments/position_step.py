@@ -19,7 +19,7 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.bench.kpis.step_response import Setting
-from bywire.brakes.wedge.case import case_from_parked, parameters_of, steps
+from bywire.brakes.wedge.case import case_from_parked, distinct, parameters_of, steps
 from bywire.brakes.wedge.elements import brake_heart
 from bywire.brakes.wedge.panels import COMPARED
 from bywire.brakes.wedge.parameters import WedgeParameters
@@ -50,25 +50,16 @@ OVERALL = Figures(
 )
 
 
-def _distinct(values: tuple[float, ...]) -> tuple[float, ...]:
-    tags = [_tag(value) for value in values]
-    for k, value in enumerate(values):
-        if tags[k] in tags[:k]:
-            raise ValueError(f"{value:g} rad is given twice: leave one out")
-    return values
-
-
 def _tag(amplitude: float) -> str:
     """Return the name of an amplitude in labels and key figures, in thousandths of a radian."""
     return f"{1e3 * amplitude:.10g}mrad".replace(".", "p")
 
 
-Amplitude = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Amplitudes = Annotated[
-    tuple[Amplitude, ...],
+    tuple[Annotated[float, Field(gt=0, allow_inf_nan=False)], ...],
     Unit("rad", 0.5),
     Field(min_length=1, max_length=100),
-    AfterValidator(_distinct),
+    AfterValidator(distinct(_tag, " rad")),
 ]
 
 

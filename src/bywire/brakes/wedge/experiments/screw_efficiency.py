@@ -34,9 +34,9 @@ from bywire.core.typing import Array
 
 SlowSpeed = Annotated[float, Unit("rad/s", 10.0), Field(gt=0, allow_inf_nan=False)]
 
-_SETTLED = 0.3  # of the time in motion: what comes before is left out of the means
+_SETTLED = 0.3  # share of the time in motion that the means omit
 _LESS = 0.5  # share of the currents in the motions under less force
-_SPEED = 0.05  # by which mean speeds may differ from what is demanded
+_SPEED = 0.05  # largest relative error of mean speeds in steady motion
 EFFICIENCY_FIGURES = Figures(
     eta_f=("1", "Torque by the force over motor torque minus the bearings', motor 1 driving."),
     eta_f_no_load=("1", "The same, with only the bearing torque without load subtracted."),

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Any
 
+import numpy as np
+import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
@@ -15,7 +17,7 @@ from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.wedge.case import parameters_of, steps
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import Stimuli, peak, shaft_case, share_at
+from bywire.brakes.wedge.rigs.rig_case import Stimuli, peak, shaft_case
 from bywire.brakes.wedge.rigs.shaft_rig import friction
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
@@ -103,9 +105,15 @@ def judge_steps(recordings: Recordings, options: StepsOptions) -> tuple[Kpi, ...
         kpis += CURRENT(
             f"_{label}",
             peak_current=peak(run, "i_1"),
-            current_limit=share_at(run, "i_1_ref", limit),
+            current_limit=_share_at(run, "i_1_ref", limit),
         )
     return tuple(kpis)
+
+
+def _share_at(run: xr.Dataset, name: str, limit: float) -> float:
+    """Return the share of the time after zero in which a signal's magnitude is at a limit [%]."""
+    after = np.abs(run[name].sel(time=slice(-1e-9, None)).values)
+    return 100.0 * float(np.mean(after >= limit * (1.0 - 1e-9)))
 
 
 def _stepped(level: float) -> Stimuli:

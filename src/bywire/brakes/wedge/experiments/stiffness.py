@@ -10,15 +10,13 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import parameters_of
+from bywire.brakes.wedge.case import case_from_parked, parameters_of
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import (
     Stimuli,
     check_current,
-    heart_case,
     screw_case,
     slope_of,
-    squeezing_current,
     torque_constant_of,
 )
 from bywire.core.parameters import ParameterSet
@@ -26,6 +24,21 @@ from bywire.core.quantities import Current, Duration, Length
 from bywire.core.typing import Array
 from bywire.plant import shaft_encoder
 from bywire.plant.axial_bearing import AngularSpeed
+
+
+def _heart_case(par: WedgeParameters, stimulus: Stimuli, duration: float, mode: str) -> Case:
+    """Return a run of both motors in the brake heart, without an offset and so without force.
+
+    The command's ``mode`` is "current" or "position"; the wedge stays in its clearance.
+    """
+    changes = {"command.mode": mode, "control.offset.delta_preload": 0.0}
+    return case_from_parked(par, stimulus, duration, changes, "heart")
+
+
+def _squeezing_current(run: xr.Dataset) -> Array:
+    """Return the current [A] that squeezes, the mean of both motors."""
+    return np.asarray(0.5 * (run["i_1"].values - run["i_2"].values))
+
 
 # --- In current control: ramps of opposite currents
 
@@ -88,7 +101,7 @@ def stiffness(
     modes = {"rig.mode_1": "current", "rig.mode_2": "current"}
     return (
         screw_case("sensor", par, opposite, duration, modes),
-        heart_case(par, opposite, duration, "current"),
+        _heart_case(par, opposite, duration, "current"),
     )
 
 
@@ -98,12 +111,12 @@ def judge_stiffness(recordings: Recordings, options: StiffnessOptions) -> tuple[
     par = parameters_of(sensor)
     lines, calibrations, loaded = [], [], []
     for sign in (1.0, -1.0):
-        F, i = sensor["y_F"].values, squeezing_current(sensor)
+        F, i = sensor["y_F"].values, _squeezing_current(sensor)
         rising = _rising(sensor, sign, options)
         lines.append(_line(_closer(sensor)[rising], F[rising]))
         calibrations.append(_line(i[rising], F[rising]))
         seen = _rising(heart, sign, options)
-        F_hat = calibrations[-1].slope * (squeezing_current(heart)[seen] - calibrations[-1].start)
+        F_hat = calibrations[-1].slope * (_squeezing_current(heart)[seen] - calibrations[-1].start)
         loaded.append(_line(_closer(heart)[seen], F_hat))
     c_F = 1.0 / par.rig.sensor.K_F
     c_S = 0.5 * (0.5 * sum(1.0 / line.slope for line in lines) - c_F)
@@ -144,7 +157,7 @@ def _rising(run: xr.Dataset, sign: float, options: StiffnessOptions) -> Any:
     """Return which rows lie in the upper part of one direction's rising current."""
     times = _profile(options)[0]
     begin, end = (times[0], times[1]) if sign > 0 else (times[4], times[5])
-    t, level = run["time"].values, sign * squeezing_current(run)
+    t, level = run["time"].values, sign * _squeezing_current(run)
     return (t >= begin) & (t <= end) & (level > _UPPER * options.i_max)
 
 
@@ -216,7 +229,7 @@ def force_cycle(
     seize, t_heart = _cycle(par, options.c_close, options.c_apart, options)
     return (
         screw_case("sensor", par, squeeze, t_sensor, modes),
-        heart_case(par, seize, t_heart, "position"),
+        _heart_case(par, seize, t_heart, "position"),
     )
 
 
@@ -239,7 +252,7 @@ def judge_force_cycle(recordings: Recordings, options: ForceCycleOptions) -> tup
     """Return the forces reached, the line's stiffness, and the hysteresis of a cycle."""
     run = recordings["sensor"]
     par = parameters_of(run)
-    F, i = run["y_F"].values, squeezing_current(run)
+    F, i = run["y_F"].values, _squeezing_current(run)
     d = slope_of(par) * (run["q_1"].values - run["q_2"].values)
     work = 0.5 * abs(float(np.trapezoid(torque_constant_of(par) * i, F)))
     return FORCE_CYCLE_FIGURES(
@@ -247,7 +260,7 @@ def judge_force_cycle(recordings: Recordings, options: ForceCycleOptions) -> tup
         force_tension=-F.min(),
         stiffness=np.polyfit(d, F, 1)[0] if np.ptp(d) > 0 else math.nan,
         peak_current_sensor=np.abs(i).max(),
-        peak_current_heart=np.abs(squeezing_current(recordings["heart"])).max(),
+        peak_current_heart=np.abs(_squeezing_current(recordings["heart"])).max(),
         hysteresis=work / max(float(np.ptp(F)), 1e-9),
     )
 

@@ -56,7 +56,7 @@ class Input(NamedTuple):
 
     theta_c: Annotated[float, Signal("rad", "contact position, estimated", 1.7)]
     mode: Annotated[float, Signal("1", "mode of the moment control", 3.0)]
-    wanted: Annotated[float, Signal("1", "braking is demanded")]
+    braking: Annotated[float, Signal("1", "braking is demanded")]
 
 
 class Output(NamedTuple):
@@ -75,7 +75,7 @@ def output(x: State, u: Input, par: Parameters) -> tuple[State, Output]:
         T=par.T_disc_hat,
         touching=ops.where((u.mode - moment_control.MOMENT) ** 2 < 0.25, 1.0, 0.0),
         parked=ops.where(u.mode < 0.5, 1.0, 0.0),
-        wanted=u.wanted,
+        wanted=u.braking,
     )
     state, out = wear_adjuster.output(wear_adjuster.State(*x), seen, par)
     gap = wear_adjuster.cold_gap(seen, par) - par.tooth * out.teeth

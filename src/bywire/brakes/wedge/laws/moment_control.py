@@ -84,17 +84,17 @@ def observed(x: State, u: Input, par: Parameters) -> Moment:
     return ops.where(still, believed, u.M_meas)
 
 
-def next_mode(mode: Flag, wanted: Flag, touching: Flag, home: Flag) -> Flag:
+def next_mode(mode: Flag, braking: Flag, touching: Flag, home: Flag) -> Flag:
     """Return the next mode, by flags of 0 or 1.
 
-    ``wanted``, ``touching``, ``home``: whether braking is demanded, the pads touch, the reference
+    ``braking``, ``touching``, ``home``: whether braking is demanded, the pads touch, the reference
     is back at its parking position.
     """
-    from_parked = ops.where(wanted > 0.5, GAP, PARKED)
-    from_gap = ops.where(wanted > 0.5, ops.where(touching > 0.5, MOMENT, GAP), RETRACTING)
-    done = (1.0 - wanted) * (1.0 - touching)
+    from_parked = ops.where(braking > 0.5, GAP, PARKED)
+    from_gap = ops.where(braking > 0.5, ops.where(touching > 0.5, MOMENT, GAP), RETRACTING)
+    done = (1.0 - braking) * (1.0 - touching)
     from_moment = ops.where(done > 0.5, RETRACTING, MOMENT)
-    from_retracting = ops.where(wanted > 0.5, GAP, ops.where(home > 0.5, PARKED, RETRACTING))
+    from_retracting = ops.where(braking > 0.5, GAP, ops.where(home > 0.5, PARKED, RETRACTING))
     lower = ops.where(mode < 0.5, from_parked, from_gap)
     upper = ops.where(mode < 2.5, from_moment, from_retracting)
     return ops.where(mode < 1.5, lower, upper)
@@ -124,10 +124,10 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> State:
     law itself is ours.
     """
     M = observed(x, u, par)
-    wanted = ops.where(u.M_set > par.M_on, 1.0, 0.0)
+    braking = ops.where(u.M_set > par.M_on, 1.0, 0.0)
     touching = ops.where(par.M_contact < M, 1.0, 0.0)
     home = ops.where(u.theta_ref <= 1e-3 * par.omega_creep * T, 1.0, 0.0)
-    mode = next_mode(x.mode, wanted, touching, home)
+    mode = next_mode(x.mode, braking, touching, home)
     begins = ops.where(
         x.mode < 1.5, ops.where(mode > 1.5, ops.where(mode < 2.5, 1.0, 0.0), 0.0), 0.0
     )

@@ -1,1 +1,1 @@
-"""Identification methods, one file each; what several share in a folder."""
+"""Identification methods, one file each."""

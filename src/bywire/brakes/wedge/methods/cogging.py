@@ -31,7 +31,7 @@ from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.output_error import even_interval
-from bywire.identification.sensed import Sensor, sensed
+from bywire.identification.trust import Sensor, sensed
 from bywire.identification.unknown import Unknown
 from bywire.plant import axial_bearing, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
@@ -130,7 +130,7 @@ def cogging_problem(turning: Turning, orders: tuple[int, ...]) -> Problem:
     return Problem(tuple(unknowns), evaluate)
 
 
-def same_both_ways(cogging: CoggingFit) -> Check:
+def _same_both_ways(cogging: CoggingFit) -> Check:
     r"""Return whether the main order changes with the direction, as cogging does not.
 
     Two more columns, cosine and sine with the sign of the direction, are fitted to the residual.
@@ -151,7 +151,7 @@ def same_both_ways(cogging: CoggingFit) -> Check:
     return Check("cogging_same_both_ways", value, limit=limit, note=note)
 
 
-def slope_as_known(cogging: CoggingFit, known: float) -> Check:
+def _slope_as_known(cogging: CoggingFit, known: float) -> Check:
     """Return the share of the ripple that the fit explains by friction beyond its known slope.
 
     Friction that depends on the angle looks like friction that falls with the speed while cogging
@@ -167,7 +167,7 @@ def slope_as_known(cogging: CoggingFit, known: float) -> Check:
     return Check("slope_beyond_law", share, limit=_OTHER, note=note)
 
 
-def amplitudes(angle: Array, torque: Array, highest: int) -> Array:
+def _amplitudes(angle: Array, torque: Array, highest: int) -> Array:
     """Return the amplitude of every order 1 .. highest, each fitted alone, shape (highest,).
 
     Parameters
@@ -186,7 +186,7 @@ def amplitudes(angle: Array, torque: Array, highest: int) -> Array:
     return sizes
 
 
-def standing_out(angle: Array, torque: Array, highest: int) -> tuple[int, ...]:
+def _standing_out(angle: Array, torque: Array, highest: int) -> tuple[int, ...]:
     """Return the orders that stand out of the noise, strongest first.
 
     The power of noise at an order has an exponential distribution; its mean is the median over all
@@ -197,7 +197,7 @@ def standing_out(angle: Array, torque: Array, highest: int) -> tuple[int, ...]:
     residual, orders = torque - torque.mean(), list[int]()
     limit = math.log(highest / _FALSE) / math.log(2.0)
     while len(orders) < _MOST:
-        power = amplitudes(angle, residual, highest) ** 2
+        power = _amplitudes(angle, residual, highest) ** 2
         best = int(np.argmax(power)) + 1
         if best in orders or power[best - 1] <= limit * float(np.median(power)):
             break
@@ -257,7 +257,7 @@ def identify(
     """
     turning = _turning(data, par, options)
     _require_braking(turning)
-    orders = standing_out(turning.angle, turning.leveled, options.highest)
+    orders = _standing_out(turning.angle, turning.leveled, options.highest)
     if not orders:
         raise ParameterError(
             f"no order up to {options.highest} exceeds the noise: turn slower or by more "
@@ -278,7 +278,7 @@ def identify(
         estimates={"cogging and friction": best},
         parameters={"motor_1.T_cog": best["motor_1.T_cog"], "motor_1.N_cog": float(main)},
         figures=figures,
-        checks=(same_both_ways(cogging), slope_as_known(cogging, _slope(par, turning))),
+        checks=(_same_both_ways(cogging), _slope_as_known(cogging, _slope(par, turning))),
         curves=(_folded(cogging),),
         notes=_notes(best, orders),
     )

@@ -1,4 +1,8 @@
-"""Force over current of a screw drive: calibration line, friction to either side, offset."""
+"""Force over current of a screw drive: calibration line, friction to either side, offset.
+
+For a brake without a force sensor: the force that a current gives, and its uncertainty by friction.
+Two motors squeeze a force between their screws; one of them may be at rest.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +30,7 @@ from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.output_error import even_interval
 from bywire.identification.residuals import lack_of_fit
-from bywire.identification.sensed import Sensor, sensed
+from bywire.identification.trust import Sensor, sensed
 from bywire.identification.unknown import Unknown
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
@@ -114,7 +118,6 @@ def cogging_meanings(stage: str) -> dict[str, tuple[str, str]]:
 
 
 # --- Current over force: a mean line, and friction to either side of it
-# Two motors squeeze a force between their screws; one of them at rest is the same.
 
 LAW_MEANINGS: Mapping[str, tuple[str, str]] = {
     "offset": ("A", "current at zero force, i_0"),
@@ -317,7 +320,6 @@ def branches(squeezed: Squeeze, power: int, x: Array) -> Array:
 
 
 # --- The method
-# For a brake without a force sensor: what force a current means, and how far friction may be off.
 
 _GAP = np.full((2, 1), np.nan)
 _LAW = len(LAW_NAMES)

@@ -37,13 +37,13 @@ from bywire.identification.least_squares import Problem
 from bywire.identification.measured import joined, split
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.residuals import lack_of_fit
-from bywire.identification.sensed import Sensor, sensed
+from bywire.identification.trust import Sensor, sensed
 from bywire.identification.unknown import Unknown, parameters_of
 from bywire.plant import servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
 
-INERTIA = "motor_1.J_M"
-NAMES = (INERTIA, "bearing.C_0", "bearing.T_nu", "motor_1.D_M")
+_INERTIA = "motor_1.J_M"
+_NAMES = (_INERTIA, "bearing.C_0", "bearing.T_nu", "motor_1.D_M")
 _ADVICE = "let a fast shaft coast, as 'bywire run run-down' does"
 _SCALE = 0.02  # least known torque that sets the scale, over the decelerating torque
 
@@ -64,13 +64,13 @@ class RunDown:
         return window_residuals(self.equation, self.par, unknowns, self.motion)
 
 
-def read_run(label: str, data: xr.Dataset, par: WedgeParameters, options: Options) -> RunDown:
+def _read_run(label: str, data: xr.Dataset, par: WedgeParameters, options: Options) -> RunDown:
     """Return a record's motion; an inertia added to the shaft counts as part of the dummy."""
     seen = data.rename({"q_1": "theta", "i_1": "i"})
     moved = differentiated(seen[["theta", "i"]], "theta", ("omega", "alpha"), options.cutoff)
     moved["F"] = ("time", np.zeros(moved.sizes["time"]), {"units": "N"})
     motion = motions(moved, "omega", options.slowest, options.margin, options.window)
-    if len(motion.windows) < len(NAMES):
+    if len(motion.windows) < len(_NAMES):
         raise ParameterError(
             f"record {label} has too few windows of {1e3 * options.window:g} ms above "
             f"{options.slowest:g} rad/s, {len(motion.windows)}: {_ADVICE}",
@@ -87,7 +87,7 @@ def read_run(label: str, data: xr.Dataset, par: WedgeParameters, options: Option
     return RunDown(label, run_par, motion, added, torque, equation)
 
 
-def fitted(runs: Sequence[RunDown], names: Sequence[str]) -> Estimate:
+def _fitted(runs: Sequence[RunDown], names: Sequence[str]) -> Estimate:
     """Fit the torque balances of all records for parameters of the motor and its bearings."""
     unknowns = parameters_of(runs[0].par, names)
     return steady_dynamics([run.problem(unknowns) for run in runs], unknowns, _ADVICE)
@@ -97,7 +97,7 @@ def _deceleration(run: RunDown) -> float:
     return float(np.mean(np.abs(run.motion.means(run.motion.data["alpha"].values))))
 
 
-def has_scale(runs: Sequence[RunDown]) -> bool:
+def _has_scale(runs: Sequence[RunDown]) -> bool:
     """Tell whether a known inertia or torque is large enough to set the scale.
 
     The current that the back-EMF drives through the loop is proportional to the deceleration. It
@@ -110,7 +110,7 @@ def has_scale(runs: Sequence[RunDown]) -> bool:
     return max(torque) - min(torque) > _SCALE * J[0] * max(map(_deceleration, runs))
 
 
-def by_source(runs: Sequence[RunDown]) -> dict[str, tuple[float, float]]:
+def _by_source(runs: Sequence[RunDown]) -> dict[str, tuple[float, float]]:
     """Return the inertia and its deviation, by the added inertia alone and by the current alone."""
     quiet = min(abs(run.torque) for run in runs)
     J = min(run.par.motor_1.J_M + run.par.rig.J_dummy for run in runs)
@@ -120,16 +120,16 @@ def by_source(runs: Sequence[RunDown]) -> dict[str, tuple[float, float]]:
     same = [run for run in runs if run.added == first]
     inertias = {}
     for name, chosen in (("added_inertia", bare), ("current", same)):
-        if not 1 < len(chosen) < len(runs) or not has_scale(chosen):
+        if not 1 < len(chosen) < len(runs) or not _has_scale(chosen):
             continue
-        best = fitted(chosen, NAMES)
-        if INERTIA in best.names:
-            deviation = float(best.deviations[best.names.index(INERTIA)])
-            inertias[name] = (best[INERTIA], deviation)
+        best = _fitted(chosen, _NAMES)
+        if _INERTIA in best.names:
+            deviation = float(best.deviations[best.names.index(_INERTIA)])
+            inertias[name] = (best[_INERTIA], deviation)
     return inertias
 
 
-def residuals_of(runs: Sequence[RunDown], best: Estimate) -> list[Array]:
+def _residuals_of(runs: Sequence[RunDown], best: Estimate) -> list[Array]:
     """Return the residual torques of every record [N m], by window."""
     values = best.parameters()
     unknowns = [u for u in best.unknowns if u.name in values]
@@ -186,13 +186,15 @@ def identify(
     ----------
     Roberts et al. (2003), sections "Motor", "Rollerscrew and bearings".
     """
-    runs = [read_run(label or "run", record, par, options) for label, record in split(data).items()]
-    names = NAMES if has_scale(runs) else NAMES[1:]
-    best = fitted(runs, names)
-    is_scaled = INERTIA in best.names
-    if not is_scaled and INERTIA in names:
-        best = fitted(runs, NAMES[1:])
-    sources = by_source(runs) if is_scaled else {}
+    runs = [
+        _read_run(label or "run", record, par, options) for label, record in split(data).items()
+    ]
+    names = _NAMES if _has_scale(runs) else _NAMES[1:]
+    best = _fitted(runs, names)
+    is_scaled = _INERTIA in best.names
+    if not is_scaled and _INERTIA in names:
+        best = _fitted(runs, _NAMES[1:])
+    sources = _by_source(runs) if is_scaled else {}
     return Identified(
         estimates={"inertia and friction" if is_scaled else "friction at the given inertia": best},
         parameters=best.parameters() if is_scaled else {},
@@ -224,7 +226,7 @@ def _agreement(sources: dict[str, tuple[float, float]]) -> tuple[Check, ...]:
 
 def _fits(runs: Sequence[RunDown], best: Estimate) -> Check:
     """Return whether a separate cubic over speed for every record would fit better."""
-    residuals = residuals_of(runs, best)
+    residuals = _residuals_of(runs, best)
     rows, columns, weights = sum(map(len, residuals)), [], []
     begin = 0
     for run, e in zip(runs, residuals, strict=True):
@@ -247,7 +249,7 @@ def _fits(runs: Sequence[RunDown], best: Estimate) -> Check:
 def _ratios(best: Estimate, par: WedgeParameters) -> dict[str, tuple[float, str]]:
     """Return friction and damping per inertia of motor and dummy shaft."""
     values = best.parameters()
-    J = values.get(INERTIA, par.motor_1.J_M) + par.rig.J_dummy
+    J = values.get(_INERTIA, par.motor_1.J_M) + par.rig.J_dummy
     return {
         f"{name}_per_inertia": (values[name] / J, unit)
         for name, unit in _RATIOS.items()
@@ -259,8 +261,8 @@ def _curve(runs: Sequence[RunDown], best: Estimate) -> Curve:
     """Return the decelerating torque over the speed, measured and modeled."""
     values = best.parameters()
     speeds, table = [], []
-    for run, e in zip(runs, residuals_of(runs, best), strict=True):
-        J = values.get(INERTIA, run.par.motor_1.J_M) + run.par.rig.J_dummy
+    for run, e in zip(runs, _residuals_of(runs, best), strict=True):
+        J = values.get(_INERTIA, run.par.motor_1.J_M) + run.par.rig.J_dummy
         moved = run.motion.data
         torque = run.motion.means(J * moved["alpha"].values)
         speeds.append(run.motion.means(moved["omega"].values))
@@ -308,6 +310,6 @@ METHOD = Method(
     identify=identify,
     synthetic=synthetic,
     simulated=("sigma_i", "sigma_q"),
-    unknowns=NAMES,
+    unknowns=_NAMES,
     several=True,
 )

@@ -37,7 +37,7 @@ from bywire.identification.estimate import Estimate
 from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.residuals import lack_of_fit
-from bywire.identification.sensed import sensed
+from bywire.identification.trust import sensed
 from bywire.identification.unknown import parameters_of
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
@@ -60,7 +60,7 @@ class Stroke:
     error: float
 
 
-def strokes(shaft: Motions, residuals: Array, par: WedgeParameters, side: int) -> list[Stroke]:
+def _strokes(shaft: Motions, residuals: Array, par: WedgeParameters, side: int) -> list[Stroke]:
     """Return a shaft's motions with the residual torque of each."""
     K_T, read = servo_motor.torque_constant(par.motor_1), []
     motion = np.array([w.motion for w in shaft.windows])
@@ -75,7 +75,7 @@ def strokes(shaft: Motions, residuals: Array, par: WedgeParameters, side: int) -
     return read
 
 
-def fits(strokes_read: list[Stroke], best: Estimate) -> Check:
+def _fits(strokes_read: list[Stroke], best: Estimate) -> Check:
     """Return whether a separate curve for every shaft and direction would fit better."""
     F = np.array([s.F for s in strokes_read]) / max(s.F for s in strokes_read)
     kind = [(s.side, s.drives) for s in strokes_read]
@@ -154,13 +154,13 @@ def identify(
     strokes_read = [
         stroke
         for part, shaft, side in zip(parts, shafts, (1, 2), strict=True)
-        for stroke in strokes(shaft, part.evaluate(full)[0], identified_par, side)
+        for stroke in _strokes(shaft, part.evaluate(full)[0], identified_par, side)
     ]
     return Identified(
         estimates={"screw and bearings": best},
         parameters=values,
         figures=_figures(identified_par, strokes_read),
-        checks=(fits(strokes_read, best),),
+        checks=(_fits(strokes_read, best),),
         curves=(_curve(strokes_read),),
         notes=(
             "a part of the bearings' friction that is proportional to the force (C_1) looks like "

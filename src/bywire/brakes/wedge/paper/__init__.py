@@ -1,1 +1,1 @@
-"""What the source states, beside what we compute."""
+"""Statements of the source, and the computed values."""

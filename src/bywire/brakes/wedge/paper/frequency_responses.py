@@ -34,10 +34,11 @@ def fig5(runs: Runs) -> Part:
     """Return the responses by amplitude, and the loss by friction."""
     runs.report("Fig. 5: sweep", 0.0)
     shares = [
-        float(of(screw(), _LOW, size)["share_sat_current"].max()) for size in AMPLITUDES[_LOW]
+        float(_responses_at(_screw_responses(), _LOW, size)["share_sat_current"].max())
+        for size in _AMPLITUDES[_LOW]
     ]
-    gain, phase = without_friction(_LOW)
-    preload, nearest = nearest_preload()
+    gain, phase = _without_friction(_LOW)
+    preload, nearest = _nearest_preload()
     items = [
         compared(
             "fig5.limit",
@@ -45,14 +46,14 @@ def fig5(runs: Runs) -> Part:
             100.0 * max(shares),
             note="largest share over frequencies and amplitudes",
         ),
-        *friction(_LOW, "fig5"),
+        *_friction_loss(_LOW, "fig5"),
         *_low_frequency(),
         compared("fig5.linear.gain", FACTS["same_gain"], gain, note="1 to 100 Hz"),
         compared("fig5.linear.phase", FACTS["same_phase"], phase, note="1 to 100 Hz"),
         compared(
             "fig5.wedge",
             FACTS["little"],
-            apart(_LOW),
+            _largest_distance(_LOW),
             note="largest distance of both responses, amplitudes of 0.5 and 1 rad",
         ),
         found(
@@ -71,12 +72,12 @@ def fig5(runs: Runs) -> Part:
     exhibits = (
         Exhibit(
             "fig5",
-            lambda: figure(_LOW),
+            lambda: _bode(_LOW),
             "Fig. 5: position frequency response, low bandwidth controller.",
         ),
         Exhibit(
             "fig5-wedge",
-            lambda: beside(_LOW),
+            lambda: _comparison(_LOW),
             "The assembled wedge beside the screw, low bandwidth controller.",
         ),
     )
@@ -85,26 +86,26 @@ def fig5(runs: Runs) -> Part:
         text,
         tuple(items),
         exhibits,
-        {"frequency-response-screw": screw()},
+        {"frequency-response-screw": _screw_responses()},
     )
 
 
-def friction(controller: str, figure: str) -> list[Item]:
+def _friction_loss(controller: str, figure: str) -> list[Item]:
     """Return the loss by friction at the lowest frequency."""
     items: list[Item] = []
-    sweep = screw()
+    sweep = _screw_responses()
     f = sweep["frequency"].values
-    linear = linear_response(controller, f)
-    sizes = AMPLITUDES[controller]
-    away = 100.0 * float(np.abs(response_of(sweep, controller, sizes[0])[0] - linear[0]))
+    linear = _linear_response(controller, f)
+    sizes = _AMPLITUDES[controller]
+    away = 100.0 * float(np.abs(_response_of(sweep, controller, sizes[0])[0] - linear[0]))
     items.append(
         compared(
             f"{figure}.friction", FACTS["friction_seen"], away, note=f"amplitude {sizes[0]:g} rad"
         )
     )
     for size in sizes:
-        value = response_of(sweep, controller, size)
-        lost = decibels(value / linear)
+        value = _response_of(sweep, controller, size)
+        lost = _decibels(value / linear)
         late = np.degrees(np.angle(value / linear))
         items.append(
             found(
@@ -120,12 +121,12 @@ def friction(controller: str, figure: str) -> list[Item]:
 
 def _low_frequency() -> list[Item]:
     """Return the loss by friction at low frequency, and the frequency of the largest loss."""
-    sweep = screw()
+    sweep = _screw_responses()
     f = sweep["frequency"].values
     lost = np.array(
         [
-            decibels(linear_response(_LOW, f) / response_of(sweep, _LOW, size))
-            for size in AMPLITUDES[_LOW]
+            _decibels(_linear_response(_LOW, f) / _response_of(sweep, _LOW, size))
+            for size in _AMPLITUDES[_LOW]
         ]
     )
     return [
@@ -159,25 +160,25 @@ Complex = NDArray[np.complex128]
 
 def fig6(runs: Runs) -> Part:
     """Return the responses by amplitude, the current limit and the screw's efficiency."""
-    gain, phase = without_friction(_HIGH)
+    gain, phase = _without_friction(_HIGH)
     runs.report("Fig. 6: current limit, efficiency", 0.5)
     items = [
         *_current_limit(),
         *_jump(),
-        *friction(_HIGH, "fig6"),
+        *_friction_loss(_HIGH, "fig6"),
         *_efficiency(),
         compared("fig6.linear.gain", FACTS["same_gain"], gain, note="1 to 100 Hz"),
         compared("fig6.linear.phase", FACTS["same_phase"], phase, note="1 to 100 Hz"),
         compared(
             "fig6.wedge",
             FACTS["little"],
-            apart(_HIGH),
+            _largest_distance(_HIGH),
             note="largest distance of both responses, amplitudes of 0.25, 0.5 and 1 rad",
         ),
         found(
             "fig6.wedge.below_limit",
             "%",
-            apart(_HIGH, limited=False),
+            _largest_distance(_HIGH, limited=False),
             "the same where the screw does not reach the current limit",
         ),
     ]
@@ -190,12 +191,12 @@ def fig6(runs: Runs) -> Part:
     exhibits = (
         Exhibit(
             "fig6",
-            lambda: figure(_HIGH),
+            lambda: _bode(_HIGH),
             "Fig. 6: position frequency response, high bandwidth controller.",
         ),
         Exhibit(
             "fig6-wedge",
-            lambda: beside(_HIGH),
+            lambda: _comparison(_HIGH),
             "The assembled wedge beside the screw, high bandwidth controller.",
         ),
     )
@@ -204,26 +205,26 @@ def fig6(runs: Runs) -> Part:
         text,
         tuple(items),
         exhibits,
-        {"frequency-response-wedge": wedge()},
+        {"frequency-response-wedge": _wedge_responses()},
     )
 
 
 def _current_limit() -> list[Item]:
     """Return the frequencies where the current limit begins, and its effect on gain and phase."""
-    f = screw()["frequency"].values
-    model = LOOPS.find("screw-position").closed(changed(_HIGH), 0.0)
+    f = _screw_responses()["frequency"].values
+    model = LOOPS.find("screw-position").closed(_parameters_with(_HIGH), 0.0)
     wide = bandwidth(lambda g: model.response(g)[:, 0, 0], (0.5, 500.0))
-    falls = -np.diff(np.degrees(np.unwrap(np.angle(linear_response(_HIGH, f)))))
+    falls = -np.diff(np.degrees(np.unwrap(np.angle(_linear_response(_HIGH, f)))))
     onsets, kinks, each = [], [], list[Item]()
-    for size in AMPLITUDES[_HIGH]:
-        response = of(screw(), _HIGH, size)
+    for size in _AMPLITUDES[_HIGH]:
+        response = _responses_at(_screw_responses(), _HIGH, size)
         limited = np.flatnonzero(response["share_sat_current"].values > 0)
         onset = float(f[limited[0]]) if limited.size else math.inf
         drops = -np.diff(response["phase"].values)
         k = int(np.argmax(drops / falls))
         onsets.append(onset)
         kinks.append(float(drops[k] / falls[k]))
-        slope = _slope(f, decibels(response_of(screw(), _HIGH, size)))
+        slope = _slope(f, _decibels(_response_of(_screw_responses(), _HIGH, size)))
         each += [
             found(
                 f"fig6.onset.{size:g}",
@@ -268,7 +269,7 @@ def _efficiency() -> list[Item]:
     _, drive = _wedge("drive")
     items: list[Item] = []
     for law, lossy in (("load", load), ("drive", drive)):
-        lost = decibels(ideal / lossy)
+        lost = _decibels(ideal / lossy)
         note = f"{_LAWS[law]}, amplitude {_SMALL:g} rad"
         items += [
             compared(
@@ -292,7 +293,7 @@ def _efficiency() -> list[Item]:
 
 def _wedge(law: str) -> tuple[Complex, Complex]:
     """Return the assembled wedge's response with a screw without loss, and with its loss."""
-    loop, par = LOOPS.find("position"), changed(_HIGH).replace({"screw.law": law})
+    loop, par = LOOPS.find("position"), _parameters_with(_HIGH).replace({"screw.law": law})
     leaves = par.leaves()
     sweep = Sweep(
         loop.inputs,
@@ -335,7 +336,7 @@ def _gain(begin: float) -> float:
         turns = np.where(t < _T_FALL, falling, at_end + _BELOW * (t - _T_FALL))
         return np.column_stack([_SHAKEN * np.sin(2.0 * math.pi * turns), 0.0 * t])
 
-    run = LOOPS.find("screw-position").point(changed(_HIGH), 0.0).run()
+    run = LOOPS.find("screw-position").point(_parameters_with(_HIGH), 0.0).run()
     run = replace(run, stimulus=stimulus, duration=_T_FALL + _T_SEEN)
     seen = simulate(run, ("theta_1",))
     inside = (seen.time > _T_FALL - 1e-9) & (seen.time < _T_FALL + _T_SEEN - 1e-9)
@@ -346,27 +347,27 @@ def _gain(begin: float) -> float:
 
 # --- The responses of both figures
 
-BANDWIDTHS = {"low": 12.0, "high": 60.0}
+_BANDWIDTHS = {"low": 12.0, "high": 60.0}
 """natural frequencies of the two position controllers [Hz]"""
-AMPLITUDES = {"low": (0.5, 1.0, 2.0), "high": (0.25, 0.5, 1.0)}
+_AMPLITUDES = {"low": (0.5, 1.0, 2.0), "high": (0.25, 0.5, 1.0)}
 """amplitudes shown of each controller [rad]"""
-FREQUENCIES = tuple(np.geomspace(1.0, 100.0, 40).tolist())
-_BOTH = tuple(sorted({size for sizes in AMPLITUDES.values() for size in sizes}))
+_FREQUENCIES = tuple(np.geomspace(1.0, 100.0, 40).tolist())
+_BOTH = tuple(sorted({size for sizes in _AMPLITUDES.values() for size in sizes}))
 _WEDGE = (0.25, 0.5, 1.0)  # larger ones would reach the disc
 _PRELOADS = (25.0, 50.0, 75.0, 100.0)  # N
 _PATIENCE = 12  # most windows: with friction, encoder and cogging they may never repeat
 
 
 @cache
-def screw() -> xr.Dataset:
+def _screw_responses() -> xr.Dataset:
     """Return the preloaded screw's responses: both controllers, all amplitudes, in one sweep."""
-    return _swept("screw-position", FREQUENCIES, _BOTH, ("stuck", "sat_current"))
+    return _swept("screw-position", _FREQUENCIES, _BOTH, ("stuck", "sat_current"))
 
 
 @cache
-def wedge() -> xr.Dataset:
+def _wedge_responses() -> xr.Dataset:
     """Return the assembled wedge's responses, at every third frequency."""
-    return _swept("position", FREQUENCIES[::3], _WEDGE, ("stuck",))
+    return _swept("position", _FREQUENCIES[::3], _WEDGE, ("stuck",))
 
 
 def _swept(
@@ -378,116 +379,122 @@ def _swept(
         loop.output,
         frequencies,
         amplitudes,
-        {"control.position.f_n": list(BANDWIDTHS.values())},
+        {"control.position.f_n": list(_BANDWIDTHS.values())},
         flags=flags,
         most=_PATIENCE,
     )
     responses = frequency_response(loop.point(parameters(), 0.0).run(), sweep)
-    return responses.assign_coords(controller=("variant", list(BANDWIDTHS)))
+    return responses.assign_coords(controller=("variant", list(_BANDWIDTHS)))
 
 
-def of(responses: xr.Dataset, controller: str, size: float) -> xr.Dataset:
+def _responses_at(responses: xr.Dataset, controller: str, size: float) -> xr.Dataset:
     """Return the figures of one controller and amplitude [rad], over frequency."""
-    return responses.isel(variant=list(BANDWIDTHS).index(controller)).sel(amplitude=size)
+    return responses.isel(variant=list(_BANDWIDTHS).index(controller)).sel(amplitude=size)
 
 
-def response_of(responses: xr.Dataset, controller: str, size: float) -> Complex:
+def _response_of(responses: xr.Dataset, controller: str, size: float) -> Complex:
     """Return a complex response, shape (frequencies,); NaN where the output sticks."""
-    figures = of(responses, controller, size)
+    figures = _responses_at(responses, controller, size)
     return np.asarray(figures["gain"].values * np.exp(1j * np.radians(figures["phase"].values)))
 
 
-def changed(controller: str) -> ParameterSet:
+def _parameters_with(controller: str) -> ParameterSet:
     """Return the parameter set with one of the controllers."""
-    return parameters().replace({"control.position.f_n": BANDWIDTHS[controller]})
+    return parameters().replace({"control.position.f_n": _BANDWIDTHS[controller]})
 
 
-def linear_response(controller: str, frequencies: Array) -> Complex:
+def _linear_response(controller: str, frequencies: Array) -> Complex:
     """Return the response of the screw's linear model, without friction and limit."""
     loop = LOOPS.find("screw-position")
-    return loop.closed(changed(controller), 0.0).response(frequencies)[:, 0, 0]
+    return loop.closed(_parameters_with(controller), 0.0).response(frequencies)[:, 0, 0]
 
 
-def decibels(response: Complex) -> Array:
+def _decibels(response: Complex) -> Array:
     """Return magnitudes in dB."""
     return np.asarray(20.0 * np.log10(np.abs(response)))
 
 
-def without_friction(controller: str) -> tuple[float, float]:
+def _without_friction(controller: str) -> tuple[float, float]:
     """Return the largest differences of the nonlinear and the linear response, dB and degree.
 
     Friction, cogging and the encoder's resolution are off, and the amplitude is below the current
     limit.
     """
     loop = LOOPS.find("screw-position")
-    smooth = loop.smooth(changed(controller))
+    smooth = loop.smooth(_parameters_with(controller))
     sweep = Sweep(
-        loop.inputs, loop.output, FREQUENCIES[::4], loop.amplitudes[:1], flags=(), tolerance=1e-4
+        loop.inputs, loop.output, _FREQUENCIES[::4], loop.amplitudes[:1], flags=(), tolerance=1e-4
     )
     response = frequency_response(loop.point(smooth, 0.0).run(), sweep).squeeze()
     measured = response["gain"].values * np.exp(1j * np.radians(response["phase"].values))
-    ratio = measured / linear_response(controller, response["frequency"].values)
-    return float(np.abs(decibels(ratio)).max()), float(np.abs(np.degrees(np.angle(ratio))).max())
+    ratio = measured / _linear_response(controller, response["frequency"].values)
+    return float(np.abs(_decibels(ratio)).max()), float(np.abs(np.degrees(np.angle(ratio))).max())
 
 
-def apart(controller: str, *, limited: bool = True) -> float:
+def _largest_distance(controller: str, *, limited: bool = True) -> float:
     """Return the largest distance of the wedge's response from the screw's, % of the amplitude.
 
     ``limited``: whether frequencies count at which the screw reaches the current limit.
     """
-    ours = screw().sel(frequency=wedge()["frequency"])
+    ours = _screw_responses().sel(frequency=_wedge_responses()["frequency"])
     largest = 0.0
-    for size in (size for size in AMPLITUDES[controller] if size in _WEDGE):
-        free = of(ours, controller, size)["share_sat_current"].values == 0
-        away = np.abs(response_of(wedge(), controller, size) - response_of(ours, controller, size))
+    for size in (size for size in _AMPLITUDES[controller] if size in _WEDGE):
+        free = _responses_at(ours, controller, size)["share_sat_current"].values == 0
+        away = np.abs(
+            _response_of(_wedge_responses(), controller, size)
+            - _response_of(ours, controller, size)
+        )
         largest = max(largest, float(away[free | limited].max()))
     return 100.0 * largest
 
 
-def nearest_preload() -> tuple[float, float]:
+def _nearest_preload() -> tuple[float, float]:
     """Return the screw's preload [N] that comes closest to the wedge, and the distance [%].
 
     Low-bandwidth controller, the same amplitudes and frequencies as `apart`.
     """
-    sizes = tuple(size for size in AMPLITUDES["low"] if size in _WEDGE)
+    sizes = tuple(size for size in _AMPLITUDES["low"] if size in _WEDGE)
     loop = LOOPS.find("screw-position")
     sweep = Sweep(
         loop.inputs,
         loop.output,
-        FREQUENCIES[::3],
+        _FREQUENCIES[::3],
         sizes,
         {"rig.F_0": list(_PRELOADS)},
         flags=(),
         most=_PATIENCE,
     )
-    responses = frequency_response(loop.point(changed("low"), 0.0).run(), sweep)
+    responses = frequency_response(loop.point(_parameters_with("low"), 0.0).run(), sweep)
     values = responses["gain"].values * np.exp(1j * np.radians(responses["phase"].values))
-    of_wedge = np.array([response_of(wedge(), "low", size) for size in sizes])
+    of_wedge = np.array([_response_of(_wedge_responses(), "low", size) for size in sizes])
     away = np.abs(values - of_wedge).max(axis=(1, 2))
     k = int(away.argmin())
     return _PRELOADS[k], 100.0 * float(away[k])
 
 
-def figure(controller: str) -> Figure:
+def _bode(controller: str) -> Figure:
     """Return the Bode plot: all amplitudes, and the linear model's."""
-    f = screw()["frequency"].values
-    lines = [Response("linear", f, linear_response(controller, f))]
+    f = _screw_responses()["frequency"].values
+    lines = [Response("linear", f, _linear_response(controller, f))]
     lines += [
-        Response(f"amplitude {size:g} rad", f, response_of(screw(), controller, size))
-        for size in AMPLITUDES[controller]
+        Response(f"amplitude {size:g} rad", f, _response_of(_screw_responses(), controller, size))
+        for size in _AMPLITUDES[controller]
     ]
     return bode(lines)
 
 
-def beside(controller: str) -> Figure:
+def _comparison(controller: str) -> Figure:
     """Return the Bode plot of the assembled wedge's response as points on the screw's."""
     lines = []
-    for size in (size for size in AMPLITUDES[controller] if size in _WEDGE):
-        for label, responses, points in (("screw", screw(), False), ("wedge", wedge(), True)):
+    for size in (size for size in _AMPLITUDES[controller] if size in _WEDGE):
+        for label, responses, points in (
+            ("screw", _screw_responses(), False),
+            ("wedge", _wedge_responses(), True),
+        ):
             f = responses["frequency"].values
             lines.append(
                 Response(
-                    f"{label} {size:g} rad", f, response_of(responses, controller, size), points
+                    f"{label} {size:g} rad", f, _response_of(responses, controller, size), points
                 )
             )
     return bode(lines)

@@ -19,9 +19,9 @@ from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs, kpis
 
-AWAY = 0.2
+_AWAY = 0.2
 """friction coefficient far from the neutral point"""
-LOADED = {"M_high": 500.0, "t_hold": 2.0}
+_LOADED = {"M_high": 500.0, "t_hold": 2.0}
 
 
 def part(runs: Runs) -> Part:
@@ -46,7 +46,7 @@ def _power_off(runs: Runs) -> list[Item]:
     neutral = {**with_friction(parameters(), tan_alpha(), known=True), **WITHOUT_RUNOUT}
     kept = kpis(runs.bench("power-off-hold", MAIN, neutral))
     usual = kpis(runs.bench("power-off-hold", MAIN))
-    low = {**with_friction(parameters(), AWAY, known=True), **WITHOUT_RUNOUT}
+    low = {**with_friction(parameters(), _AWAY, known=True), **WITHOUT_RUNOUT}
     far = kpis(runs.bench("power-off-hold", MAIN, low))
     still = Fact(
         0.0, "m", "physical bound: a body that dry friction holds does not creep", "physical bound"
@@ -76,7 +76,7 @@ def _power_off(runs: Runs) -> list[Item]:
             "hold.far",
             "%",
             _share(far),
-            f"as hold.neutral at mu_B = {AWAY:g}: back-driven until friction holds",
+            f"as hold.neutral at mu_B = {_AWAY:g}: back-driven until friction holds",
         ),
     ]
 
@@ -124,18 +124,18 @@ def _self_reinforcement(run: xr.Dataset) -> float:
 
 
 def _together(runs: Runs) -> list[Item]:
-    away = with_friction(parameters(), AWAY, known=True)
+    away = with_friction(parameters(), _AWAY, known=True)
     above = {}
     for law in ("preload", "scheduled"):
         overrides = {**away, "control.offset.law": law}
-        run = runs.bench("moment-pulses", MAIN, overrides, LOADED).recordings["run"]
-        above[law] = settled(run, "P_in", LOADED["t_hold"]) - standby()
+        run = runs.bench("moment-pulses", MAIN, overrides, _LOADED).recordings["run"]
+        above[law] = settled(run, "P_in", _LOADED["t_hold"]) - standby()
     return [
         compared(
             "hold.together",
             FACTS["together"],
             above["scheduled"] / above["preload"],
-            note=f"500 Nm at mu_B = {AWAY:g}: {above['scheduled']:.3g} W together, "
+            note=f"500 Nm at mu_B = {_AWAY:g}: {above['scheduled']:.3g} W together, "
             f"{above['preload']:.3g} W preloaded",
         ),
     ]

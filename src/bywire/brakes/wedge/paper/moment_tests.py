@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import xarray as xr
 
@@ -14,7 +16,6 @@ from bywire.brakes.wedge.paper.statements import (
     IDEAL,
     MAIN,
     WITHOUT_RUNOUT,
-    order_spectrum,
     parameters,
     settled,
     stacked,
@@ -24,11 +25,11 @@ from bywire.reproduction.item import Fact, Item, compared, found, reading
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs, kpis, peak
 
-TURNS = 20
+_TURNS = 20
 """revolutions of the analysis of the oscillation"""
-LONG_HOLD = {"t_hold": 3.0}
+_LONG_HOLD = {"t_hold": 3.0}
 """[s], longer than that many revolutions"""
-FROM = 0.5
+_FROM = 0.5
 """time [s] from which the hold is settled"""
 
 
@@ -56,7 +57,7 @@ def fig7(runs: Runs) -> Part:
     )
 
 
-def pulse_ends(result: Result) -> list[float]:
+def _pulse_ends(result: Result) -> list[float]:
     """Return when each pulse ends [s]."""
     o = result.bench.chosen_options.flat()
     period = o["t_low"] + o["t_high"]
@@ -66,7 +67,7 @@ def pulse_ends(result: Result) -> list[float]:
 def _held_moments(result: Result) -> list[Item]:
     run, hold = result.recordings["run"], result.bench.chosen_options.flat()["t_hold"]
     stated = FACTS["pulsed"].value
-    low = [settled(run, "M_B", end) for end in pulse_ends(result)]
+    low = [settled(run, "M_B", end) for end in _pulse_ends(result)]
     worst = max(low, key=lambda M: abs(M - stated))
     judged = "mean over the last revolution of the disc before the demand changes"
     return [
@@ -82,13 +83,13 @@ def _held_moments(result: Result) -> list[Item]:
 
 def _oscillation(runs: Runs) -> list[Item]:
     """Return order and cause of the moment's oscillation."""
-    run = runs.bench("moment-pulses", MAIN, None, LONG_HOLD).recordings["run"]
-    plain = runs.bench("moment-pulses", MAIN, WITHOUT_RUNOUT, LONG_HOLD).recordings["run"]
-    end = LONG_HOLD["t_hold"]
-    spectrum = order_spectrum(run, "M_B", TURNS, FROM)
+    run = runs.bench("moment-pulses", MAIN, None, _LONG_HOLD).recordings["run"]
+    plain = runs.bench("moment-pulses", MAIN, WITHOUT_RUNOUT, _LONG_HOLD).recordings["run"]
+    end = _LONG_HOLD["t_hold"]
+    spectrum = order_spectrum(run, "M_B", _TURNS, _FROM)
     strongest = int(np.argmax(spectrum["amplitude"]))
     third = float(np.interp(3.0, spectrum["order"], spectrum["amplitude"]))
-    ripple = swing(run, "M_B", FROM, end)
+    ripple = swing(run, "M_B", _FROM, end)
     return [
         compared(
             "fig7.ripple_order",
@@ -100,7 +101,7 @@ def _oscillation(runs: Runs) -> list[Item]:
         compared(
             "fig7.ripple_without_runout",
             FACTS["runout"],
-            100.0 * swing(plain, "M_B", FROM, end) / ripple,
+            100.0 * swing(plain, "M_B", _FROM, end) / ripple,
             note="peak to peak in % of that with run-out: the loop does not hunt",
         ),
         found(
@@ -126,10 +127,38 @@ def _oscillation(runs: Runs) -> list[Item]:
         found(
             "fig7.share_stuck",
             "%",
-            100.0 * mean(run, "stuck", FROM, end),
+            100.0 * mean(run, "stuck", _FROM, end),
             "share of the hold in which shafts and wedge stick",
         ),
     ]
+
+
+def order_spectrum(
+    run: xr.Dataset, name: str, turns: int, begin: float
+) -> Mapping[str, np.ndarray[tuple[int], np.dtype[np.float64]]]:
+    """Return the spectrum of a signal over the disc's angle.
+
+    Parameters
+    ----------
+    turns
+        Revolutions of the analysis: the spectrum resolves 1/turns.
+    begin
+        Start of the analysis [s].
+
+    Returns
+    -------
+    mapping
+        ``order`` [waves per revolution] and ``amplitude`` [the signal's unit], without the mean;
+        NaN where the disc turns too little.
+    """
+    seen = run.sel(time=slice(begin, None))
+    phi = np.abs(seen["phi"].values)
+    angle = phi[0] + np.linspace(0.0, 2.0 * np.pi * turns, 128 * turns, endpoint=False)
+    if angle[-1] > phi[-1]:
+        return {"order": np.array([np.nan]), "amplitude": np.array([np.nan])}
+    values = np.interp(angle, phi, seen[name].values)
+    wave = 2.0 * np.abs(np.fft.rfft(values - values.mean())) / values.size
+    return {"order": np.arange(wave.size) / turns, "amplitude": wave}
 
 
 def _stiffness() -> float:
@@ -293,11 +322,11 @@ def _items(result: Result) -> list[Item]:
 
 # --- Fig. 9: a pulse of 950 N m on the software rate limit
 
-SHORT, LONGER = 0.11, 1.0
+_SHORT, _LONGER = 0.11, 1.0
 """lengths [s] of a pulse that ends as soon as the moment is there, and of a longer braking"""
-THRESHOLDS = (8.0, 20.0)
+_THRESHOLDS = (8.0, 20.0)
 """moments [N m] below which the controller leaves the moment mode; our 12 N m lies between"""
-FIRST = 0.2
+_FIRST = 0.2
 """time [s] in which the effect of friction is compared, the length of the pulse"""
 
 
@@ -345,7 +374,7 @@ def _pulse_moment(result: Result) -> list[Item]:
     ]
 
 
-def limited(result: Result, target: float) -> tuple[float, float]:
+def _limited(result: Result, target: float) -> tuple[float, float]:
     """Return the shares of the time to 90 % on the rate limit [%]: from contact, from the step."""
     run, values = result.recordings["run"], kpis(result)
     end = run["time"].values[int(np.argmax(run["y_M"].values > 0.9 * target))]
@@ -358,8 +387,8 @@ def limited(result: Result, target: float) -> tuple[float, float]:
 def _limits(runs: Runs, result: Result) -> list[Item]:
     """Return the dominant effect at either amplitude: friction, or limits."""
     small = runs.bench("moment-pulses", MAIN)
-    build_up, whole = limited(result, FACTS["pulse"].value)
-    _, whole_small = limited(small, FACTS["held"].value)
+    build_up, whole = _limited(result, FACTS["pulse"].value)
+    _, whole_small = _limited(small, FACTS["held"].value)
     effects = {
         M: _friction_effect(runs, name, M)
         for name, M in (
@@ -388,7 +417,7 @@ def _limits(runs: Runs, result: Result) -> list[Item]:
             "fig9.friction_dominates",
             FACTS["small_friction"],
             at_200 / at_950,
-            note=f"root mean square over {FIRST:g} s of the effect of friction: "
+            note=f"root mean square over {_FIRST:g} s of the effect of friction: "
             f"{100 * at_200:.3g} % of 200 Nm, {100 * at_950:.3g} % of 950 Nm",
         ),
     ]
@@ -397,7 +426,7 @@ def _limits(runs: Runs, result: Result) -> list[Item]:
 def _friction_effect(runs: Runs, experiment: str, M: float) -> float:
     """Return the effect of friction on the moment, root mean square over the demand."""
     changed = [
-        runs.bench(experiment, MAIN, overrides).recordings["run"]["M_B"].sel(time=slice(0, FIRST))
+        runs.bench(experiment, MAIN, overrides).recordings["run"]["M_B"].sel(time=slice(0, _FIRST))
         for overrides in ({**WITHOUT_RUNOUT, "encoder.law": "ideal"}, IDEAL)
     ]
     with_friction, without = (moment.values for moment in changed)
@@ -412,9 +441,9 @@ def _pulse_power(runs: Runs, result: Result) -> list[Item]:
     hold = settled(fig7.recordings["run"], "P_meas", t_hold) - standby()
     before = _largest(run, 0.0, contact) - standby()
     after = _largest(run, contact, end) - standby()
-    longer = runs.bench("moment-pulse-950", MAIN, None, {"t_pulse": LONGER}).recordings["run"]
-    short = runs.bench("moment-pulse-950", MAIN, None, {"t_pulse": SHORT}).recordings["run"]
-    steady = settled(longer, "P_meas", LONGER) - standby()
+    longer = runs.bench("moment-pulse-950", MAIN, None, {"t_pulse": _LONGER}).recordings["run"]
+    short = runs.bench("moment-pulse-950", MAIN, None, {"t_pulse": _SHORT}).recordings["run"]
+    steady = settled(longer, "P_meas", _LONGER) - standby()
     late = float(run["P_meas"].sel(time=end - 1e-3, method="nearest")) - standby()
     return [
         compared(
@@ -439,14 +468,14 @@ def _pulse_power(runs: Runs, result: Result) -> list[Item]:
         found(
             "fig9.lowest_power.short",
             "1",
-            _lowest(short, contact, SHORT) / hold,
-            f"the same for a pulse of {SHORT:g} s",
+            _lowest(short, contact, _SHORT) / hold,
+            f"the same for a pulse of {_SHORT:g} s",
         ),
         compared(
             "fig9.power_reduces",
             FACTS["reduces"],
             steady / late,
-            note=f"{steady:.3g} W after {LONGER:g} s, {late:.3g} W at the end of the pulse",
+            note=f"{steady:.3g} W after {_LONGER:g} s, {late:.3g} W at the end of the pulse",
         ),
         found("fig9.steady_power", "W", steady, "above standby, last revolution of 1 s at 950 Nm"),
     ]
@@ -464,11 +493,11 @@ def _lowest(run: xr.Dataset, begin: float, end: float) -> float:
 def _tail(runs: Runs) -> list[Item]:
     """Return the effect of the gap mode's threshold on the end of the release."""
     low, high = (
-        runs.bench("moment-pulse-950", MAIN, {"control.moment.M_contact": M}) for M in THRESHOLDS
+        runs.bench("moment-pulse-950", MAIN, {"control.moment.M_contact": M}) for M in _THRESHOLDS
     )
     times = [_switches(result.recordings["run"]) for result in (low, high)]
     parking = [kpis(result)["parking_time"] for result in (low, high)]
-    between = f"between thresholds of {THRESHOLDS[0]:g} and {THRESHOLDS[1]:g} Nm"
+    between = f"between thresholds of {_THRESHOLDS[0]:g} and {_THRESHOLDS[1]:g} Nm"
     why = "the paper attributes its difference at the end of Fig. 9 to the time of this switch"
     return [
         found(

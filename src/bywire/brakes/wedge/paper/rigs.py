@@ -15,7 +15,7 @@ from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs, kpis
 
-MICRON = 1e6
+_MICRON = 1e6
 """[N/m] in one N/um"""
 
 
@@ -113,8 +113,8 @@ def stiffness(runs: Runs) -> Part:
     result = runs.bench("stiffness", MAIN)
     values = kpis(result)
     items = [
-        _recovered("stiffness.K_S", FACTS["sets_stiffness"], values, "K_S", MICRON),
-        _recovered("stiffness.K_W", FACTS["sets_stiffness"], values, "K_W", MICRON),
+        _recovered("stiffness.K_S", FACTS["sets_stiffness"], values, "K_S", _MICRON),
+        _recovered("stiffness.K_W", FACTS["sets_stiffness"], values, "K_W", _MICRON),
         _recovered("stiffness.free_play", FACTS["measures_play"], values, "free_play", 1e-6),
         *_directions(values),
     ]
@@ -143,13 +143,13 @@ def _directions(values: dict[str, float]) -> list[Item]:
     """Return the comparison of compression and tension."""
     K_F = parameters().rig.sensor.K_F
     line = 1.0 / (1.0 / values["K_line_compression"] - 1.0 / K_F)
-    same = replace(FACTS["same_compression"], value=line / MICRON)
+    same = replace(FACTS["same_compression"], value=line / _MICRON)
     compression = values["K_heart_compression"]
     return [
         compared(
             "stiffness.compression",
             same,
-            compression / MICRON,
+            compression / _MICRON,
             note="tip to tip, the force by the motors' current",
         ),
         compared(
@@ -169,8 +169,8 @@ def _directions(values: dict[str, float]) -> list[Item]:
 
 # --- Position control of the wedge, and the force fight
 
-MOTIONS = ("step", "ramp", "sine")
-WEAKER = 0.95
+_MOTIONS = ("step", "ramp", "sine")
+_WEAKER = 0.95
 """torque constant of motor 2 over that of motor 1 where they differ"""
 
 
@@ -212,7 +212,7 @@ def force_fight(runs: Runs) -> Part:
     """Return the forces between two motors that follow one reference."""
     result = runs.bench("force-fight", MAIN)
     values = kpis(result)
-    equal = max(values[f"peak_force_{motion}_equal"] for motion in MOTIONS)
+    equal = max(values[f"peak_force_{motion}_equal"] for motion in _MOTIONS)
     o = result.bench.chosen_options.flat()
     unequal = ", ".join(f"{100 * o[f'more_{key}']:+g} % {key}" for key in ("K", "J", "R", "D"))
     items = [
@@ -229,7 +229,7 @@ def force_fight(runs: Runs) -> Part:
                 values[f"peak_force_{motion}_unequal"],
                 f"largest force, motor 2 with {unequal}, our choice",
             )
-            for motion in MOTIONS
+            for motion in _MOTIONS
         ),
         found(
             "force_fight.static",
@@ -255,7 +255,7 @@ def force_fight(runs: Runs) -> Part:
 def _speed(runs: Runs) -> list[Item]:
     """Return the effect of a doubled rate limit on the angle between the motors."""
     par = parameters()
-    weaker = {"motor_2.K_ref": WEAKER * par.motor_2.K_ref}
+    weaker = {"motor_2.K_ref": _WEAKER * par.motor_2.K_ref}
     rate = par.control.moment.rate_max
     swings = []
     for limit in (rate, 2.0 * rate):
@@ -271,7 +271,7 @@ def _speed(runs: Runs) -> list[Item]:
             FACTS["faster_fights"],
             swings[1] / swings[0],
             note=f"swings of {1e3 * swings[0]:.3g} mrad at {rate:g} rad/s, {1e3 * swings[1]:.3g} "
-            f"mrad at {2 * rate:g} rad/s; torque constant of motor 2 {WEAKER:g} times",
+            f"mrad at {2 * rate:g} rad/s; torque constant of motor 2 {_WEAKER:g} times",
         ),
         found(
             "force_fight.force_per_angle",

@@ -28,26 +28,26 @@ from bywire.reproduction.runs import Runs, kpis
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COEFFICIENTS = (0.2, 0.35, 0.6)
+_COEFFICIENTS = (0.2, 0.35, 0.6)
 """below, near and above the neutral point: brake factors that are judged"""
-TRIED = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6)
+_TRIED = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6)
 """coefficients at which the actuation force is computed"""
-LOWEST, HIGHEST = 0.32, 0.62
+_LOWEST, _HIGHEST = 0.32, 0.62
 """bounds of the search for the lowest coefficient that runs away"""
-GROWN = 1.05
+_GROWN = 1.05
 """moment over that at power-off from which the brake has run away"""
-VARIANTS = (
+_VARIANTS = (
     ("", "fixed", "kept"),
     (".frictionless", "fixed", "none"),
     (".known", "known", "kept"),
 )
 """endings of ids, whether the controller knows mu_B, and the brake's friction"""
-FREE = {"control.offset.delta_preload": 0.0}
-HOLD = (0.1, 0.5)
+_FREE = {"control.offset.delta_preload": 0.0}
+_HOLD = (0.1, 0.5)
 """times [s] between which changes of contact are counted"""
-BELOW, ABOVE = 0.2, 0.5
+_BELOW, _ABOVE = 0.2, 0.5
 """friction coefficients on both sides of the neutral point"""
-DEPTH = 5e-5
+_DEPTH = 5e-5
 """wedge travel [m] beyond contact at the operating point; the model is linear there"""
 
 
@@ -80,7 +80,7 @@ def _static(runs: Runs) -> list[Item]:
     """Return brake factor and actuation force at rest, without friction."""
     values = kpis(runs.bench("static-force", MAIN, None, _sweep()))
     items = []
-    for mu_B in COEFFICIENTS:
+    for mu_B in _COEFFICIENTS:
         stated = values[f"C_star_closed_{tag(mu_B)}"]
         where = (
             "section 'Introduction': C* = 2 mu_B/(tan(alpha) - mu_B), read as its value at our "
@@ -114,7 +114,7 @@ def _static(runs: Runs) -> list[Item]:
 
 def _sweep() -> dict[str, Any]:
     """Return the coefficients of the static test, the neutral point among them."""
-    return {"mu_B": tuple(sorted((*TRIED, tan_alpha())))}
+    return {"mu_B": tuple(sorted((*_TRIED, tan_alpha())))}
 
 
 def _figure(runs: Runs) -> Exhibit:
@@ -171,24 +171,24 @@ def _lowest(runs: Runs, changes: dict[str, Any], M_hold: float) -> float:
     """
 
     def grows(k: int) -> bool:
-        overrides = _at(round(LOWEST + k * ALLOWANCES["grid"].size, 3), changes)
+        overrides = _at(round(_LOWEST + k * ALLOWANCES["grid"].size, 3), changes)
         values = kpis(runs.bench("power-off-hold", MAIN, overrides, {"M_hold": M_hold}))
         met_stop = values["end_stop_force"] > 0.0
-        return met_stop or values["moment_end"] > GROWN * values["moment_start"]
+        return met_stop or values["moment_end"] > _GROWN * values["moment_start"]
 
-    low, high = 0, round((HIGHEST - LOWEST) / ALLOWANCES["grid"].size)
+    low, high = 0, round((_HIGHEST - _LOWEST) / ALLOWANCES["grid"].size)
     if grows(low) or not grows(high):
         return math.nan
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if grows(middle) else (middle, high)
-    return round(LOWEST + high * ALLOWANCES["grid"].size, 3)
+    return round(_LOWEST + high * ALLOWANCES["grid"].size, 3)
 
 
 def _closed_loop(runs: Runs) -> list[Item]:
     """Return stability and overshoot of the closed loop at all coefficients."""
     items: list[Item] = []
-    for suffix, slope, friction in VARIANTS:
+    for suffix, slope, friction in _VARIANTS:
         values = kpis(
             runs.bench("friction-sweep", MAIN, None, {"slope": slope, "friction": friction})
         )
@@ -221,11 +221,11 @@ def _free_play(runs: Runs) -> list[Item]:
     """Return the changes of contact at the neutral point, with preload and with free-play."""
     shaking = {"flywheel.runout": parameters().flywheel.runout}
     held = {}
-    for name, preload in (("preload", {}), ("free_play", FREE)):
+    for name, preload in (("preload", {}), ("free_play", _FREE)):
         overrides = _at(tan_alpha(), {**IDEAL, **shaking, **preload})
         held[name] = runs.bench("moment-pulses", MAIN, overrides).recordings["run"]
     changes = {
-        name: int(np.count_nonzero(np.diff(run["contacts"].sel(time=slice(*HOLD)).values)))
+        name: int(np.count_nonzero(np.diff(run["contacts"].sel(time=slice(*_HOLD)).values)))
         for name, run in held.items()
     }
     note = "changes of contact between the rows of 0.4 s of a hold at tan(alpha), without friction"
@@ -246,7 +246,7 @@ def _free_play(runs: Runs) -> list[Item]:
             found(
                 f"stability.ripple.{name}",
                 "N*m",
-                swing(run, "M_B", *HOLD),
+                swing(run, "M_B", *_HOLD),
                 "peak to peak of the moment meanwhile",
             )
             for name, run in held.items()
@@ -257,7 +257,7 @@ def _free_play(runs: Runs) -> list[Item]:
 def _poles() -> list[Item]:
     """Return the slow open-loop poles at constant currents, without friction and cogging."""
     note = "linear model at constant currents, without friction and cogging, mu_B ="
-    below, neutral, above = (slow_pole(mu_B) for mu_B in (BELOW, tan_alpha(), ABOVE))
+    below, neutral, above = (_slow_pole(mu_B) for mu_B in (_BELOW, tan_alpha(), _ABOVE))
     return [
         compared(
             "stability.pole.neutral",
@@ -269,22 +269,22 @@ def _poles() -> list[Item]:
             "stability.pole.above",
             FACTS["unstable_pole"],
             above.real,
-            note=f"largest growth rate, {note} {ABOVE:g}",
+            note=f"largest growth rate, {note} {_ABOVE:g}",
         ),
         compared(
             "stability.pole.below",
             FACTS["stable_pole"],
             below.real,
-            note=f"largest growth rate, {note} {BELOW:g}",
+            note=f"largest growth rate, {note} {_BELOW:g}",
         ),
-        found("stability.swing.below", "rad/s", below.imag, f"of the slow pair, {note} {BELOW:g}"),
+        found("stability.swing.below", "rad/s", below.imag, f"of the slow pair, {note} {_BELOW:g}"),
     ]
 
 
-def slow_pole(mu_B: float) -> complex:
+def _slow_pole(mu_B: float) -> complex:
     """Return the slow pole that grows fastest [1/s], the one with positive frequency of a pair."""
     par = parameters().replace({**IDEAL, "command.mode": "current", "wedge.mu_B": mu_B})
-    state = state_at(travel_for(0.0, par) + DEPTH, par)
+    state = state_at(travel_for(0.0, par) + _DEPTH, par)
     model = linearize(
         WedgeBrake(), par, state, memory_at(state.x, par), inputs=("i_1_ref",), outputs=("x",)
     )

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-import numpy as np
 import xarray as xr
 
 from bywire.brakes.wedge.case import FRICTIONLESS
@@ -16,7 +14,6 @@ from bywire.brakes.wedge.panels import BRAKING
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.sets import roberts2003
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.report.time_traces import time_traces
 from bywire.reproduction.source_file import SourceFile
 
 if TYPE_CHECKING:
@@ -63,6 +60,8 @@ def stacked(run: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
     measured
         Recording of a rig with the same names and units; its variables may be fewer.
     """
+    from bywire.report.time_traces import time_traces  # with Matplotlib, which runs do without
+
     return time_traces(run, panels=STACK, measured=measured)
 
 
@@ -76,31 +75,3 @@ def settled(run: xr.Dataset, name: str, end: float) -> float:
 def standby() -> float:
     """Return the drives' standby power [W]."""
     return parameters().supply.P_standby
-
-
-def order_spectrum(
-    run: xr.Dataset, name: str, turns: int, begin: float
-) -> Mapping[str, np.ndarray[tuple[int], np.dtype[np.float64]]]:
-    """Return the spectrum of a signal over the disc's angle.
-
-    Parameters
-    ----------
-    turns
-        Revolutions of the analysis: the spectrum resolves 1/turns.
-    begin
-        Start of the analysis [s].
-
-    Returns
-    -------
-    mapping
-        ``order`` [waves per revolution] and ``amplitude`` [the signal's unit], without the mean;
-        NaN where the disc turns too little.
-    """
-    seen = run.sel(time=slice(begin, None))
-    phi = np.abs(seen["phi"].values)
-    angle = phi[0] + np.linspace(0.0, 2.0 * np.pi * turns, 128 * turns, endpoint=False)
-    if angle[-1] > phi[-1]:
-        return {"order": np.array([np.nan]), "amplitude": np.array([np.nan])}
-    values = np.interp(angle, phi, seen[name].values)
-    wave = 2.0 * np.abs(np.fft.rfft(values - values.mean())) / values.size
-    return {"order": np.arange(wave.size) / turns, "amplitude": wave}

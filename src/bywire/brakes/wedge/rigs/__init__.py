@@ -1,1 +1,1 @@
-"""Test rigs of the drive train."""
+"""Rigs of the drive train, and a car's corner."""

@@ -10,7 +10,6 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case
-from bywire.brakes.wedge.case import case_from_parked
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
 from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
@@ -72,20 +71,6 @@ def _case(
     )
 
 
-def heart_case(par: WedgeParameters, stimulus: Stimuli, duration: float, mode: str) -> Case:
-    """Return a run of both motors in the brake heart, without an offset and so without force.
-
-    The command's ``mode`` is "current" or "position"; the wedge stays in its clearance.
-    """
-    changes = {"command.mode": mode, "control.offset.delta_preload": 0.0}
-    return case_from_parked(par, stimulus, duration, changes, "heart")
-
-
-def squeezing_current(run: xr.Dataset) -> Array:
-    """Return the current [A] that squeezes, the mean of both motors."""
-    return np.asarray(0.5 * (run["i_1"].values - run["i_2"].values))
-
-
 def check_current(name: str, i: float, par: WedgeParameters) -> None:
     """Require a current that the drives can give.
 
@@ -110,12 +95,6 @@ def slope_of(par: WedgeParameters) -> float:
 def torque_constant_of(par: WedgeParameters) -> float:
     """Return the torque constant [N m/A] assumed by the rig's control."""
     return par.control.position.K_hat
-
-
-def share_at(run: xr.Dataset, name: str, limit: float) -> float:
-    """Return the share of the time after zero in which a signal's magnitude is at a limit [%]."""
-    after = np.abs(run[name].sel(time=slice(-1e-9, None)).values)
-    return 100.0 * float(np.mean(after >= limit * (1.0 - 1e-9)))
 
 
 def peak(run: xr.Dataset, name: str) -> float:

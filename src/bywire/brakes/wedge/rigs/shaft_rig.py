@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from bywire.brakes.wedge import drive_train
 from bywire.brakes.wedge.drive_train import Command, Demand
-from bywire.brakes.wedge.parameters import WedgeParameters, dummy_inertia
+from bywire.brakes.wedge.parameters import RigParameters, WedgeParameters
 from bywire.core import ops
 from bywire.core.assembly import Assembly
 from bywire.core.model import Bounds, Task
@@ -98,12 +98,12 @@ class ShaftRig(Assembly[WedgeParameters, Memory]):
     def mass(self, xe: Any, par: Par) -> Any:
         """Return the inductance and the inertia, that of the dummy shaft included."""
         motor = super().mass(xe, par)
-        return motor._replace(omega_1=motor.omega_1 + dummy_inertia(par.rig))
+        return motor._replace(omega_1=motor.omega_1 + _dummy_inertia(par.rig))
 
     def stored(self, w: Self) -> Any:
         """Return the energy in the motor and in the dummy shaft [J]."""
         omega = w.motor.x.omega
-        return super().stored(w) + 0.5 * dummy_inertia(w.par.rig) * omega * omega
+        return super().stored(w) + 0.5 * _dummy_inertia(w.par.rig) * omega * omega
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
         """Return the limits of the friction on the shaft."""
@@ -120,7 +120,7 @@ class ShaftRig(Assembly[WedgeParameters, Memory]):
 
     def record(self, w: Self) -> dict[str, float]:
         """Return the recorded signals other than states and losses."""
-        limited = ops.fabs(w.m.i_1_ref) >= current_limit(w.par)
+        limited = ops.fabs(w.m.i_1_ref) >= _current_limit(w.par)
         return {
             "q_1": shaft_encoder.reading(w.motor.x.theta, w.par.encoder),
             "sat_current": ops.where(limited, 1.0, 0.0),
@@ -143,8 +143,8 @@ def friction(omega: float, torque: float, par: Par) -> Bounds:
 
     Notes
     -----
-    A preloaded nut has two halves that push on each other through the screw: whichever way it
-    turns, one half drives and the other is driven. Both rub, and their net torque is zero.
+    A preloaded nut has two halves that push on each other through the screw: in either direction
+    of rotation, one half drives and the other is driven. Both rub, and their net torque is zero.
     """
     T_p = T_n = drive_train.bearing_friction(omega, NUT, par)
     if par.rig.load == "screw":
@@ -159,7 +159,12 @@ def friction(omega: float, torque: float, par: Par) -> Bounds:
     return (-T_p, T_n)
 
 
-def current_limit(par: Par) -> float:
+def _dummy_inertia(par: RigParameters) -> float:
+    """Return the inertia [kg m^2] that the rig adds; the screw's own is in the motor's."""
+    return par.J_dummy if par.load == "dummy" else 0.0 * par.J_dummy
+
+
+def _current_limit(par: Par) -> float:
     """Return the limit [A] of the current demand: the drive's, or a lower one of the control."""
     if par.rig.mode_1 == "position":
         return ops.fmin(par.control.position.i_max, par.drive.i_max)
@@ -177,8 +182,6 @@ def tick(x: Any, m: Memory, u: Stimulus, par: Par) -> Memory:
 
 
 # --- One shaft alone: known current, known axial force
-# The drive, its current loop and the other shaft are left out: where current and force are
-# measured, nothing of them is needed. For identification.
 
 
 class Load(NamedTuple):
@@ -189,7 +192,7 @@ class Load(NamedTuple):
 
 
 class DrivenShaft(Assembly[WedgeParameters, Load]):
-    """Model of one shaft.
+    """Model of one shaft, for identification: with measured current and force, no drive is needed.
 
     One dry friction: bearings and screw together. ``rig.load`` determines whether the dummy
     shaft's inertia counts. There is no cogging where ``motor_1.T_cog`` is zero.
@@ -214,7 +217,7 @@ class DrivenShaft(Assembly[WedgeParameters, Load]):
     def mass(self, xe: Any, par: Par) -> Any:
         """Return the inertia, that of the dummy shaft included."""
         rotor = super().mass(xe, par)
-        return rotor._replace(omega=rotor.omega + dummy_inertia(par.rig))
+        return rotor._replace(omega=rotor.omega + _dummy_inertia(par.rig))
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
         """Return the limits of the friction on the shaft."""

@@ -89,7 +89,7 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
     )
 
     def wheel(self, w: Self) -> WheelSpeed:
-        """Return how fast the disc turns, and the wheel with it."""
+        """Return the speed of the disc, which is that of the wheel."""
         return WheelSpeed(w.disc.x.Omega, w.disc.xe.Omega)
 
     def disc_torque(self, w: Self) -> float:

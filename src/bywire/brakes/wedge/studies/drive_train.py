@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Literal, NamedTuple
 
@@ -16,24 +16,24 @@ from bywire.brakes.wedge.case import Coefficients
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import SomeMoment, SpeedLimit
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.sizing import (
-    HELD,
-    LATE,
-    LEFT,
-    Answer,
-    Count,
-    Demand,
-    Efficiency,
-    Slope,
-    answer,
-    mapped,
-)
+from bywire.brakes.wedge.sizing import Answer, Count, Demand, Efficiency, Slope, answer, redesigned
+from bywire.core.interrupts import thread_pool
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Length
 from bywire.core.typing import Array, Progress
-from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, edge_warnings, require_ranges
+from bywire.data.labeled import Labeled, labeled
+from bywire.synthesis.study import (
+    Cut,
+    Findings,
+    Map,
+    Mark,
+    Study,
+    edge_warnings,
+    require_ranges,
+    variable,
+)
 
-ASSUMPTIONS = (
+_ASSUMPTIONS = (
     "The wedge's slope and the screws' lead vary; motors, drives, bearings, stiffnesses, clearance "
     "and the travel that preloads the screws are constant.",
     "The screws' friction angle is constant, so that their efficiency grows with the lead and a "
@@ -121,15 +121,15 @@ DEFAULTS = Options(
 )
 """the pulse of Fig. 9 in Roberts et al. (2003), around the catalog's design"""
 
-NONE_FEASIBLE = "no design is feasible: allow more time (t_90, t_hold), or compare other designs"
-NEAR = 1.05
+_NONE_FEASIBLE = "no design is feasible: allow more time (t_90, t_hold), or compare other designs"
+_NEAR = 1.05
 """designs within this factor of the smallest power count as equally good"""
 _ROUNDS = 2  # of the optimum's refinement; each halves the spacing
 _TINY = 1e-6  # of the spacing
 _BORDER = 0.02  # contour between 0, feasible, and 1, close to the last feasible designs
 
 
-class Best(NamedTuple):
+class _Best(NamedTuple):
     """A design, and its largest power [W] at the worst friction coefficient."""
 
     tan_alpha: float
@@ -160,18 +160,18 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
     given = answer(par, demand)  # first and alone: it also builds the kernels
     slopes = np.linspace(options.tan_alpha_min, options.tan_alpha_max, options.slopes)
     leads = np.linspace(options.lead_min, options.lead_max, options.leads)
-    data = mapped(par, demand, slopes, leads, partial(progress, "designs"), options.efficiency)
+    data = _mapped(par, demand, slopes, leads, partial(progress, "designs"), options.efficiency)
     warnings = _warnings(data)
     if data["infeasible"].values.all():
-        warnings += (NONE_FEASIBLE,)
-        return Findings(data, _given(given, options), ASSUMPTIONS, {}, (), warnings)
-    coarse = smallest(data, options.power)
+        warnings += (_NONE_FEASIBLE,)
+        return Findings(data, _given(given, options), _ASSUMPTIONS, {}, (), warnings)
+    coarse = _smallest(data, options.power)
     grids, best = [data], coarse
     for n in range(1, _ROUNDS + 1):
         near = (_around(slopes, best.tan_alpha, n), _around(leads, best.lead, n))
         report = partial(progress, f"optimum, round {n}")
-        grids.append(mapped(par, demand, *near, report, options.efficiency))
-        best = min(best, smallest(grids[-1], options.power), key=lambda design: design.power)
+        grids.append(_mapped(par, demand, *near, report, options.efficiency))
+        best = min(best, _smallest(grids[-1], options.power), key=lambda design: design.power)
     here = Mark("given drive train", par.screw.lead, wedge.slope(par.wedge))
     marks = (Mark("optimum", best.lead, best.tan_alpha), here)
     maps = {
@@ -188,16 +188,16 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
     kpis = (*_optimum(best, grids, options), *_given(given, options))
     limits = (*active(best.at, par, options), *around(grids, best.at, options))
     return Findings(
-        data, kpis, ASSUMPTIONS, maps, _cuts(data, best), warnings + _edges(best, options), limits
+        data, kpis, _ASSUMPTIONS, maps, _cuts(data, best), warnings + _edges(best, options), limits
     )
 
 
-def smallest(data: xr.Dataset, power: str) -> Best:
+def _smallest(data: xr.Dataset, power: str) -> _Best:
     """Return the feasible design of least power; there must be one."""
     worst = data[f"worst_{power}"].values
     i, j = np.unravel_index(int(np.nanargmin(worst)), worst.shape)
     at = data.isel(tan_alpha=int(i), lead=int(j))
-    return Best(float(at["tan_alpha"]), float(at["lead"]), float(worst[i, j]), at)
+    return _Best(float(at["tan_alpha"]), float(at["lead"]), float(worst[i, j]), at)
 
 
 def _around(nodes: Array, middle: float, halvings: int) -> Array:
@@ -212,14 +212,14 @@ def _other(power: str) -> str:
     return "instantaneous" if power == "filtered" else "filtered"
 
 
-def _optimum(best: Best, grids: Sequence[xr.Dataset], options: Options) -> tuple[Kpi, ...]:
-    other = smallest(grids[0], _other(options.power))
+def _optimum(best: _Best, grids: Sequence[xr.Dataset], options: Options) -> tuple[Kpi, ...]:
+    other = _smallest(grids[0], _other(options.power))
     slopes, leads = [best.tan_alpha], [best.lead]
     for data in grids:
-        good = np.argwhere(data[f"worst_{options.power}"].values <= NEAR * best.power)
+        good = np.argwhere(data[f"worst_{options.power}"].values <= _NEAR * best.power)
         slopes += [float(value) for value in data["tan_alpha"].values[good[:, 0]]]
         leads += [float(value) for value in data["lead"].values[good[:, 1]]]
-    share = f"of designs within {100 * (NEAR - 1):.0f} % of the smallest power"
+    share = f"of designs within {100 * (_NEAR - 1):.0f} % of the smallest power"
     return (
         Kpi("optimum_tan_alpha", best.tan_alpha, "1", "Slope of the wedge of least power."),
         Kpi("optimum_lead", best.lead, "m", "Lead of the screws of least power."),
@@ -315,7 +315,7 @@ def _given(given: Answer, options: Options) -> tuple[Kpi, ...]:
     )
 
 
-def _cuts(data: xr.Dataset, best: Best) -> tuple[Cut, ...]:
+def _cuts(data: xr.Dataset, best: _Best) -> tuple[Cut, ...]:
     """Return the dependence on the lead at the map's slope nearest to the optimum."""
     row = data.sel(tan_alpha=best.tan_alpha, method="nearest")
     worst = row[["release", "t_90", "current", "speed", "copper"]].max(dim="mu_B", keep_attrs=True)
@@ -333,7 +333,7 @@ def _warnings(data: xr.Dataset) -> tuple[str, ...]:
     return (f"{count} substeps hit the cap of the contact iteration",) if count else ()
 
 
-def _edges(best: Best, options: Options) -> tuple[str, ...]:
+def _edges(best: _Best, options: Options) -> tuple[str, ...]:
     """Return whether the optimum lies at the edge of the designs compared."""
     slopes = (options.tan_alpha_min, options.tan_alpha_max)
     leads = (options.lead_min, options.lead_max)
@@ -341,6 +341,104 @@ def _edges(best: Best, options: Options) -> tuple[str, ...]:
         *edge_warnings("tan_alpha", best.tan_alpha, slopes, "1"),
         *edge_warnings("lead", best.lead, leads, "m"),
     )
+
+
+# --- Many drive trains as a dataset
+
+_LATE = 1.02
+"""share of the demanded time up to which a design answers equally fast"""
+
+
+_HELD = 0.95
+"""share of the demand that counts as held"""
+
+
+_LEFT = 0.05
+"""share of the demand below which the brake counts as released"""
+
+
+_NEVER = 10.0  # lateness of a moment that is never reached
+
+
+_PER_CASE = {
+    "t_90": ("s", "time to 90 % of the demand"),
+    "filtered": ("W", "largest power, filtered"),
+    "instantaneous": ("W", "largest power"),
+    "release": ("W", "largest power of the release, filtered"),
+    "current": ("A", "largest current demand"),
+    "speed": ("rad/s", "largest motor speed"),
+    "copper": ("J", "copper loss"),
+    "friction": ("J", "friction of bearings and screws"),
+    "held": ("N*m", "mean moment at the end of the stop"),
+    "left": ("N*m", "moment left at the end"),
+    "stop": ("N", "force on the end stops"),
+}
+
+
+def _mapped(
+    par: WedgeParameters,
+    demand: Demand,
+    slopes: Array,
+    leads: Array,
+    progress: Callable[[float], None],
+    efficiency: Efficiency,
+) -> xr.Dataset:
+    """Return the responses of all designs on a grid, computed on all cores; can be interrupted.
+
+    ``slopes``, ``leads``: slopes of the wedge, shape (n,), and leads of the screws [m], shape (m,);
+    ``progress``: called with the finished share, 0 to 1; ``efficiency``: see `redesigned`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``tan_alpha``, ``lead`` and ``mu_B``. Per case the fields of `Answer`; per
+        design ``closing_speed``, ``lateness`` (slowest time over the demanded one), ``infeasible``
+        (0 or 1), and ``worst_filtered`` and ``worst_instantaneous``, NaN where infeasible, with
+        ``mu_B_filtered`` and ``mu_B_instantaneous``, where each occurs.
+    """
+    designs = [(float(a), float(b)) for a in slopes for b in leads]
+    answers: list[Answer] = []
+    with thread_pool() as pool:
+        every = pool.map(
+            lambda design: answer(redesigned(par, design[0], design[1], efficiency), demand),
+            designs,
+        )
+        for k, judged in enumerate(every):
+            answers.append(judged)
+            progress((k + 1) / len(designs))
+    axes = {
+        "tan_alpha": (slopes, "1", "slope of the wedge"),
+        "lead": (leads, "m", "lead of the screws"),
+        "mu_B": (np.asarray(demand.mu_B), "1", "friction coefficient of the pads"),
+    }
+    return _dataset(answers, demand, axes)
+
+
+def _dataset(answers: Sequence[Answer], demand: Demand, axes: Mapping[str, Labeled]) -> xr.Dataset:
+    plane, shape = ("tan_alpha", "lead"), [len(each[0]) for each in axes.values()]
+    cases = {
+        name: np.array([getattr(each, name) for each in answers]).reshape(shape)
+        for name in _PER_CASE
+    }
+    data = labeled(axes, {name: (cases[name], *_PER_CASE[name]) for name in _PER_CASE})
+    slowest = cases["t_90"].max(axis=2)  # NaN where one case does not reach it
+    lateness = np.where(np.isnan(slowest), _NEVER, slowest / demand.t_90)
+    in_time = (lateness <= _LATE) if demand.enforced else (lateness < _NEVER)
+    holds = cases["held"].min(axis=2) >= _HELD * demand.moment
+    released = cases["left"].max(axis=2) <= _LEFT * demand.moment
+    feasible = in_time & holds & released & (cases["stop"].max(axis=2) == 0.0)
+    speeds = np.array([each.closing_speed for each in answers]).reshape(shape[:2])
+    data["closing_speed"] = variable(speeds, plane, "m/s", "closing speed of the pads")
+    data["lateness"] = variable(lateness, plane, "1", "slowest time over the demanded time")
+    data["infeasible"] = variable(1.0 - feasible, plane, "1", "late, not held, or at a stop")
+    for name in ("filtered", "instantaneous"):
+        worst = np.where(feasible, cases[name].max(axis=2), np.nan)
+        mu_B = np.asarray(demand.mu_B)[cases[name].argmax(axis=2)]
+        label = f"largest {name} power, worst mu_B"
+        data[f"worst_{name}"] = variable(worst, plane, "W", label)
+        data[f"mu_B_{name}"] = variable(mu_B, plane, "1", "worst friction coefficient")
+    data.attrs["unsettled_substeps"] = sum(each.unsettled for each in answers)
+    return data
 
 
 # --- Limits of a drive train: active constraints, and failures or costs of its neighbors
@@ -372,12 +470,12 @@ def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
         reached = at["mu_B"].values[at["current"].values >= _AT * i_max]
         texts.append(f"current: at the limit {name} = {i_max:g} A with mu_B = {_listed(reached)}")
     held = at["held"].min() / options.moment
-    if float(held) < HELD / _AT:
+    if float(held) < _HELD / _AT:
         texts.append(
             f"hold: {100.0 * float(held):.3g} % of the demand is held, least at "
             f"mu_B = {_where(-at['held']):g}"
         )
-    if float(at["left"].max()) > _AT * LEFT * options.moment:
+    if float(at["left"].max()) > _AT * _LEFT * options.moment:
         texts.append(f"release: {float(at['left'].max()):.3g} N·m remain at its end")
     powers = at[options.power]
     near = at["mu_B"].values[powers.values >= _AT * float(powers.max())]
@@ -391,11 +489,11 @@ def failures(at: xr.Dataset, options: Options) -> list[str]:
     slowest = float(at["t_90"].max(skipna=False))
     if math.isnan(slowest):
         reasons.append("never reaches 90 % of the demand")
-    elif options.response == "enforced" and float(at["lateness"]) > LATE:
+    elif options.response == "enforced" and float(at["lateness"]) > _LATE:
         reasons.append(f"late, {slowest * 1e3:.4g} ms at mu_B = {_where(at['t_90']):g}")
-    if float(at["held"].min()) < HELD * options.moment:
+    if float(at["held"].min()) < _HELD * options.moment:
         reasons.append("does not hold the demand")
-    if float(at["left"].max()) > LEFT * options.moment:
+    if float(at["left"].max()) > _LEFT * options.moment:
         reasons.append("does not release")
     if float(at["stop"].max()) > 0.0:
         reasons.append("presses on an end stop")

@@ -155,7 +155,7 @@ def controlled(par: WedgeParameters, moment: float) -> Controlled:
     return Controlled(figures.disk_margin, 0.0)
 
 
-def moment_borders(
+def _moment_borders(
     par: WedgeParameters, moment: float, between: tuple[float, float], count: int
 ) -> tuple[Border, ...]:
     """Return the friction coefficients at which the closed moment loop changes its stability.
@@ -181,7 +181,7 @@ def moment_borders(
 Coefficient = Annotated[float, Unit("1", 0.4), Field(gt=0, le=5, allow_inf_nan=False)]
 Force = Annotated[float, Unit("N", 1e3), Field(gt=0, allow_inf_nan=False)]
 
-ASSUMPTIONS = (
+_ASSUMPTIONS = (
     "Exact linear models of the brake, dry friction removed: friction also holds the brake, so "
     "that the real brake is stable in a wider range.",
     "Without control: both motors at constant currents, or locked; the wedge is preloaded between "
@@ -191,7 +191,7 @@ ASSUMPTIONS = (
     "controllers know the wedge's slope.",
     "The end stops of the wedge allow the same travel of the pads as before.",
 )
-HIGHEST = 5.0
+_HIGHEST = 5.0
 """largest friction coefficient of the search for the moment loop's border"""
 _SEARCHED = 40
 _PLANES = {
@@ -273,7 +273,7 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
     data = _dataset(mu, tan, np.array(rows), np.array(borders))
     given = Mark("given wedge", par.wedge.mu_B, wedge.slope(par.wedge))
     kpis = (*_uncontrolled(par, data, options), *_controlled(par, data, options))
-    return Findings(data, kpis, ASSUMPTIONS, _maps(data, given), (_cut(data, given),))
+    return Findings(data, kpis, _ASSUMPTIONS, _maps(data, given), (_cut(data, given),))
 
 
 def _dataset(mu: Array, tan: Array, values: Array, borders: Array) -> xr.Dataset:
@@ -368,11 +368,11 @@ def _controlled(par: WedgeParameters, data: xr.Dataset, options: Options) -> tup
             f"at mu_B = {float(data['mu_B'][j]):.3g}, "
             f"tan(alpha) = {float(data['tan_alpha'][i]):.3g}"
         )
-    between = (options.mu_B_min, HIGHEST)
+    between = (options.mu_B_min, _HIGHEST)
     border = [
-        b.value for b in moment_borders(par, options.moment, between, _SEARCHED) if not b.above
+        b.value for b in _moment_borders(par, options.moment, between, _SEARCHED) if not b.above
     ]
-    note = "" if border else f"stable up to {HIGHEST:g}"
+    note = "" if border else f"stable up to {_HIGHEST:g}"
     return (
         Kpi("moment_disk_min", least, "1", "Least disk margin of the moment loop.", where),
         Kpi(

@@ -203,7 +203,7 @@ def host_trial(program: Program, folder: Path, compiler: Compiler, scratch: Path
     said = _call([str(made)], may_fail=True)
     match = re.search(r"(\d+) values differ, bits ([0-9a-f]+)\n(\d+) breaches", said)
     if match is None:
-        raise CompilerError(f"the compiled ECU of {program.name} said {said[:200]!r}")
+        raise CompilerError(f"the compiled ECU of {program.name} printed {said[:200]!r}")
     return Trial("host", program.precision.name, int(match[1]), int(match[2], 16), int(match[3]))
 
 
@@ -243,7 +243,7 @@ def target_trial(
     )
     match = re.search(r"differ (\d+)\nbits (\d+)\nbreaches (\d+)\n", said)
     if match is None:
-        raise CompilerError(f"the ECU of {program.name} on {target.name} said {said[:200]!r}")
+        raise CompilerError(f"the ECU of {program.name} on {target.name} printed {said[:200]!r}")
     tasks = {
         name: TaskFigures(int(most), int(mean), int(depth))
         for name, most, mean, depth in re.findall(r"task (\w+) (\d+) (\d+) (\d+)", said)
@@ -325,5 +325,5 @@ def _call(command: list[str], may_fail: bool = False) -> str:
         raise CompilerError(f"{name} did not run: {error.strerror or error}") from None
     if done.returncode != 0 and not may_fail:
         said = "\n".join((done.stderr or done.stdout).splitlines()[:6]) or "nothing"
-        raise CompilerError(f"{name} failed on an exported ECU and said:\n{said}")
+        raise CompilerError(f"{name} failed on an exported ECU:\n{said}")
     return done.stdout + done.stderr

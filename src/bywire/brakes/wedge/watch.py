@@ -1,0 +1,148 @@
+"""Warnings about a recording of the wedge brake: stops, limits, screws that hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.brakes.wedge.laws.moment_control import MOMENT
+from bywire.core.parameters import ParameterSet
+
+Rows = NDArray[np.bool_]
+
+_REACHED = 0.95  # of the demanded moment
+_LONG = 0.05  # time [s] on the current limit after which a moment counts as out of reach
+_SWINGS = 10  # reversals on the current limit, each within _LONG of the last, that a step never has
+
+
+def warnings_of(recording: xr.Dataset, par: ParameterSet) -> list[str]:
+    """Return the warnings of a recording of at least one row; none without the brake's signals."""
+    values = par.flat()
+    if not {"F_end", "M_set", "i_1_ref", "i_2_ref"} <= set(recording):
+        return []
+    warnings = _end_stop(recording)
+    if values["command.mode"] == "moment":  # elsewhere the demanded currents are the test's own
+        warnings += _out_of_reach(recording, values) or _not_reached(recording, values)
+        warnings += _limits(recording, values)
+    return warnings + _holding_screw(values)
+
+
+def _end_stop(recording: xr.Dataset) -> list[str]:
+    force = np.abs(recording["F_end"].values)
+    if not force.any():
+        return []
+    k = int(np.argmax(force > 0))
+    when, x = _when(recording, k), 1e3 * float(recording["x"].values[k])
+    return [
+        f"the wedge reached its end stop {when}, x = {x:.3g} mm, and pressed on it with "
+        f"up to {force.max():.3g} N: the stop ends the braking moment"
+    ]
+
+
+def _when(recording: xr.Dataset, k: int) -> str:
+    """Return the time of row ``k`` in words; an event in the first row began earlier."""
+    t = float(recording["time"].values[k])
+    return "before the recording starts" if k == 0 else f"at t = {t:.4g} s"
+
+
+def _limit(values: Mapping[str, Any]) -> float:
+    return float(min(values["control.position.i_max"], values["drive.i_max"]))
+
+
+def _limited(recording: xr.Dataset, values: Mapping[str, Any]) -> Rows:
+    """Return the rows in which a motor's demanded current is at its limit."""
+    refs = [np.abs(recording[name].values) for name in ("i_1_ref", "i_2_ref")]
+    return np.asarray(np.maximum(*refs) >= _limit(values) * (1.0 - 1e-9))
+
+
+def _out_of_reach(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
+    """Warn that the current limit keeps a moment out of reach as long as it is demanded."""
+    begin, end = _longest(_short_of(recording, values) & _limited(recording, values))
+    t, demand = recording["time"].values, recording["M_set"].values
+    demanded = float(demand[begin : end + 1].max())
+    moment = np.abs(recording["M_B"].values)
+    most = float(moment[demand >= _REACHED * demanded].max())
+    if t[end] - t[begin] < _LONG or most >= _REACHED * demanded or _swings(recording, values):
+        return []
+    return [
+        f"the motors cannot reach the demanded {demanded:.4g} N*m: on the current limit of "
+        f"{_limit(values):.4g} A from t = {t[begin]:.4g} s to {t[end]:.4g} s, the moment stays at "
+        f"{most:.4g} N*m at most"
+    ]
+
+
+def _not_reached(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
+    """Warn that the moment never reached the largest demand, whatever the cause."""
+    demanded = float(recording["M_set"].values.max())
+    most = float(np.abs(recording["M_B"].values).max())
+    sparse = np.diff(recording["time"].values).max(initial=0.0) > _LONG  # may miss the peak
+    if sparse or most >= _REACHED * demanded:
+        return []
+    text = f"the demand of {demanded:.4g} N*m was not reached: the moment is {most:.4g} N*m at most"
+    M_on, speed = values["control.moment.M_on"], np.abs(recording["Omega"].values).max()
+    if demanded <= M_on:
+        text += f", as the brake stays parked up to control.moment.M_on = {M_on:.4g} N*m"
+    elif speed < values["control.moment.Omega_still"]:
+        text += ", as the disc stands"
+    return [text]
+
+
+def _limits(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
+    """Warn that the current limit was reached in passing, or that currents swing between limits."""
+    limited, limit = _limited(recording, values), _limit(values)
+    if not limited.any() or _out_of_reach(recording, values):
+        return []
+    swings = _swings(recording, values)
+    if swings:
+        begin, end, number = swings
+        return [
+            f"the demanded current swings between its limits of -{limit:.4g} A and {limit:.4g} A, "
+            f"{number} times from t = {begin:.4g} s to {end:.4g} s: a loop is likely unstable, "
+            "see 'bywire margins position' and 'bywire margins moment'"
+        ]
+    k = int(np.argmax(limited))
+    return [f"the current limit of {limit:.4g} A was reached {_when(recording, k)}"]
+
+
+def _swings(recording: xr.Dataset, values: Mapping[str, Any]) -> tuple[float, float, int] | None:
+    """Return begin and end [s] of the longest swing between both limits, and its reversals."""
+    t, limit, begin = recording["time"].values, _limit(values) * (1.0 - 1e-9), None
+    for name in ("i_1_ref", "i_2_ref"):
+        current = recording[name].values
+        rows = np.flatnonzero(np.abs(current) >= limit)
+        reversals = t[rows[1:]][np.diff(np.sign(current[rows])) != 0]
+        for chain in np.split(reversals, np.flatnonzero(np.diff(reversals) > _LONG) + 1):
+            if chain.size >= max(_SWINGS, 0 if begin is None else begin[2] + 1):
+                begin = float(chain[0]), float(chain[-1]), int(chain.size)
+    return begin
+
+
+def _short_of(recording: xr.Dataset, values: Mapping[str, Any]) -> Rows:
+    """Return the rows in which a moment is controlled on a turning disc, below its demand."""
+    turning = np.abs(recording["Omega"].values) > values["control.moment.Omega_still"]
+    demanded = _REACHED * recording["M_set"].values
+    below = np.abs(recording["y_M"].values) < demanded
+    return np.asarray((recording["mode"].values == MOMENT) & turning & below)
+
+
+def _longest(rows: Rows) -> tuple[int, int]:
+    """Return first and last index of the longest stretch of rows; (0, 0) where there is none."""
+    edges = np.flatnonzero(np.diff(rows.astype(np.int8), prepend=0, append=0))
+    if not edges.size:
+        return 0, 0
+    begins, ends = edges[::2], edges[1::2] - 1
+    k = int(np.argmax(ends - begins))
+    return int(begins[k]), int(ends[k])
+
+
+def _holding_screw(values: Mapping[str, Any]) -> list[str]:
+    if values["screw.law"] != "load" or values["screw.eta_b"] != 0.0:
+        return []
+    return [
+        "screw.eta_b = 0: no load drives these screws back, so that the brake keeps its moment "
+        "when the power goes off"
+    ]
