@@ -30,7 +30,7 @@ from bywire.simulation.run import Run
 from bywire.simulation.schedule import plan
 
 _WORD = 32  # bits
-_POOL = 4  # words of a seed, at least, before what tells its children apart
+_POOL = 4  # least number of words of a seed before those of its child
 
 
 def put_noise(samples: NDArray[np.float64], seed: Sequence[int], child: int) -> None:

@@ -269,7 +269,7 @@ def evaluate_cases(name: str, rows: Rows, settings: Sequence[Any]) -> dict[str, 
     Raises
     ------
     UnknownNameError
-        When the family, or a signal that a setting asks for by name, is unknown.
+        When the family, or a signal that a setting names, is unknown.
     """
     chosen = FAMILIES.find(name)
     if chosen.loops is not None:
