@@ -142,7 +142,7 @@ def _plain_text(value: float) -> str:
 
     Examples
     --------
-    >>> quoted(plain_text(37)), quoted("37")
+    >>> quoted(_plain_text(37)), quoted("37")
     ('37', "'37'")
     """
     return _Unquoted(repr(value))
