@@ -183,7 +183,8 @@ def load_system(path: str | Path) -> Brake:
     if not source.is_file() or source.suffix != ".py":
         raise FileError(
             f"{path} is no brake: give a Python file, a folder with an __init__.py, or a project "
-            "with one such folder in src, that declares BRAKE = bywire.Brake(...)"
+            "with one such folder in src, that declares BRAKE = bywire.Brake(...)",
+            name=str(path),
         )
     known = next((b for b in _loaded.values() if Path(b.file).resolve() == source), None)
     if known is not None:

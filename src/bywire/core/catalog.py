@@ -89,7 +89,9 @@ class _Values:
             return self._values[there]
         groups = (f"{there}.", f"{place}.")
         if not any(each.startswith(groups) for each in (*self._values, *self._moved)):
-            raise ModelError(f"a formula of a derived value reads {there}, which the set lacks")
+            raise ModelError(
+                f"a formula of a derived value reads {there}, which the set lacks", name=there
+            )
         return _Values(self._values, self._moved, self._read, place)
 
 

@@ -46,7 +46,11 @@ def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dic
 def number(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
     """Return one value in an SI unit; see `bywire.core.units.parse`. Zero needs no unit."""
     if isinstance(value, (Mapping, Sequence)) and not isinstance(value, str):
-        raise ParameterError(f"{name} = {quoted(value)}: one value is wanted, not several")
+        raise ParameterError(
+            f"{name} = {quoted(value)}: one value is wanted, not several",
+            name=name,
+            value=quoted(value),
+        )
     return _quantity(value, symbol, name, nominal)
 
 
@@ -142,7 +146,7 @@ def _plain_text(value: float) -> str:
 
     Examples
     --------
-    >>> quoted(plain_text(37)), quoted("37")
+    >>> quoted(_plain_text(37)), quoted("37")
     ('37', "'37'")
     """
     return _Unquoted(repr(value))
