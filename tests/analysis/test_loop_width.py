@@ -9,7 +9,7 @@ import xarray as xr
 from bywire.analysis.loop_width import closed_above, widths
 from bywire.analysis.response.harmonics import amplitudes, total_distortion
 from bywire.bench.kpis.hysteresis import Loop
-from bywire.brakes.motorcycle.staircase import jumps
+from bywire.brakes.motorcycle.paper.fig5 import jumps
 
 
 def test_jumps_are_counted_with_their_heights_and_creeping_is_not() -> None:

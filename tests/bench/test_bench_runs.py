@@ -15,7 +15,7 @@ from bywire.bench.ensemble import run_benches
 from bywire.bench.experiment import as_run
 from bywire.bench.result import Result
 from bywire.bench.running import run
-from bywire.brakes.motorcycle.operating_point import settled_start
+from bywire.brakes.motorcycle.case import settled_start
 from bywire.core.errors import WorkLimitError
 from bywire.simulation.run import simulate
 from bywire.simulation.run_group import simulate_group

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from bywire.reproduction.item import Item
-from bywire.reproduction.root_cause import Quoted, RootCause, causes_of
+from bywire.reproduction.item import Item, Quoted, RootCause, causes_of
 
 
 def causes(items: Iterable[Item]) -> tuple[RootCause, ...]:

@@ -8,8 +8,7 @@ from bywire.brakes.wedge.paper import frequency
 from bywire.brakes.wedge.paper.facts import FACTS
 from bywire.brakes.wedge.paper.runs import parameters
 from bywire.reproduction.item import Item, compared, found
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs
+from bywire.reproduction.reproduction import Exhibit, Part, Runs
 
 _LOW = "low"
 

@@ -18,8 +18,7 @@ from bywire.brakes.wedge.paper.facts import FACTS
 from bywire.brakes.wedge.paper.fig5 import friction
 from bywire.core.typing import Array
 from bywire.reproduction.item import Item, compared, found
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs
+from bywire.reproduction.reproduction import Exhibit, Part, Runs
 from bywire.simulation.run import simulate
 
 _HIGH = "high"

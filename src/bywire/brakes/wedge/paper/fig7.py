@@ -17,8 +17,7 @@ from bywire.brakes.wedge.paper.runs import (
     standby,
 )
 from bywire.reproduction.item import Fact, Item, compared, found
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs, kpis
+from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
 
 TURNS = 20
 """revolutions over which the oscillation is analyzed"""

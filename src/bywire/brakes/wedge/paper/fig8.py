@@ -6,8 +6,7 @@ from bywire.bench.result import Result
 from bywire.brakes.wedge.paper.facts import ALLOWANCES, FACTS
 from bywire.brakes.wedge.paper.runs import MAIN, WITHOUT_RUNOUT, settled, stacked
 from bywire.reproduction.item import Item, compared, found, reading
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs, kpis
+from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
 
 
 def part(runs: Runs) -> Part:

@@ -18,8 +18,7 @@ from bywire.brakes.wedge.paper.runs import (
     standby,
 )
 from bywire.reproduction.item import Item, compared, found
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs, kpis, peak
+from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis, peak
 
 SHORT, LONGER = 0.11, 1.0
 """lengths [s] of a pulse that ends as soon as the moment is there, and of a longer braking"""

@@ -17,8 +17,7 @@ from bywire.brakes.wedge.paper.runs import (
 )
 from bywire.brakes.wedge.series import with_friction
 from bywire.reproduction.item import Fact, Item, compared, found
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs, kpis
+from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
 
 AWAY = 0.2
 """friction coefficient far from the neutral point"""

@@ -10,8 +10,7 @@ from bywire.brakes.wedge.paper.runs import MAIN, parameters
 from bywire.plant import roller_screw
 from bywire.report.time_traces import time_traces
 from bywire.reproduction.item import Item, compared, found
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs, kpis
+from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
 
 MOTIONS = ("step", "ramp", "sine")
 WEAKER = 0.95

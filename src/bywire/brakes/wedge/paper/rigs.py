@@ -9,8 +9,7 @@ from bywire.brakes.wedge.paper.facts import FACTS
 from bywire.brakes.wedge.paper.runs import MAIN, parameters
 from bywire.report.time_traces import time_traces
 from bywire.reproduction.item import Fact, Item, compared, found
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs, kpis
+from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
 
 MICRON = 1e6
 """[N/m] in one N/um"""

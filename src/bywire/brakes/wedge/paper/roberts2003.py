@@ -6,8 +6,7 @@ from bywire.brakes.wedge.paper import fig5, fig6, fig7, fig8, fig9, hold, motion
 from bywire.brakes.wedge.paper.causes import causes
 from bywire.brakes.wedge.paper.facts import ALLOWANCES, CITATION
 from bywire.brakes.wedge.paper.runs import MAIN
-from bywire.reproduction.reproduction import Reproduction, Source, reproduced
-from bywire.reproduction.runs import Runs
+from bywire.reproduction.reproduction import Reproduction, Runs, Source, reproduced
 
 PARTS = {
     "neutral point": stability.part,

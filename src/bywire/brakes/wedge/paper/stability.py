@@ -16,8 +16,7 @@ from bywire.brakes.wedge.paper.runs import IDEAL, MAIN, parameters, stacked, tan
 from bywire.brakes.wedge.series import tag, with_friction
 from bywire.brakes.wedge.start import memory_at, travel_for
 from bywire.reproduction.item import Fact, Item, compared, found, reading
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs, kpis
+from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
