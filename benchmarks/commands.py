@@ -12,7 +12,7 @@ from pathlib import Path
 from benchmarks.result import Result, at_most, failed
 from bywire.core import child_process
 from bywire.core.child_process import python_command
-from bywire.simulation.kernel_cache import usable_folder
+from bywire.simulation.compiler import usable_folder
 
 LIBRARIES = "import numpy, casadi, xarray, pydantic, pint, typer, rich"
 """what L, the unit of these figures, is the time of: absolute times differ twofold by machine"""

@@ -6,11 +6,10 @@ import time
 from collections.abc import Iterator
 from functools import partial
 
-from bywire.bench.ensemble import changed
-from bywire.bench.kpis.cases import FamilyJudge
+from bywire.bench.ensemble import changed, needed, rounds
+from bywire.bench.kpis.families import FamilyJudge
 from bywire.bench.recording import rows_of_group
-from bywire.bench.side_by_side import needed, rounds
-from bywire.simulation.run_group import RunGroup
+from bywire.simulation.ensemble import RunGroup
 from bywire.studies.plan import CHUNK, StudyPlan
 
 

@@ -1,4 +1,4 @@
-"""How Sphinx makes the site of these pages: ``python3 tasks.py docs``."""
+"""Configuration of Sphinx for the site of these pages: ``python3 tasks.py docs``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ sys.path.insert(0, str(HERE))
 
 from site_pages.extension import FileScraper  # noqa: E402
 
-from bywire import __version__  # noqa: E402  what stands beside this file comes first
+from bywire import __version__  # noqa: E402  modules beside this file come first
 
 project = "bywire"
 author = copyright = "the bywire developers"
@@ -21,7 +21,7 @@ extensions = [
     "numpydoc",
     "sphinx.ext.viewcode",  # docstrings and sources
     "sphinx_gallery.gen_gallery",  # the examples, run
-    "site_pages.extension",  # pages made from the code
+    "site_pages.extension",  # pages generated from the code
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = [
@@ -60,7 +60,7 @@ html_title = "bywire"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_extra_path = ["_generated/extra"]
-(HERE / html_extra_path[0]).mkdir(parents=True, exist_ok=True)  # Sphinx looks before it is filled
+(HERE / html_extra_path[0]).mkdir(parents=True, exist_ok=True)  # Sphinx checks for it early
 html_math_renderer = "mathml"
 html_show_sourcelink = False
 html_sidebars = {name: [] for name in ("index", "start", "papers", "_generated/live")}
@@ -71,5 +71,5 @@ html_theme_options = {
     "header_links_before_dropdown": 8,
     "footer_start": ["copyright"],
     "footer_end": [],
-    "secondary_sidebar_items": ["page-toc"],
+    "secondary_sidebar_items": {"**": ["page-toc"], "cheat-sheet": []},
 }

@@ -1,4 +1,4 @@
-"""Write docs/fault-rows.md: every fault row of the specification, and what our benches give.
+"""Write docs/fault-rows.md: stated figures of faults beside those that our benches compute.
 
 ``python docs/make_fault_rows.py``
 """
@@ -18,14 +18,16 @@ TABLES: dict[str, tuple[Any, ...]] = {
     "The motorcycle brake": motorcycle.ROWS,
     "The wedge brake": wedge.ROWS,
 }
-HEAD = """# Faults: what was stated, and what bywire gives
+HEAD = """# Faults: stated and computed figures
 
-Stated are figures of prototypes of the same equations; some were bywire's own once, and those rows
-show that nothing has changed. Admitted are 10 %, 0.2 bar or
-10 ms, whichever is larger; what does not agree is left standing, with its reason. Computed by
-`python docs/make_fault_rows.py` and, as a test, by `tests/examples/test_fault_rows.py`; what the
-faults are and how to inject them says [faults.md](faults.md). A dash stands where no figure is
-stated; that of a wheel's lost encoder, of which none is stated either, is there.
+The tables compare stated figures of faults with those that bywire computes. Stated figures come
+from prototypes of the same equations. Some are earlier results of bywire, and those rows show that
+nothing has changed. The tolerance is 10 %, 0.2 bar or 10 ms, whichever is larger. Disagreements
+remain in the table, with their reason below it. A dash means that no figure is stated.
+
+[faults.md](faults.md) describes the faults and how to inject them. It also has the figures for a
+wheel's lost encoder, for which none are stated. `python docs/make_fault_rows.py` computes this
+page, and `tests/examples/test_fault_rows.py` checks it.
 """
 HEADING = ("fault", "figure", "stated", "computed", "unit", "agrees")
 
@@ -43,9 +45,9 @@ def page() -> str:
             for row, v in zip(rows, values, strict=True)
             if not row.agrees(v)
         )
-        lines += ["", "Why some do not agree:", "", *apart, ""] if apart else [""]
+        lines += ["", "Reasons for disagreements:", "", *apart, ""] if apart else [""]
         notes = [f"- `{row.fault}`, {row.what}: {row.note}." for row in rows if row.note]
-        lines += ["What explains others:", "", *notes, ""] if notes else []
+        lines += ["Notes on other figures:", "", *notes, ""] if notes else []
     return "\n".join(lines)
 
 

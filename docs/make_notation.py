@@ -1,8 +1,8 @@
-"""Write the generated pages: ``python docs/make_notation.py`` after a change of what they list.
+"""Write the generated pages: ``python docs/make_notation.py``, after their contents changed.
 
-``notation.md`` holds symbols, names, units and meanings of parameters and signals;
-``bench-reference.md`` holds experiments with their options, stimuli and key figures. Everything
-comes from the code's own metadata, so that nothing is written twice; a test compares.
+``notation.md`` has symbols, names, units and meanings of parameters and signals;
+``bench-reference.md`` has experiments with their options, stimuli and key figures. Everything
+comes from the code's own metadata, and a test compares.
 """
 
 from __future__ import annotations
@@ -16,12 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from bywire import control, plant
-from bywire.analysis.linear.plant import PLANTS
-from bywire.analysis.loop import LOOPS
+from bywire.analysis.loop import LOOPS, PLANTS
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
-from bywire.bench.kpis.registry import FAMILIES
-from bywire.bench.stimuli.registry import STIMULI
+from bywire.bench.kpis.families import FAMILIES
+from bywire.bench.stimulus import STIMULI
 from bywire.brakes.wedge import elements, laws
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.field_notes import field_notes
@@ -33,7 +32,7 @@ from bywire.core.signals import merged_signals, places_of
 from bywire.report.wording import amount, range_text, unit_text
 
 HERE = Path(__file__).parent
-NOTE = "<!-- Written by docs/make_notation.py; change the code that it lists, not this page. -->"
+NOTE = "<!-- Written by docs/make_notation.py: change the listed code, not this page. -->"
 GREEK = (
     "alpha",
     "beta",
@@ -51,7 +50,7 @@ GREEK = (
     "omega",
     "zeta",
 )
-# Heads of names whose symbol in the literature is another one.
+# Heads of names with another symbol in the literature.
 SYMBOLS = {
     "omega": r"\Omega",
     "duty": "D",
@@ -82,7 +81,7 @@ def symbol(name: str) -> str:
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
-    """Return the lines of a Markdown table; a column without any content is left out."""
+    """Return the lines of a Markdown table without its empty columns."""
     content = [tuple(row) for row in rows]
     titles = tuple(head)
     kept = [k for k in range(len(titles)) if any(row[k] for row in content)]
@@ -118,7 +117,7 @@ def parameter_rows(
 
 
 def interval(leaf: Leaf) -> str:
-    """Return the admissible range in the unit that stands beside it."""
+    """Return the valid range in the unit shown beside it."""
     low = "" if math.isinf(leaf.low) else f"{'>' if leaf.low_open else '>='} {leaf.low:g}"
     high = "" if math.isinf(leaf.high) else f"{'<' if leaf.high_open else '<='} {leaf.high:g}"
     return ", ".join(part for part in (low, high) if part)
@@ -134,7 +133,7 @@ def shown(value: Any, unit: str) -> str:
 
 
 def bracketed(unit: str) -> str:
-    """Return a unit as it stands behind a name, nothing for a pure number."""
+    """Return a unit in brackets, as after a name; nothing for a pure number."""
     return f" [{unit_text(display_unit(unit))}]" if unit != "1" else ""
 
 
@@ -160,7 +159,7 @@ def element_tuples() -> Iterator[tuple[str, type]]:
 
 
 def merged(tuples: Iterable[tuple[str, Any]]) -> list[tuple[str, ...]]:
-    """Return one row per name, unit and meaning, with all places where it stands."""
+    """Return one row per name, unit and meaning, with all its places."""
     return [
         (symbol(name), f"`{name}`", unit_text(s.unit) or "1", s.label, ", ".join(where))
         for name, s, where in merged_signals(tuples)
@@ -174,10 +173,11 @@ def notation() -> str:
         "",
         NOTE,
         "",
-        "Symbol, name in code, unit and meaning. Inside, all numbers are in SI and radians;",
-        "bench files may use any unit of the same kind. A name without a symbol is a word.",
+        "The tables give symbol, name in code, unit and meaning. The code uses SI units and",
+        "radians; bench files may use any unit of the same kind. A name that is a word has no",
+        "symbol.",
         "",
-        "Signs: [sign-conventions.md](sign-conventions.md).",
+        "For signs, see [sign-conventions.md](sign-conventions.md).",
         "",
     ]
     for model in models():
@@ -189,7 +189,7 @@ def notation() -> str:
             lines += table(titles, parameter_rows(known[0].parameter_class))
         lines += [f"## Signals of {model.name}", ""]
         if not known:
-            lines += ["A rig: its parameters are those of the brake that it tests.", ""]
+            lines += ["This is a rig; its parameters are those of the tested brake.", ""]
         rows = merged(places_of(model).items())
         lines += table(("symbol", "name", "unit", "meaning", "where"), rows)
     lines += ["## Signals of elements and control laws", ""]
@@ -204,7 +204,7 @@ def bench_reference() -> str:
         "",
         NOTE,
         "",
-        "What a bench file can name. How to write one: [bench-files.md](bench-files.md).",
+        "These are the names for bench files. To write one, see [bench-files.md](bench-files.md).",
         "",
         "## Experiments",
         "",
@@ -221,9 +221,9 @@ def bench_reference() -> str:
     lines += [
         "## Experiments of any brake",
         "",
-        "Given by names of signals. `input`, `output` and the like stand for the unit of the "
-        "signal that the option of that name names; levels are by default multiples of its "
-        "nominal magnitude.",
+        "These experiments take names of signals. A unit such as `input` or `output` is that of "
+        "the signal that the option of that name selects. By default, levels are multiples of "
+        "the signal's nominal magnitude.",
         "",
     ]
     for g in GENERIC_EXPERIMENTS.all().values():
@@ -231,7 +231,12 @@ def bench_reference() -> str:
         lines += [f"### {g.name}, of any brake", "", f"{summary}.", ""]
         rows = [("", *row[1:3], "", *row[4:]) for row in parameter_rows(g.options)]
         lines += table(("", "option", "unit", "", "range or choices", "meaning"), rows)
-    lines += ["## Loops", "", "What `linearize`, `frequency-response` and `margins` know.", ""]
+    lines += [
+        "## Loops",
+        "",
+        "Loops for `linearize`, `margins`, `frequency-response`, `agreement` and `design`.",
+        "",
+    ]
     rows = (
         (
             f"`{loop.name}`",
@@ -245,7 +250,7 @@ def bench_reference() -> str:
         for loop in LOOPS.all().values()
     )
     lines += table(("loop", "meaning", "of", "at", "from", "to", "cut at"), rows)
-    lines += ["## Plants", "", "What `linearize` knows besides loops.", ""]
+    lines += ["## Plants", "", "Additional models for `linearize`.", ""]
     rows = (
         (
             f"`{plant.name}`",
@@ -257,7 +262,7 @@ def bench_reference() -> str:
         for plant in PLANTS.all().values()
     )
     lines += table(("plant", "meaning", "of", "at one of", "judged up to"), rows)
-    lines += ["## Stimuli", "", "`level`: the unit of what the experiment drives.", ""]
+    lines += ["## Stimuli", "", "`level` is the unit of the experiment's input.", ""]
     for s in STIMULI.all().values():
         lines += [f"### {s.name}", "", s.summary, ""]
         rows = (("", *row[1:3], "", *row[4:]) for row in parameter_rows(s.parameter_class))

@@ -1,7 +1,7 @@
 """Condense studies of the identification methods into docs/trust and docs/trust.md.
 
-``bywire identify METHOD --study 200 --out FOLDER/METHOD`` for each method (or another label), then
-``python docs/make_trust.py FOLDER``.
+Run ``bywire identify METHOD --study 200 --out FOLDER/METHOD`` for each method (or another label),
+then ``python docs/make_trust.py FOLDER``.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ from typing import Any
 from bywire.core.scratch import require_finished
 
 DOCS = Path(__file__).parent
-HEAD = """# Does what is put in come back?
+HEAD = """# Trust in identification: known parameters recovered
 
-Simulated experiments with the sensors' noise, each with its own seed, identified from starts that
-are up to 30 % off. The mean of the estimates has to lie within 3 standard errors of what was put
-in, and the share of 95 % intervals that hold it must be compatible with 90 to 99 %. Made by
-`bywire identify METHOD --study COUNT`; every outcome with its seed is in [trust/](trust/). What
-does not hold is left standing, and explained below the table.
+Each study simulates experiments with the sensors' noise, each with its own seed, and identifies
+the parameters from starts that are up to 30 % off. The mean of the estimates must lie within 3
+standard errors of the true value. The share of 95 % intervals that contain the true value must be
+compatible with 90 to 99 %. Rows that fail remain in the table and are explained below it. To make
+a study, use `bywire identify METHOD --study COUNT`. Every result with its seed is in
+[trust/](trust/).
 
 """
 HEADING = (
@@ -29,7 +30,7 @@ HEADING = (
     "experiments",
     "bias [standard errors]",
     "bias [%]",
-    "intervals that hold",
+    "intervals that contain the true value",
     "claimed / real scatter",
     "holds",
 )

@@ -9,7 +9,7 @@ import pytest
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop_figures import LoopFigures
-from bywire.synthesis import designer, linear_case, optimizer
+from bywire.synthesis import designer, linear_case
 
 
 def coarse(gain: LinearModel, closed: LinearModel, points: int) -> LoopFigures:
@@ -23,10 +23,10 @@ def few_starts(*, is_coarse: bool = True) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         if is_coarse:
             patch.setattr(linear_case, "LoopFigures", coarse)
-        patch.setattr(optimizer, "_SAMPLES", 16)
-        patch.setattr(optimizer, "_STARTS", 1)
-        patch.setattr(optimizer, "_ITERATIONS", 15)
-        patch.setattr(optimizer, "_SIMPLEX", 8)
+        patch.setattr(designer, "_SAMPLES", 16)
+        patch.setattr(designer, "_STARTS", 1)
+        patch.setattr(designer, "_ITERATIONS", 15)
+        patch.setattr(designer, "_SIMPLEX", 8)
         patch.setattr(designer, "_CONFIRMED", 5)
         patch.setattr(designer, "_CONFIRMED_FIGURES", 20)
         yield

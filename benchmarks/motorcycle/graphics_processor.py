@@ -15,7 +15,7 @@ from benchmarks.timing import interleaved, processor_timed, timed
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.catalog import parameters
 from bywire.core.errors import DeviceError, ParameterError
-from bywire.simulation.cuda_device import find_device
+from bywire.simulation.cuda import find_device
 from bywire.simulation.ensemble import simulate_ensemble
 
 LANES, THREADS = 1024, 32_768

@@ -18,9 +18,9 @@ from benchmarks.suite import Part
 from bywire.core.child_process import python_command
 from bywire.core.unneeded import allow_dask
 from bywire.data.file_format import library
-from bywire.studies.chunk import computed_chunk
 from bywire.studies.executor import CLUSTER_MEMORY, CLUSTER_SETTINGS, Cluster, Executor, Pool
 from bywire.studies.plan import CHUNK, StudyPlan
+from bywire.studies.store import computed_chunk
 from bywire.studies.study_file import read_study
 
 _STUDY = """

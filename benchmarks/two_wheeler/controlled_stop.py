@@ -10,7 +10,7 @@ from benchmarks.suite import Part
 from benchmarks.timing import interleaved, kernel, ratio
 from benchmarks.two_wheeler.hand_stop import HandWrittenStop
 from bywire.bench.experiment import as_run
-from bywire.brakes.two_wheeler.experiments import straight_stop
+from bywire.brakes.two_wheeler.experiments.straight_stop import STRAIGHT_STOP, StraightStopOptions
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.catalog import parameters
 from bywire.simulation.run import Run
@@ -20,9 +20,9 @@ _ROUNDS, _STEP, _DURATION = 20, 20e-6, 4.5
 
 def controlled_stop(par: TwoWheelerParameters) -> Run:
     """Return a stop from 30 m/s on wet asphalt by slip control, and half a second of standstill."""
-    options = cast(straight_stop.Options, straight_stop.EXPERIMENT.defaults)
+    options = cast(StraightStopOptions, STRAIGHT_STOP.defaults)
     wet = options.replace({"surface": "wet-asphalt", "v_0": 30.0, "duration": _DURATION})
-    case, *_ = straight_stop.cases(par, wet)
+    case, *_ = STRAIGHT_STOP.cases(par, wet, None)
     return as_run(case, _STEP)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from benchmarks.judging import simulated_and_judged
 from benchmarks.result import Result, at_most
 from benchmarks.suite import Part
-from bywire.studies.chunk import computed_chunk
+from bywire.studies.store import computed_chunk
 from bywire.studies.study_file import read_study
 
 _STUDY = """

@@ -23,7 +23,7 @@ from benchmarks.timing import (
 from benchmarks.wedge import tanh_rk4
 from benchmarks.wedge.hand_wedge import HandWrittenWedge
 from bywire.bench.experiment import as_run
-from bywire.brakes.wedge.experiments import moment_pulses
+from bywire.brakes.wedge.experiments.moment_tests import MOMENT_PULSES, PulsesOptions
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.catalog import parameters
 from bywire.core.typing import Array
@@ -52,8 +52,8 @@ _WIDTH, _WIDTH_V, _TANH_STEP = 0.03, 1e-5, 1e-6
 
 def fig7(par: WedgeParameters, step: float = STEP) -> Run:
     """Return the run of Fig. 7: a step of the moment demand, then pulses."""
-    options = cast(moment_pulses.Options, moment_pulses.EXPERIMENT.defaults)
-    case, *_ = moment_pulses.cases(par, options)
+    options = cast(PulsesOptions, MOMENT_PULSES.defaults)
+    case, *_ = MOMENT_PULSES.cases(par, options, None)
     return as_run(case, step)
 
 

@@ -1,1 +1,1 @@
-"""What the specification of faults states beside what the brakes of this package give."""
+"""Stated figures of faults beside those that the brakes of this package compute."""

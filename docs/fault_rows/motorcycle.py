@@ -1,4 +1,4 @@
-"""Rows of the motorcycle brake, section 3.2."""
+"""Fault figures of the motorcycle brake."""
 
 from __future__ import annotations
 
@@ -31,40 +31,40 @@ CONDUCTANCE = "m**3/(s*Pa)"
 FROZEN = (1.7, 19.8, 36.9, 51.4, 51.4, 37.1, 16.6)
 AHEAD = 0.75e-3 / 20e-3
 PHASE = (
-    "the stated phases are those of a dither three quarters of a sample of the ECU ahead of ours, "
-    "and the end differs by up to 13 bar from sample to sample. With a dither as far ahead all "
-    "seven are the stated ones within 1.8 bar, four of them within 0.1; the others are those that "
-    "still release, and 0.005 of duty makes up for 1.8 bar"
+    "the stated phases belong to a dither three quarters of an ECU sample ahead of ours, and the "
+    "final pressure differs by up to 13 bar from sample to sample. With the same lead, all seven "
+    "agree within 1.8 bar, and four of them within 0.1. The other three are still releasing, and "
+    "0.005 of duty corresponds to 1.8 bar"
 )
 LATE = (
-    "five ticks late the current loop is beyond its margin: where its phase crosses -180 degrees, "
-    "at 44 Hz, its gain is 1.28, and without dither it swings by itself, at 41 Hz with 18 A. The "
-    "50 Hz of the dither come out 4.6 times as large, 13.5 A, with 3.6 A of 41 Hz beside them. So "
-    "near the resonance its gain decides: a tenth more or less of its integral part gives 12.1 or "
-    "8.1 A, and 7 A belong to 17 % less. How the stated one was counted is not known: half the "
-    "range of ours is 17.3 A, its mean deviation 8.8 A, and it is 6.5 A above the healthy one's"
+    "with a delay of five ticks the current loop is unstable. Its phase crosses -180 degrees at "
+    "44 Hz, where its gain is 1.28. Without dither it oscillates by itself, at 41 Hz with 18 A. "
+    "The dither's 50 Hz are amplified 4.6 times to 13.5 A, beside 3.6 A of 41 Hz. So close to the "
+    "resonance, the gain is decisive: a tenth more or less of its integral part gives 12.1 or "
+    "8.1 A, and 17 % less gives 7 A. The definition of the stated figure is not known. Half the "
+    "range of ours is 17.3 A, its mean deviation 8.8 A, and it is 6.5 A above the healthy one"
 )
-RIGID = "our line is rigid, as the paper's: nothing but the pads gives way"
+RIGID = "our line is rigid, like the paper's, so only the pads are compliant"
 
 
 def _seal() -> list[Row]:
     return [
-        Row("seal.swollen 1.9", "left without power", 3.0, "bar", ends(RELEASES)),
+        Row("seal.swollen 1.9", "remaining pressure without power", 3.0, "bar", ends(RELEASES)),
         Row(
             "seal.swollen 3",
-            "share of time stuck, from 6 to 37 bar",
+            "share of time stuck, step from 6 to 37 bar",
             87.0,
             "%",
             figure("share_stuck", "seal.swollen", 3.0, factor=100.0),
         ),
         Row(
             "seal.swollen 3",
-            "off the demand then",
+            "deviation from the demand",
             1.7,
             "bar",
             lambda: abs(figure("steady_state_error", "seal.swollen", 3.0, factor=1e-5)()),
         ),
-        Row("seal.swollen 3", "held without power", 37.0, "bar", ends(HOLDS)),
+        Row("seal.swollen 3", "pressure held without power", 37.0, "bar", ends(HOLDS)),
     ]
 
 
@@ -79,7 +79,9 @@ def _supply() -> list[Row]:
             passes(one("battery.lost"), 5.0),
             daily=True,
         ),
-        Row("battery.lost", "left", 1.37, "bar", ends(one("battery.lost")), daily=True),
+        Row(
+            "battery.lost", "remaining pressure", 1.37, "bar", ends(one("battery.lost")), daily=True
+        ),
         Row(
             "battery.shorted",
             "below 5 bar after",
@@ -87,17 +89,23 @@ def _supply() -> list[Row]:
             "ms",
             passes(one("battery.shorted"), 5.0),
         ),
-        Row("battery.shorted", "left", 1.84, "bar", ends(one("battery.shorted"))),
+        Row("battery.shorted", "remaining pressure", 1.84, "bar", ends(one("battery.shorted"))),
         Row(
             weak + " 6 V",
-            "rise from 6 to 37 bar",
+            "rise time from 6 to 37 bar",
             87.0,
             "ms",
             figure("rise_time", weak, factor=1e3),
         ),
-        Row(weak + " 6 V", "rises slower by", 40.0, "%", ratio("rise_time", weak)),
+        Row(weak + " 6 V", "increase of the rise time", 40.0, "%", ratio("rise_time", weak)),
         Row(weak + " 6 V", "overshoot", 12.0, "%", figure("overshoot", weak)),
-        Row(weak + " 6 V", "duty saturated", 7.0, "%", figure("share_sat_duty", weak, factor=100)),
+        Row(
+            weak + " 6 V",
+            "share of time at the duty limit",
+            7.0,
+            "%",
+            figure("share_sat_duty", weak, factor=100),
+        ),
         Row(
             "bridge.open-phase",
             "below 5 bar after",
@@ -105,7 +113,7 @@ def _supply() -> list[Row]:
             "ms",
             passes(one("bridge.open-phase"), 5.0),
         ),
-        Row("bridge.open-phase", "left", 1.37, "bar", ends(one("bridge.open-phase"))),
+        Row("bridge.open-phase", "remaining pressure", 1.37, "bar", ends(one("bridge.open-phase"))),
         *(
             row
             for duty, after, current in ((0.5, 42.0, 17.0), (1.0, 21.0, 32.0))
@@ -114,7 +122,7 @@ def _supply() -> list[Row]:
                 Row(
                     f"bridge.stuck {duty:g}", "over 45 bar after", after, "ms", passes(fault, 45.0)
                 ),
-                Row(f"bridge.stuck {duty:g}", "stays", (52.0, 54.0), "bar", ends(fault)),
+                Row(f"bridge.stuck {duty:g}", "steady pressure", (52.0, 54.0), "bar", ends(fault)),
                 Row(f"bridge.stuck {duty:g}", "current", current, "A", ends(fault, "i", 1.0)),
             )
         ),
@@ -123,10 +131,10 @@ def _supply() -> list[Row]:
 
 def _motor_and_sensors() -> list[Row]:
     return [
-        Row("motor.hot 2", "rises slower by", 8.0, "%", ratio("rise_time", "motor.hot")),
+        Row("motor.hot 2", "increase of the rise time", 8.0, "%", ratio("rise_time", "motor.hot")),
         Row(
             "motor.hot 2",
-            "error",
+            "steady-state error",
             0.34,
             "bar",
             figure("steady_state_error", "motor.hot", factor=1e-5),
@@ -135,22 +143,25 @@ def _motor_and_sensors() -> list[Row]:
         Row("motor.hot 2", "held pressure", 37.0, "bar", ends(one("motor.hot"))),
         Row(
             "motor.demagnetized 0.7",
-            "current over the healthy one",
+            "current, relative to the healthy one",
             1.43,
             "1",
             current_ratio,
-            "the ECU does not know it, and its dither is weaker, too: the piston sticks all the "
-            "time, where friction takes its part of the current. Known to the ECU it is 1.42",
+            "the ECU does not know of the weak magnets, so its dither is weaker too. The piston "
+            "sticks all the time, and friction carries part of the current's load. With an ECU "
+            "that knows, the figure is 1.42",
         ),
         Row("current.stuck 0", "peak", 45.5, "bar", most(one("current.stuck", "0 A"))),
-        Row("current.stuck 0", "peak within", 36.0, "ms", peak_time),
-        Row("current.stuck 0", "then back to", 37.0, "bar", ends(one("current.stuck", "0 A"))),
+        Row("current.stuck 0", "time of the peak", 36.0, "ms", peak_time),
+        Row(
+            "current.stuck 0", "pressure after that", 37.0, "bar", ends(one("current.stuck", "0 A"))
+        ),
         Row("current.gain 0.5", "peak", 39.4, "bar", most(one("current.gain", 0.5))),
-        Row("current.gain 0.5", "then back to", 37.0, "bar", ends(one("current.gain", 0.5))),
+        Row("current.gain 0.5", "pressure after that", 37.0, "bar", ends(one("current.gain", 0.5))),
         *(
             Row(
                 f"pressure.offset {offset}",
-                "stays",
+                "steady pressure",
                 stays,
                 "bar",
                 ends(one("pressure.offset", f"{offset} bar")),
@@ -160,7 +171,7 @@ def _motor_and_sensors() -> list[Row]:
         ),
         Row(
             "pressure.drift -1 bar/s",
-            "after 2.5 s",
+            "pressure after 2.5 s",
             39.5,
             "bar",
             ends(one("pressure.drift", "-1 bar/s")),
@@ -177,7 +188,7 @@ def _motor_and_sensors() -> list[Row]:
                     "ms",
                     passes(fault, 45.0),
                 ),
-                Row(f"pressure.stuck {level} bar", "stays", 52.0, "bar", ends(fault)),
+                Row(f"pressure.stuck {level} bar", "steady pressure", 52.0, "bar", ends(fault)),
             )
         ),
         Row(
@@ -199,21 +210,23 @@ def _motor_and_sensors() -> list[Row]:
 
 def _controller() -> list[Row]:
     return [
-        Row("ecu.dropped 2", "stays", 36.7, "bar", ends(one("ecu.dropped", 2), rows=1000)),
+        Row(
+            "ecu.dropped 2", "steady pressure", 36.7, "bar", ends(one("ecu.dropped", 2), rows=1000)
+        ),
         Row(
             "ecu.dropped 5",
-            "stays",
+            "steady pressure",
             36.2,
             "bar",
             ends(one("ecu.dropped", 5), rows=1000),
-            "with every fifth tick alone our controller takes its differences over five sample "
-            "times for those of one: its derivative part grows fivefold, and demands of +-20 A "
-            "follow one another",
+            "with every fifth tick alone, our controller treats differences over five sample times "
+            "as differences over one. Its derivative part grows fivefold, and demands of +-20 A "
+            "alternate",
         ),
         Row("bridge.late 5", "peak", 38.5, "bar", most(one("bridge.late", 5))),
         Row(
             "bridge.late 5",
-            "ripple of the current, its deviation",
+            "ripple of the current, standard deviation",
             7.0,
             "A",
             lambda: float(recording(one("bridge.late", 5))["i"].values[-1000:].std()),
@@ -221,19 +234,30 @@ def _controller() -> list[Row]:
         ),
         Row(
             "bridge.late 5",
-            "the same, its integral part 17 % less",
+            "the same with 17 % less integral gain",
             None,
             "A",
             late_with_less,
-            note="its own swinging is gone then, see above",
+            note="the current loop no longer oscillates by itself, see above",
         ),
-        Row(
-            "ecu.frozen", "least of seven phases", min(FROZEN), "bar", lambda: min(frozen()), PHASE
-        ),
-        Row("ecu.frozen", "most of seven phases", max(FROZEN), "bar", lambda: max(frozen())),
         Row(
             "ecu.frozen",
-            "most that any of the seven is off, dither 0.75 ms ahead",
+            "lowest pressure of seven phases",
+            min(FROZEN),
+            "bar",
+            lambda: min(frozen()),
+            PHASE,
+        ),
+        Row(
+            "ecu.frozen",
+            "highest pressure of seven phases",
+            max(FROZEN),
+            "bar",
+            lambda: max(frozen()),
+        ),
+        Row(
+            "ecu.frozen",
+            "largest deviation of the seven, dither 0.75 ms ahead",
             None,
             "bar",
             lambda: max(
@@ -242,12 +266,12 @@ def _controller() -> list[Row]:
         ),
         Row(
             "p_set.lost",
-            "stays: our choice is the last demand",
+            "steady pressure: we hold the last demand",
             37.0,
             "bar",
             ends(one("p_set.lost")),
         ),
-        Row("gear.jammed", "stays as it was", 37.0, "bar", ends(one("gear.jammed"))),
+        Row("gear.jammed", "unchanged pressure", 37.0, "bar", ends(one("gear.jammed"))),
     ]
 
 
@@ -256,18 +280,18 @@ def _fluid() -> list[Row]:
     slow = one(LEAK, f"1e-14 {CONDUCTANCE}")
     return [
         Row("fluid.air 0.0088 ml", "travel at 37 bar", 8.62, "mm", lambda: travel(little)),
-        Row("fluid.air 0.0088 ml", "the same without", 8.53, "mm", lambda: travel(())),
-        Row("fluid.air-in-line 1.28 ml", "stays", 0.6, "bar", ends(AIR, options=APPLY)),
+        Row("fluid.air 0.0088 ml", "the same without air", 8.53, "mm", lambda: travel(())),
+        Row("fluid.air-in-line 1.28 ml", "steady pressure", 0.6, "bar", ends(AIR, options=APPLY)),
         Row("fluid.air-in-line 1.28 ml", "current", 19.8, "A", ends(AIR, "i", 1.0, options=APPLY)),
         Row(
             "fluid.air-in-line 0.123 ml",
-            "still reached",
+            "pressure still reached",
             37.0,
             "bar",
             ends(one("fluid.air-in-line", "0.123 ml", FROM_START), options=APPLY),
         ),
-        Row(f"{LEAK} 1e-14", "stays", 37.09, "bar", ends(slow)),
-        Row(f"{LEAK} 1e-14", "piston creeps", 0.41, "mm/s", lambda: creep(recording(slow))),
+        Row(f"{LEAK} 1e-14", "steady pressure", 37.09, "bar", ends(slow)),
+        Row(f"{LEAK} 1e-14", "creep of the piston", 0.41, "mm/s", lambda: creep(recording(slow))),
         *(
             Row(
                 f"{fault} {g}",
@@ -279,7 +303,13 @@ def _fluid() -> list[Row]:
             for fault in (LEAK, CUP)
             for g, after in (("1e-13", 1970.0), ("1e-12", 200.0))
         ),
-        Row("caliper.heated 5 ml", "rigid line", 0.43, "bar/K", lambda: expansion(5e-6, 6.0)),
+        Row(
+            "caliper.heated 5 ml",
+            "pressure rise, rigid line",
+            0.43,
+            "bar/K",
+            lambda: expansion(5e-6, 6.0),
+        ),
         Row(
             "caliper.heated 5 ml",
             "drag pressure after 30 K",
@@ -289,7 +319,7 @@ def _fluid() -> list[Row]:
         ),
         Row(
             "caliper.heated 5 ml",
-            "a line that gives way",
+            "pressure rise, compliant line",
             0.24,
             "bar/K",
             lambda: expansion(5e-6, 6.0),
@@ -297,7 +327,7 @@ def _fluid() -> list[Row]:
         ),
         Row(
             "caliper.heated 64 ml",
-            "all fluid, a line that gives way",
+            "pressure rise of all fluid, compliant line",
             3.1,
             "bar/K",
             lambda: expansion(64e-6, 1.0),
@@ -305,12 +335,18 @@ def _fluid() -> list[Row]:
         ),
         Row(
             "caliper.knocked-back 0.3 mm",
-            "piston's travel more",
+            "additional piston travel",
             1.0,
             "mm",
             lambda: travel(one("caliper.knocked-back", "0.3 mm", FROM_START)) - travel(()),
         ),
-        Row("piston.stuck 60 N", "left on the pads without power", None, "bar", ends(STUCK)),
+        Row(
+            "piston.stuck 60 N",
+            "remaining pressure at the pads without power",
+            None,
+            "bar",
+            ends(STUCK),
+        ),
     ]
 
 

@@ -1,4 +1,4 @@
-"""Runs of the motorcycle brake: full braking at 37 bar, the fault after 1.5 s."""
+"""Runs of the motorcycle brake: full braking at 37 bar with a fault at 1.5 s."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Faults = tuple[tuple[str, Any, float], ...]
 
 @cache
 def recording(faults: Faults, options: tuple[tuple[str, str], ...] = HOLD) -> xr.Dataset:
-    """Return full braking with faults, each as name, value and onset [s]."""
+    """Return a recording of full braking with faults: name, value and onset [s] of each."""
     sections = [
         {"fault": name, "onset": onset, **({} if value is None else {"value": value})}
         for name, value, onset in faults
@@ -38,7 +38,7 @@ def recording(faults: Faults, options: tuple[tuple[str, str], ...] = HOLD) -> xr
 
 @cache
 def figures(fault: str = "", value: Any = None) -> dict[str, float]:
-    """Return the key figures of the step from 6 to 37 bar with a fault that is there all along."""
+    """Return the key figures of the step from 6 to 37 bar with a fault from the start."""
     given = {} if value is None else {"value": value}
     faults = [{"fault": fault, "onset": FROM_START, **given}] if fault else []
     return {kpi.name: kpi.value for kpi in run(Bench("hard-braking", SET, faults=faults)).kpis}
@@ -83,7 +83,7 @@ def most(faults: Faults, signal: str = "p_pd", factor: float = 1e-5) -> Callable
 
 
 def ratio(name: str, fault: str, value: Any = None) -> Callable[[], float]:
-    """Return by how much a key figure of the step is more with a fault [%]."""
+    """Return the increase of a key figure of the step by a fault [%]."""
     return lambda: 100.0 * (figures(fault, value)[name] / figures()[name] - 1.0)
 
 
@@ -94,9 +94,9 @@ def figure(name: str, fault: str, value: Any = None, factor: float = 1.0) -> Cal
 
 @cache
 def frozen(ahead: float = 0.0) -> tuple[float, ...]:
-    """Return where the pads stand 1.1 s after the ECU froze, at seven phases of the dither [bar].
+    """Return the pads' pressure 1.1 s after the ECU froze, at seven phases of the dither [bar].
 
-    ``ahead``: share of a period by which the dither runs ahead of our own.
+    ``ahead``: lead of the dither over our own, as a share of its period.
     """
     bench = Bench("hard-braking", SET, options=dict(HOLD))
     (case,) = bench.cases()
@@ -119,19 +119,19 @@ def late_with_less() -> float:
 
 
 def peak_time() -> float:
-    """Return when the pressure is highest after the current sensor shows nothing [ms]."""
+    """Return the time of the highest pressure after the current sensor fails [ms]."""
     p = recording(one("current.stuck", "0 A"))["p_pd"].sel(time=slice(ONSET, None))
     return 1e3 * (float(p["time"].values[int(np.argmax(p.values))]) - ONSET)
 
 
 def creep(found: xr.Dataset) -> float:
-    """Return how fast the piston creeps over whole periods of the dither [mm/s]."""
+    """Return the speed of the creeping piston over whole periods of the dither [mm/s]."""
     x = found["x_mc"].values
     return 1e3 * float(x[-1] - x[-1001])
 
 
 def current_ratio() -> float:
-    """Return the current of weak magnets over that of good ones."""
+    """Return the ratio of the currents with weak and with good magnets."""
     weak, good = (
         float(recording(faults)["i"][-1000:].mean())
         for faults in (one("motor.demagnetized", 0.7), ())
@@ -143,13 +143,13 @@ LOW = (("p_from", "1e-5 bar"), ("p_to", "37 bar"), ("duration", "4 s"))
 
 
 def travel(faults: Faults) -> float:
-    """Return where the piston holds 37 bar, a brake applied from empty [mm]."""
+    """Return the piston travel at 37 bar, of a brake applied from zero pressure [mm]."""
     return 1e3 * float(recording(faults, LOW)["x_mc"].values[-1000:].mean())
 
 
 @cache
 def expansion(volume: float, duration: float) -> float:
-    """Return the pressure per kelvin of a warming volume [m3] behind a blocked port [bar/K]."""
+    """Return the pressure rise of a warming volume [m3] behind a blocked port [bar/K]."""
     par, rate = Bench("hard-braking", SET).par, 5.0
     case = case_from_rest(
         "run",

@@ -1,4 +1,4 @@
-"""One figure that is stated of a fault, beside the one that is computed."""
+"""A stated figure of a fault beside the computed one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 FLOORS = {"bar": 0.2, "ms": 10.0}
-"""admitted at least, by unit, where a tenth of what is stated is less"""
+"""smallest tolerance by unit, used if a tenth of the stated figure is less"""
 
 
 @dataclass(frozen=True)
@@ -16,21 +16,21 @@ class Row:
     Parameters
     ----------
     fault
-        What fails, as ``[[faults]]`` names it where it does.
+        Name of the fault in ``[[faults]]``, if it has one.
     what
-        Which figure.
+        Name of the figure.
     stated
-        It, or least and most of it; None where none is stated.
+        Stated figure, or its least and largest value; None if none is stated.
     unit
         Of both figures.
     computed
-        Runs our bench.
+        Runs our bench and returns the figure.
     because
-        Why the two disagree; empty where they agree.
+        Reason for a disagreement; empty if the figures agree.
     note
-        What explains a figure that agrees, or of which none is stated.
+        Explanation of a figure that agrees, or for which none is stated.
     daily
-        Whether it is cheap enough for every run of the tests.
+        Whether every test run can afford it.
     """
 
     fault: str
@@ -43,7 +43,7 @@ class Row:
     daily: bool = False
 
     def agrees(self, value: float) -> bool:
-        """Return whether a value lies within a tenth, or the unit's floor, of what is stated."""
+        """Return whether a value is within a tenth, or the unit's floor, of the stated one."""
         if self.stated is None:
             return True
         low, high = self.stated if isinstance(self.stated, tuple) else (self.stated, self.stated)

@@ -1,4 +1,4 @@
-"""Rows of the wedge brake: moments held, the fault after 0.3 s unless it is there all along."""
+"""Fault figures of the wedge brake: held moments, with a fault at 0.3 s or from the start."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.result import Result
-from bywire.bench.running import run
+from bywire.bench.running import Result, run
 from bywire.plant import roller_screw
 from fault_rows.row import Row
 
@@ -36,7 +35,7 @@ Pairs = tuple[tuple[str, Any], ...]
 
 
 def friction(mu_B: float) -> Pairs:
-    """Return pads of another friction, of which the controller knows."""
+    """Return changes for pads of another friction coefficient, known to the controller."""
     slope = Bench("moment-ramp", SET).par.control.moment.slope_hat
     return (("wedge.mu_B", mu_B), ("control.moment.slope_hat", slope * mu_B / 0.35))
 
@@ -73,20 +72,20 @@ def par() -> Any:
 
 
 def back_driving() -> float:
-    """Return the force from which an unpowered motor turns: C_0/(L/2pi eta_b) [N]."""
+    """Return the force that back-drives an unpowered motor: C_0/(L/2pi eta_b) [N]."""
     own = par()
     return float(own.bearing.C_0 / (roller_screw.slope(own.screw) * own.screw.eta_b))
 
 
 def strongest(bearing: bool = False) -> float:
-    """Return what one motor delivers at the drive's limit [N]; with its own bearing, or without."""
+    """Return the force of one motor at the drive's limit [N]; with its own bearing, or without."""
     own = par()
     torque = own.motor_1.K_ref * own.drive.i_max - (own.bearing.C_0 if bearing else 0.0)
     return float(torque * own.screw.eta_f / roller_screw.slope(own.screw))
 
 
 def needed(mu_B: float) -> Callable[[], float]:
-    """Return the force of the motors that 950 N m take, by the balance of the wedge [N]."""
+    """Return the motors' force for 950 N m, by the equilibrium of the wedge [N]."""
 
     def computed() -> float:
         own = par()
@@ -97,12 +96,12 @@ def needed(mu_B: float) -> Callable[[], float]:
 
 
 def moved() -> float:
-    """Return how far the wedge moves after a screw has jammed [um]."""
+    """Return the travel of the wedge after a screw has jammed [um]."""
     return 1e6 * float(np.ptp(rows_of("x", ONSET + 0.01, "moment-ramp", (), "screw_1.jammed")))
 
 
 def fight() -> float:
-    """Return by how much the preload changes for each micrometer of error of an encoder [N/um]."""
+    """Return the change of the preload per micrometer of encoder error [N/um]."""
     error = 3e-3  # rad
     away = roller_screw.slope(par().screw) * error * 1e6
     forces = [
@@ -117,12 +116,12 @@ def fight() -> float:
 
 
 def ripple(fault: str = "") -> Callable[[], float]:
-    """Return the moment peak to peak where the screws stand, without power [N m]."""
+    """Return the peak-to-peak moment with standing screws, without power [N m]."""
     return lambda: float(np.ptp(rows_of("M_B", 1.0, "power-off-hold", (), fault, onset=FROM_START)))
 
 
 def crossing(known: bool) -> Callable[[], float]:
-    """Return how much longer 0.1 mm more of clearance takes, known to the ECU or not [ms]."""
+    """Return the extra time for 0.1 mm more clearance, known to the ECU or not [ms]."""
 
     def computed() -> float:
         far = ((("caliper.clearance", 0.3e-3),),) if known else ((), "caliper.gap-grown", 1.5)
@@ -135,7 +134,7 @@ def crossing(known: bool) -> Callable[[], float]:
 
 
 def mean_moment(fault: str, value: Any) -> Callable[[], float]:
-    """Return by how much the moment of a hold changes with a fault [N m]."""
+    """Return the change of the held moment by a fault [N m]."""
     options = (("t_hold", 1.0),)
     return lambda: float(
         np.diff(
@@ -151,7 +150,7 @@ def mean_moment(fault: str, value: Any) -> Callable[[], float]:
 
 
 def at_stop(*args: Any, **given: Any) -> Callable[[], float]:
-    """Return 1 where the wedge comes to an end stop, else 0."""
+    """Return 1 if the wedge reaches an end stop, else 0."""
     return lambda: float(np.abs(rows_of("F_end", 0.0, *args, **given)).max() > 0.0)
 
 
@@ -164,19 +163,20 @@ WORN = ("power-off-hold", (), "heart.worn")
 WOUND = ("moment-ramp", (), "moment.stuck", 0.0)
 LOST = ("moment-ramp", (), "caliper.pad-lost")
 CONTROLLED = (
-    "28 is the ripple of Fig. 7 while the moment control holds 200 N m, 21.0 that of screws which "
-    "stand. The disc turns at 9.5 Hz, near the loop's crossover of 8 Hz: without any friction the "
-    "control takes 12 % off the 21.0 (18.4 N m), but shafts that stick at every reversal lag, and "
-    "that adds: 27.5 N m with lossless screws, 31.5 with our friction, 28.4 at 950 N m"
+    "28 is the ripple of Fig. 7 while the moment control holds 200 N m; with standing screws it is "
+    "21.0. The disc turns at 9.5 Hz, near the loop's crossover of 8 Hz. Without any friction, the "
+    "control lowers the 21.0 by 12 % to 18.4 N m. Shafts that stick at every reversal lag, which "
+    "adds ripple: 27.5 N m with lossless screws, 31.5 with our friction, 28.4 at 950 N m"
 )
 FIVEFOLD = (
-    "140 is five times 28, but what sticking adds does not grow with the run-out: the ripple is "
-    "1.48 of that with standing screws at 4 um, 1.19 at 8 um, 1.07 at 12 um and 0.98 at 20 um"
+    "140 is five times 28, but the contribution of sticking does not grow with the run-out. "
+    "Relative to standing screws, the ripple is 1.48 at 4 um, 1.19 at 8 um, 1.07 at 12 um and 0.98 "
+    "at 20 um"
 )
-STANDING = "2 mu_B r_B K_cal times the run-out peak to peak, 21.0 N m and five times that"
+STANDING = "2 mu_B r_B K_cal times the peak-to-peak run-out, 21.0 N m and five times that"
 CREEP = (
-    "0.1 mm is 0.863 rad of the motors, 7.19 ms at the 120 rad/s of the gap mode; of a gap that "
-    "the ECU does not know all of it lies beyond the contact it believes in, where it creeps at "
+    "0.1 mm is 0.863 rad of the motors, 7.19 ms at the 120 rad/s of the gap mode. If the ECU does "
+    "not know of the gap, all of it lies beyond the assumed contact, where the brake creeps at "
     "10 rad/s: 86.3 ms"
 )
 
@@ -187,7 +187,7 @@ def _motors() -> list[Row]:
         *(
             Row(
                 "power.stuck 1",
-                f"kept of 500 N m at mu_B {mu_B:g}",
+                f"moment kept of 500 N m at mu_B {mu_B:g}",
                 kept,
                 "N m",
                 figure("moment_end", hold, (("wedge.mu_B", mu_B),)),
@@ -197,24 +197,33 @@ def _motors() -> list[Row]:
         Row("power.stuck 1", "drift", 0.0, "m", figure("drift", hold)),
         Row(
             "power.stuck 1",
-            "without friction, at mu_B 0.45: comes to the end stop",
+            "reaches the end stop without friction, at mu_B 0.45",
             1.0,
             "1",
             at_stop(hold, friction(0.45) + BARE),
         ),
         Row(
             "drive_1.stuck 0",
-            "force from which the dead motor turns",
+            "force that back-drives the dead motor",
             545.0,
             "N",
             back_driving,
             daily=True,
         ),
-        Row("drive_1.stuck 0", "most of the other, 20 A", 4084.0, "N", strongest, daily=True),
-        Row("drive_1.stuck 0", "950 N m at mu_B 0.2 take", 3115.0, "N", needed(0.2), daily=True),
         Row(
             "drive_1.stuck 0",
-            "reserve, less its own bearing",
+            "largest force of the other motor, 20 A",
+            4084.0,
+            "N",
+            strongest,
+            daily=True,
+        ),
+        Row(
+            "drive_1.stuck 0", "force for 950 N m at mu_B 0.2", 3115.0, "N", needed(0.2), daily=True
+        ),
+        Row(
+            "drive_1.stuck 0",
+            "reserve, minus its own bearing",
             (0.0, 10.0),
             "%",
             lambda: 100.0 * (strongest(bearing=True) / (needed(0.2)() + back_driving()) - 1.0),
@@ -223,7 +232,7 @@ def _motors() -> list[Row]:
         *(
             Row(
                 f"drive_{k}.stuck 0",
-                "held of 950 N m at mu_B 0.2",
+                "moment held of 950 N m at mu_B 0.2",
                 None,
                 "N m",
                 held("M_B", "moment-ramp", friction(0.2), f"drive_{k}.stuck", 0.0, options=HIGH),
@@ -232,12 +241,12 @@ def _motors() -> list[Row]:
         ),
         Row(
             "screw_1.jammed",
-            "wedge moves at most",
+            "largest travel of the wedge",
             (0.0, 40.0),
             "um",
             moved,
-            "26 um of it are free-play, and 27 um the spring of 24 N/um by which the wedge stood "
-            "on the jammed screw with 647 N, and is let go",
+            "26 um of it are free play. 27 um come from the spring of 24 N/um that pressed the "
+            "wedge on the jammed screw with 647 N and is released",
         ),
         Row(
             "motor_1.shorted",
@@ -251,22 +260,22 @@ def _motors() -> list[Row]:
 
 def _sensors() -> list[Row]:
     return [
-        Row("encoder_1.offset", "force fight: tens of N per um", (10.0, 99.0), "N/um", fight),
+        Row("encoder_1.offset", "force fight, in tens of N per um", (10.0, 99.0), "N/um", fight),
         Row(
             "moment.offset 50 N m",
-            "moment changes by",
+            "change of the moment",
             -50.0,
             "N m",
             mean_moment("moment.offset", 50.0),
         ),
         Row(
             "moment.stuck 0",
-            "winds in, current",
+            "current while the wedge is pulled in",
             20.0,
             "A",
             lambda: float(np.abs(rows_of("i_1", 0.0, *WOUND)).max()),
         ),
-        Row("moment.stuck 0", "winds in: comes to the end stop", 1.0, "1", at_stop(*WOUND)),
+        Row("moment.stuck 0", "reaches the end stop", 1.0, "1", at_stop(*WOUND)),
     ]
 
 
@@ -287,9 +296,7 @@ def _mechanics() -> list[Row]:
             "N m",
             lambda: float(np.abs(rows_of("M_B", 0.0, *LOST, onset=FROM_START)).max()),
         ),
-        Row(
-            "caliper.pad-lost", "comes to the end stop", 1.0, "1", at_stop(*LOST, onset=FROM_START)
-        ),
+        Row("caliper.pad-lost", "reaches the end stop", 1.0, "1", at_stop(*LOST, onset=FROM_START)),
         Row(
             "heart.worn 5",
             "preload without power",
@@ -299,7 +306,7 @@ def _mechanics() -> list[Row]:
         ),
         Row(
             "heart.worn 5",
-            "the same of a healthy brake",
+            "the same for a healthy brake",
             454.0,
             "N",
             figure("preload_end", "power-off-hold"),
@@ -313,28 +320,28 @@ def _mechanics() -> list[Row]:
         ),
         Row(
             "wedge.spring-broken",
-            "rate of the spring, by default",
+            "spring rate, default",
             0.0,
             "N/m",
             lambda: float(par().wedge.k_return),
         ),
         Row(
             "wedge_friction.worn 5",
-            "kept of 500 N m without power",
+            "moment kept of 500 N m without power",
             None,
             "N m",
             figure("moment_end", "power-off-hold", (), "wedge_friction.worn", onset=FROM_START),
         ),
         Row(
             "caliper.gap-grown",
-            "0.1 mm more, known to the ECU",
+            "extra time, known to the ECU",
             7.2,
             "ms per 0.1 mm",
             crossing(known=True),
         ),
         Row(
             "caliper.gap-grown",
-            "0.1 mm more, unknown",
+            "extra time, unknown to the ECU",
             None,
             "ms per 0.1 mm",
             crossing(known=False),
@@ -359,7 +366,7 @@ def _mechanics() -> list[Row]:
         *(
             Row(
                 f"flywheel.run-out{times}",
-                "ripple, screws stand without power",
+                "ripple, standing screws without power",
                 None,
                 "N m",
                 ripple(fault),

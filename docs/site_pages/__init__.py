@@ -1,5 +1,5 @@
-"""Pages of the site that are made from the code: they are written nowhere by hand.
+"""Pages of the site that are generated from the code.
 
-Each module here returns the text of one kind of page; `pages.py` has them all, `extension.py` hands
-them to Sphinx.
+Each module returns the text of one kind of page. `pages.py` lists them all, and `extension.py`
+hands them to Sphinx.
 """

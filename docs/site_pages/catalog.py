@@ -1,20 +1,19 @@
-"""What the registry finds, a page for each kind of thing: all that ``bywire list NAME`` says."""
+"""A page for each kind of thing in the registry, with the text of ``bywire list NAME``."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from bywire.analysis.linear.plant import PLANTS
-from bywire.analysis.loop import LOOPS
+from bywire.analysis.loop import LOOPS, PLANTS
 from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.api.describe import Description, described
-from bywire.api.described import fault_summaries
+from bywire.api.things import all_things
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
-from bywire.bench.kpis.registry import definitions
-from bywire.bench.stimuli.registry import STIMULI
-from bywire.campaigns.declared import CAMPAIGNS
+from bywire.bench.kpis.families import definitions
+from bywire.bench.stimulus import STIMULI
+from bywire.campaigns.residual import CAMPAIGNS
 from bywire.core.brake import brakes
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES
@@ -28,14 +27,14 @@ from site_pages.markdown import block_lines, plain, section_lines, table_lines
 
 @dataclass(frozen=True)
 class Topic:
-    """A page of things.
+    """A page for one or several kinds of things.
 
     Parameters
     ----------
     title, about
-        Heading, and what stands below it.
+        Heading, and the sentence below it.
     names
-        Kind of thing, as `bywire.describe` calls it -> what returns the names of all.
+        Kind of thing, as `bywire.describe` calls it -> a function that returns all names.
     """
 
     title: str
@@ -46,17 +45,17 @@ class Topic:
 TOPICS = {
     "assemblies": Topic(
         "Brakes and their assemblies",
-        "What can be simulated, with the signals that a recording holds.",
+        "All models that bywire can simulate, with their recorded signals.",
         {"assembly": lambda: ASSEMBLIES.all()},
     ),
     "parameter-sets": Topic(
         "Parameter sets",
-        "Every value says where it comes from: a source, a derivation, a calibration, a choice.",
+        "Every value states its source: a paper, a derivation, a calibration or a choice.",
         {"parameter set": lambda: PARAMETER_SETS.all()},
     ),
     "experiments": Topic(
         "Experiments",
-        "What a bench file's `experiment` names, with options and key figures.",
+        "Names for the key `experiment` of a bench file, with options and key figures.",
         {
             "experiment": lambda: EXPERIMENTS.all(),
             "experiment of any brake": lambda: GENERIC_EXPERIMENTS.all(),
@@ -64,32 +63,32 @@ TOPICS = {
     ),
     "stimuli": Topic(
         "Stimuli",
-        "What a bench drives an experiment with.",
+        "Inputs of an experiment over time, for `[stimulus]` of a bench file.",
         {"stimulus": lambda: STIMULI.all()},
     ),
     "key-figures": Topic(
         "Key figures",
-        "How each is computed.",
+        "The definition of each key figure.",
         {"KPI": lambda: definitions()},
     ),
     "loops": Topic(
         "Loops and plants",
-        "What `linearize`, `margins`, `frequency-response` and `design` take.",
+        "Names for `linearize`, `margins`, `frequency-response`, `agreement` and `design`.",
         {"loop": lambda: LOOPS.all(), "plant": lambda: PLANTS.all()},
     ),
     "methods": Topic(
         "Methods of identification",
-        "What `identify` takes.",
+        "Names for `identify`.",
         {"method": lambda: METHODS.all(), "method of any bench": lambda: BENCH_METHODS.all()},
     ),
     "studies": Topic(
         "Studies and lives",
-        "What `study size` and `life` take.",
+        "Names for `study size` and `life`.",
         {"study": lambda: STUDIES.all(), "life": lambda: LIVES.all()},
     ),
     "campaigns": Topic(
         "Campaigns of faults",
-        "What `faults` takes.",
+        "Names for `faults`.",
         {"campaign": lambda: CAMPAIGNS.all()},
     ),
 }
@@ -108,25 +107,25 @@ def page(name: str) -> str:
 
 
 def faults_page() -> str:
-    """Return the page of all faults, a line each: most differ by their signal alone."""
+    """Return the page of all faults, one per line: most differ only by their signal."""
     lines = [
         "# Faults",
         "",
-        "What `[[faults]]` of a bench file and `--fault` take; `bywire list NAME` says all about "
-        "one.",
+        "Names for `[[faults]]` of a bench file and for `--fault`. `bywire list NAME` shows all "
+        "about one fault.",
         "",
     ]
-    rows = ([f"`{name}`", plain(summary)] for name, summary in fault_summaries().items())
-    return "\n".join([*lines, *table_lines(["fault", "what happens"], rows)])
+    rows = ([f"`{name}`", plain(summary)] for name, summary in all_things()["faults"].items())
+    return "\n".join([*lines, *table_lines(["fault", "effect"], rows)])
 
 
 def loop_figures_page() -> str:
-    """Return the page of the figures of loops, a line each."""
+    """Return the page of the figures of loops, one per line."""
     lines = [
         "# Figures of loops",
         "",
-        "What `--require` of `bywire design` and a file of requirements limit, by either name; "
-        "`bywire margins --json` gives those that have a second name by it.",
+        "Figures that `--require` of `bywire design`, or a file of requirements, can limit, by "
+        "either name. `bywire margins --json` reports figures with a second name under that name.",
         "",
     ]
     rows = (
@@ -144,9 +143,9 @@ def loop_figures_page() -> str:
 
 
 def brakes_page() -> str:
-    """Return the page of the brakes that come with bywire, with the schematics of what they run."""
+    """Return the page of the brakes that come with bywire, with schematics of their models."""
     rows = ([f"`{brake.name}`", plain(brake.summary)] for brake in brakes().values())
-    lines = ["# Brakes", "", *table_lines(["brake", "what it is"], rows)]
+    lines = ["# Brakes", "", *table_lines(["brake", "description"], rows)]
     main = {cited.assembly: name for name, cited in reversed(PARAMETER_SETS.all().items())}
     for brake in brakes().values():
         lines += [f"## {plain(brake.name)}", "", plain(brake.summary), ""]

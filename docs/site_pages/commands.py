@@ -1,4 +1,4 @@
-"""All commands with their arguments and options, as their help has them."""
+"""All commands with their arguments and options, from their help."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from site_pages.markdown import plain, table_lines
 
 
 def commands() -> dict[str, Any]:
-    """Return what a user types -> the command, subcommands in the place of their group."""
+    """Return the words a user types -> the command; subcommands replace their group."""
     return dict(_leaves("bywire", program()))
 
 
@@ -28,16 +28,16 @@ def page() -> str:
     lines = [
         "# Commands",
         "",
-        "Each is a call of a public function of the same name, with the same checks and warnings; "
-        "`bywire COMMAND --help` says the same. With `--system PATH` a brake of one's own takes "
-        "part in all.",
+        "Each command calls a public function, with the same checks and warnings. `bywire COMMAND "
+        "--help` prints the same text. Add `--system PATH` to use your own brake with any command. "
+        "One page with all commands: [](../cheat-sheet.md).",
         "",
     ]
     for words, command in commands().items():
         context = command.make_context(words, [], resilient_parsing=True)
         usage = re.sub(r"\s+", " ", command.get_usage(context).removeprefix("Usage: "))
         lines += [f"## {words}", "", f"`{usage}`", "", *_help(command.help or ""), ""]
-        lines += table_lines(["", "what it is"], _rows(command, context))
+        lines += table_lines(["", "meaning"], _rows(command, context))
     return "\n".join(lines)
 
 

@@ -80,7 +80,7 @@ def _list_table(headings: list[str], rows: Iterator[list[str]]) -> list[str]:
     lines = [".. list-table::", "   :header-rows: 1", ""]
     for row in (headings, *rows):
         for k, cell in enumerate(row):
-            # A row without anything in a cell still has the cell.
+            # An empty cell is still a cell.
             lines.append(f"   {'  ' if k else '* '}- {cell}".rstrip())
     return [*lines, ""]
 
@@ -110,4 +110,4 @@ def _faults(faults: tuple[ParameterFault, ...]) -> list[str]:
     if not faults:
         return []
     rows = ([f"``{fault.name}``", fault.summary] for fault in faults)
-    return ["Faults", "------", "", *_list_table(["name", "what happens"], rows)]
+    return ["Faults", "------", "", *_list_table(["name", "effect"], rows)]

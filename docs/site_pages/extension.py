@@ -1,9 +1,10 @@
-"""What Sphinx is told: pages made from the code, links that leave the folder, formulas, names."""
+"""Sphinx extension: generated pages, links that leave the folder, formulas, public names."""
 
 from __future__ import annotations
 
 import builtins
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ GALLERY = HERE.parent / "examples" / "gallery"
 FIGURES = GENERATED / "gallery-figures"
 _log = logging.getLogger(__name__)
 
-# Where a link goes that leads out of this folder in the repository, from a page of this folder.
+# Links of pages in this folder that leave it in the repository -> the page that replaces them.
 _MOVED = {
     "../examples/emb_caliper": "_generated/third-brake.md",
     "../examples/emb_caliper/README.md": "_generated/third-brake.md",
@@ -33,7 +34,7 @@ _MOVED = {
     "../src/bywire/plant": "_generated/elements/index.rst",
     "trust/": "trust.md",
 }
-# A script, a style sheet, a picture or a frame that a browser would ask another host for.
+# A script, style sheet, picture or frame that a browser would load from another host.
 _ELSEWHERE = re.compile(
     r"<(?:script|img|iframe|link(?![^>]*rel=\"(?:canonical|search|author)\"))[^>]*"
     r"(?:src|href)=\"(?:https?:)?//[^\"]*",
@@ -45,6 +46,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Connect everything."""
     app.connect("builder-inited", _make_pages, priority=100)  # before the gallery
     app.connect("source-read", _follow_links)
+    app.connect("autodoc-process-signature", _own_result)
     app.connect("missing-reference", _public_name)
     app.connect("build-finished", _require_one_host)
     app.add_html_math_renderer("mathml", (_inline_math, None), (_displayed_math, None))
@@ -62,10 +64,10 @@ def _follow_links(app: Sphinx, name: str, source: list[str]) -> None:
 
 
 class FileScraper:
-    """Takes the figures that an example leaves in the folder of its ``--out``."""
+    """Scraper of the figures that an example writes into the folder of its ``--out``."""
 
     def __call__(self, block: Any, block_vars: dict[str, Any], gallery_conf: Any) -> str:
-        """Return the figures that are new, as reStructuredText."""
+        """Return the new figures as reStructuredText."""
         moved = []
         for file in sorted(FIGURES.glob("*.png")):
             target = Path(next(block_vars["image_path_iterator"]))
@@ -78,20 +80,33 @@ class FileScraper:
 
 
 def name_script(gallery_conf: Any, script: str) -> None:
-    """Give an example the ``__file__`` that it has when it is started as a script."""
+    """Give an example the ``__file__`` that it has as a script."""
     vars(builtins)["__file__"] = str(GALLERY / Path(script).name)
 
 
 def arguments(gallery_conf: Any, script: dict[str, Any]) -> list[str]:
-    """Return what an example of the gallery is called with."""
+    """Return the arguments of an example of the gallery."""
     FIGURES.mkdir(parents=True, exist_ok=True)
     return ["--out", str(FIGURES)]
+
+
+def _own_result(
+    app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: str, result: str
+) -> tuple[str, str] | None:
+    """Link the result of a public function to the class that users import from the same place."""
+    face = name.rpartition(".")[0]
+    return (signature, f"{face}.{result}") if f"{face}.{result}" in _classes() else None
+
+
+@cache
+def _classes() -> frozenset[str]:
+    return frozenset(f"bywire.{name}" for name in python_names.public())
 
 
 def _public_name(
     app: Sphinx, env: BuildEnvironment, node: pending_xref, content: nodes.Element
 ) -> nodes.Node | None:
-    """Lead a type in a signature to the name that users import, or show it without a link."""
+    """Link a type in a signature to the name that users import, or show it without a link."""
     if node.get("refdomain") != "py":
         return None
     target = node["reftarget"]
@@ -130,4 +145,4 @@ def _require_one_host(app: Sphinx, error: Exception | None) -> None:
         return
     for path in sorted(Path(app.outdir).rglob("*.html")):
         if asked := _ELSEWHERE.search(path.read_text(encoding="utf-8")):
-            raise ExtensionError(f"{path.name} asks another host: {asked.group()}")
+            raise ExtensionError(f"{path.name} loads from another host: {asked.group()}")

@@ -10,12 +10,12 @@ from site_pages.markdown import plain
 ROOT = Path(__file__).parents[2]
 BENCHES = {
     "hard-braking": (
-        "A step of the brake pressure, the motorcycle brake",
+        "Motorcycle brake: a step of the brake pressure",
         "hard-braking",
         ("seal.T_pr", "ecu.dither.gain", "ecu.pressure.k_p", "motor.R_m"),
     ),
     "moment-pulses": (
-        "Pulses of the brake moment, the wedge brake",
+        "Wedge brake: pulses of the brake moment",
         "moment-pulses",
         ("wedge.mu_B", "control.moment.f_c"),
     ),
@@ -23,14 +23,14 @@ BENCHES = {
 
 
 def write(folder: Path) -> None:
-    """Write each bench as a page of its own into a folder."""
+    """Write each bench as one page into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, (_, bench, vary) in BENCHES.items():
         bywire.page(bench, folder / f"{name}.html", vary=vary)
 
 
 def page() -> str:
-    """Return the page in which they stand."""
+    """Return the page that contains them."""
     lines = [
         "---",
         "html_theme.sidebar_secondary.remove: true",
@@ -38,16 +38,16 @@ def page() -> str:
         "",
         "# Live benches",
         "",
-        "The brake's own kernel, compiled to WebAssembly, runs in this page: move a slider, and "
-        "all that a run shows follows. Nothing is sent anywhere. How to make such a file of a "
-        "bench of your own: [](../page.md).",
+        "The brake's own kernel, compiled to WebAssembly, runs in this page. Move a slider, and "
+        "curves and key figures follow. The page sends nothing anywhere. To make such a file of "
+        "your own bench, see [](../page.md).",
         "",
     ]
     for name, (title, *_) in BENCHES.items():
         lines += [
             f"## {plain(title)}",
             "",
-            f'<a href="../live/{name}.html">Open it alone</a>',
+            f'<a href="../live/{name}.html">Open in its own tab</a>',
             "",
             "```{raw} html",
             f'<iframe class="bench" src="../live/{name}.html" title="{title}" loading="lazy">'

@@ -1,4 +1,4 @@
-"""A result's document as Markdown, with its figures beside it."""
+"""A result's document as Markdown, with its figures as files."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|$~])")
 
 
 def plain(text: str) -> str:
-    """Return a text in which Markdown sees nothing but letters."""
+    """Return a text with all special characters of Markdown escaped."""
     return _SPECIAL.sub(r"\\\1", " ".join(text.split()))
 
 
 def table_lines(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Return a table of texts that are Markdown already."""
+    """Return a table of texts that are already Markdown."""
     lines = ["| " + " | ".join(headings) + " |", "|---" * len(headings) + "|"]
     return [*lines, *("| " + " | ".join(row) + " |" for row in rows), ""]
 
@@ -36,12 +36,12 @@ def table_lines(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> list[
 def section_lines(
     sections: Sequence[Section], level: int, figures: Path | None = None
 ) -> list[str]:
-    """Return sections with their headings at a level, and draw their figures into a folder.
+    """Return sections with headings at a level, and draw their figures into a folder.
 
     Parameters
     ----------
     figures
-        Where figures are written, as vector graphics; they are left out where there is none.
+        Folder of the figures, as vector graphics; without a folder, figures are left out.
     """
     lines: list[str] = []
     for section in sections:

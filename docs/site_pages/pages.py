@@ -1,4 +1,4 @@
-"""All pages that are made from the code, and when they are made anew."""
+"""All generated pages, and the condition under which they are generated again."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ STAMP = "made-of"
 
 
 def texts() -> Iterator[tuple[str, str]]:
-    """Yield file and text of the pages that take no computing."""
+    """Yield file and text of the pages that need no computation."""
     yield "brakes.md", catalog.brakes_page()
     for topic in catalog.TOPICS:
         yield f"{topic}.md", catalog.page(topic)
@@ -43,14 +43,14 @@ def texts() -> Iterator[tuple[str, str]]:
 
 
 def write(folder: Path, said: Callable[[str], None]) -> None:
-    """Write all pages, unless what they are made of is what it was."""
+    """Write all pages, unless their sources are unchanged."""
     digest = _digest()
     stamp = folder / STAMP
     if stamp.exists() and stamp.read_text() == digest:
         return
     if stamp.exists():
         stamp.unlink()
-    kept = {"gallery"}  # of which Sphinx-Gallery itself knows what is current
+    kept = {"gallery"}  # Sphinx-Gallery itself updates it
     for path in folder.iterdir() if folder.exists() else ():
         if path.name not in kept:
             shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -71,7 +71,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _digest() -> str:
-    """Return a digest of all that these pages are made of."""
+    """Return a digest of the sources of these pages."""
     digest = hashlib.sha256()
     folders = (ROOT / "src", Path(__file__).parent, ROOT / "benches", ROOT / "studies")
     inside = (p for folder in folders for p in folder.rglob("*") if p.suffix != ".pyc")

@@ -1,4 +1,4 @@
-"""Each published source: what it states beside what bywire computes, with its figures."""
+"""Each published source: its statements beside the computed values, with figures."""
 
 from __future__ import annotations
 
@@ -15,5 +15,5 @@ def sources() -> list[str]:
 
 
 def page(source: str, folder: Path) -> str:
-    """Return the page of a source, computed now; its figures go into the folder."""
+    """Return the page of a source, computed now, and write its figures into the folder."""
     return document_page(bywire.reproduce(source).document(), folder / f"{source}-figures")

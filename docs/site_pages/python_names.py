@@ -1,4 +1,4 @@
-"""The Python face: every public name with its docstring."""
+"""The public names of Python with their docstrings."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from bywire.report.wording import unit_text
 
 
 def public() -> dict[str, Any]:
-    """Return name -> object of the package's face."""
+    """Return public name -> object."""
     return {name: getattr(bywire, name) for name in bywire.__all__}
 
 
 def homes() -> dict[str, str]:
-    """Return where an object is defined -> where users import it from."""
+    """Return the full name of an object -> the name that users import."""
     known = {}
-    for face in (authoring, bywire):  # the shorter name where there are two
+    for face in (authoring, bywire):  # of two names, the shorter
         for name in face.__all__:
             thing = getattr(face, name)
             home = getattr(thing, "__module__", "")
@@ -35,8 +35,8 @@ def page() -> str:
         "Python",
         "======",
         "",
-        "``import bywire`` loads nothing; each name is loaded on its first "
-        "use. Every function that is a command, too, takes the same and says the same.",
+        "``import bywire`` is fast: modules load on first use. A function that is also a command "
+        "takes the same arguments and gives the same warnings.",
         "",
     ]
     functions = {n: f for n, f in public().items() if inspect.isfunction(f)}
@@ -48,8 +48,8 @@ def page() -> str:
 
 
 def authoring_page() -> str:
-    """Return the page of what models of one's own are written with, as reStructuredText."""
-    title = "What models are written with"
+    """Return the page of the names for writing models, as reStructuredText."""
+    title = "Names for writing models"
     lines = [title, "=" * len(title), "", inspect.getdoc(authoring) or "", ""]
     both = public()
     for name in sorted(authoring.__all__, key=str.lower):
@@ -69,8 +69,9 @@ def errors_page() -> str:
             "Errors",
             "======",
             "",
-            "A command that fails says one line and exits with the status below: 1 where something "
-            "that was required does not hold, 130 where it was interrupted.",
+            "A command that fails prints one line and exits with the status below. Status 1 means "
+            "that a requirement or check is not met, status 130 that the command was interrupted. "
+            "Messages with causes and remedies: :doc:`../troubleshooting`.",
             "",
             ".. automodule:: bywire.core.errors",
             "   :members:",

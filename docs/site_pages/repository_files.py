@@ -1,4 +1,4 @@
-"""Files of the repository that are worth a page: bench files, the third brake, what changed."""
+"""Pages of files of the repository: bench files, the third brake, the changelog."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ _LINK = re.compile(r"\[([^\]]*)\]\((?!https?:|#)[^)]*\)")
 
 
 def benches_page() -> str:
-    """Return the page of all bench and study files, each as it stands."""
+    """Return the page of all bench and study files with their full text."""
     lines = [
         "# Bench and study files",
         "",
-        "They stand in `benches/` and `studies/` of the repository. Every key: "
-        "[](../bench-files.md), [](../studies.md).",
+        "These files are in `benches/` and `studies/` of the repository. For every key, see "
+        "[](../bench-files.md) and [](../studies.md).",
         "",
     ]
     for folder in ("benches", "studies"):
@@ -28,11 +28,11 @@ def benches_page() -> str:
 
 
 def third_brake_page() -> str:
-    """Return what the package of the third brake says of itself; its links lead to no page."""
+    """Return the README of the third brake's package, without links."""
     text = (ROOT / "examples" / "emb_caliper" / "README.md").read_text(encoding="utf-8")
     return _LINK.sub(r"`\1`", text)
 
 
 def changes_page() -> str:
-    """Return what changed, from version to version."""
+    """Return the changelog, without links."""
     return _LINK.sub(r"`\1`", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"))

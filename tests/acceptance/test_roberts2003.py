@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from bywire.brakes.wedge.paper.roberts2003 import PARTS, reproduce
-from bywire.brakes.wedge.paper.runs import parameters
+from bywire.brakes.wedge.paper.statements import parameters
 from bywire.reproduction.reproduction import Reproduction
 from undrawn import drawn_once, undrawn
 
@@ -321,7 +321,7 @@ def test_report_opens_with_causes_and_shows_every_figure(
         paths = reproduction.write(tmp_path)
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert html.count("<figcaption>Figure") == len(reproduction.figures)
-    assert html.index("leaves friction out") < html.index("<figcaption>Figure")
+    assert html.index("neglects friction") < html.index("<figcaption>Figure")
     results = json.loads((tmp_path / "results.json").read_text())
     assert results.pop("files") == [str(path) for path in paths]
     assert results == reproduction.as_object()

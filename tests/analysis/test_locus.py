@@ -11,8 +11,7 @@ import pytest
 from bywire.analysis.linear.linear_model import LinearModel, rates
 from bywire.analysis.locus import locus, locus_of
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.loop_curves import loop_curve
-from bywire.analysis.margins import figures_at
+from bywire.analysis.margins import figures_at, loop_curve
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError
 

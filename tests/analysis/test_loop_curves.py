@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.loop_curves import Family, LoopCurve, disk, loop_curve
-from bywire.analysis.margins import UNSTABLE, figures_at
+from bywire.analysis.margins import UNSTABLE, Family, LoopCurve, disk, figures_at, loop_curve
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError
 

@@ -15,8 +15,7 @@ from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.margins import MARGINS, UNSTABLE, LoopMargins, margins, margins_of, worst
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
-from bywire.synthesis.linear_case import room, slack, values_of
-from bywire.synthesis.requirement import read
+from bywire.synthesis.linear_case import read, room, slack, values_of
 
 Array = NDArray[np.float64]
 

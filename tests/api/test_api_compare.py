@@ -222,9 +222,9 @@ def test_changes_of_what_was_run_before_are_refused(folders):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (None, "no finished result of bywire run"),
+        (None, "not a finished result of bywire run"),
         ("{", "cannot be read"),
-        ("[]", "holds no JSON object"),
+        ("[]", "does not contain a JSON object"),
         ('{"status": "passed"}', "is damaged"),
         (
             '{"status": "passed", "bench": "x", "kpis": {}, "requirements": [], "files": []}',

@@ -84,7 +84,7 @@ def test_an_interrupt_says_where_it_goes_on(
             bywire.trust("seal-friction", 4, folder=tmp_path)
     (tmp_path / "starts.jsonl").write_text("")
     method = replace(METHODS.find("seal-friction"), identify=stopped)
-    monkeypatch.setattr("bywire.api.identify.find_method", lambda _: method)
+    monkeypatch.setattr("bywire.api.identification.find_method", lambda _: method)
     with pytest.raises(KeyboardInterrupt, match="finished starts are in"):
         bywire.identify("seal-friction", synthetic=1, folder=tmp_path)
 

@@ -11,8 +11,8 @@ import pytest
 
 import bywire
 from bywire.bench import ensemble
+from bywire.bench.ensemble import key_figures_of
 from bywire.bench.running import run
-from bywire.bench.side_by_side import key_figures_of
 from bywire.core.errors import ParameterError, UnknownNameError
 
 OPTIONS = {"duration": "60 ms", "settle": "10 ms"}
@@ -79,7 +79,7 @@ def test_an_experiment_of_several_runs():
 def test_what_cannot_run_side_by_side_runs_one_by_one(bench, monkeypatch):
     found = bywire.simulate_ensemble(bench, {"options.duration": [0.05, 0.06]})
     assert [r.recording.sizes["time"] for r in found.results] == [61, 71]
-    monkeypatch.setattr("bywire.bench.side_by_side.fit_lanes", lambda runs: False)
+    monkeypatch.setattr("bywire.bench.ensemble.fit_lanes", lambda runs: False)
     alone = bywire.simulate_ensemble(bench, {"motor.R_m": [0.25]})
     assert "lanes" not in alone.results[0].recording.attrs["engine"]
 
@@ -89,7 +89,7 @@ def test_what_is_refused(bench):
         bywire.simulate_ensemble(bench, {"motor.R_n": [0.3]})
     with pytest.raises(ParameterError, match=r"motor\.R_m = -1 \(in SI\).*ohm"):
         bywire.simulate_ensemble(bench, {"motor.R_m": [0.3, -1.0]})
-    with pytest.raises(ParameterError, match="one length"):
+    with pytest.raises(ParameterError, match="the same length"):
         bywire.simulate_ensemble(bench, {"motor.R_m": [0.3], "motor.K_e": [0.03, 0.04]})
     with pytest.raises(ParameterError, match="leave signals out"):
         bywire.simulate_ensemble(bench, {"motor.R_m": [0.3]}, ["p_mc"])

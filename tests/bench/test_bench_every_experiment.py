@@ -11,17 +11,16 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.bench.ensemble import run_benches
+from bywire.bench.ensemble import key_figures_of, run_benches
 from bywire.bench.experiment import EXPERIMENTS
-from bywire.bench.kpis.cases import FamilyJudge
+from bywire.bench.kpis.families import FamilyJudge
 from bywire.bench.running import run_of
-from bywire.bench.side_by_side import key_figures_of
-from bywire.bench.stimuli.registry import STIMULI
+from bywire.bench.stimulus import STIMULI
 from bywire.core.brake import brakes
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError
 from bywire.report.bench_figures import bench_figures
-from bywire.simulation.run_group import fit_lanes
+from bywire.simulation.ensemble import fit_lanes
 
 NAMES = sorted(EXPERIMENTS.all())
 PAIRS = [

@@ -7,7 +7,7 @@ import math
 import pytest
 
 import bywire
-from bywire.bench import extent
+from bywire.bench import experiment
 from bywire.core.errors import StepError
 from run_once import run_once
 
@@ -75,10 +75,22 @@ def test_settling_that_no_float_counts_in_bytes():
 
 
 def test_recording_less_often_needs_less(monkeypatch):
-    monkeypatch.setattr(extent, "_memory", lambda: 2e6)
+    monkeypatch.setattr(experiment, "_memory", lambda: 2e6)
     with pytest.raises(StepError, match=r"0\.002 GB.*record less often"):
         run_once(braking())
     assert run_once(braking(record="10 ms")).status == "done"
+
+
+def test_runs_that_one_memory_holds_alone_and_not_together(monkeypatch):
+    bench = bywire.Bench("current-loop", "roberts2003", options={"duration": "4 ms"})
+    kept = sum(each.nbytes for each in run_once(bench).recordings.values())
+    monkeypatch.setattr(experiment, "_memory", lambda: 0.9 * kept)
+    with pytest.raises(StepError, match=r"9 runs of up to .* kept together, need about"):
+        run_once(bench)
+    monkeypatch.setattr(experiment, "_memory", lambda: 1.5 * kept)
+    result = bywire.run(bench)
+    assert math.isnan(result.kpis[0].error)
+    assert any("kept together, need about" in text for text in result.warnings)
 
 
 def test_infinite_duration():
@@ -88,7 +100,7 @@ def test_infinite_duration():
 
 
 def test_memory_of_this_machine_is_plausible():
-    assert 1e8 < extent._memory() < 1e16
+    assert 1e8 < experiment._memory() < 1e16
 
 
 def test_system_that_does_not_tell_its_memory(monkeypatch):
@@ -96,19 +108,19 @@ def test_system_that_does_not_tell_its_memory(monkeypatch):
         raise ValueError(name)
 
     monkeypatch.setattr("os.sysconf", unknown, raising=False)
-    assert extent._memory.__wrapped__() == 8e9
+    assert experiment._memory.__wrapped__() == 8e9
 
 
 @pytest.mark.parametrize("value", [1e-9, 1, "3 ms"])
 def test_admissible_step(value):
-    assert extent.checked_step(value) >= extent.SHORTEST_STEP
-    assert extent.checked_interval(value) == extent.checked_step(value)
+    assert experiment.checked_step(value) >= experiment.SHORTEST_STEP
+    assert experiment.checked_interval(value) == experiment.checked_step(value)
 
 
 @pytest.mark.parametrize("value", [0, 9.99e-10, -1, -math.inf, math.nan, "x", [1], None, False])
 def test_inadmissible_step(value):
     with pytest.raises(bywire.BywireError, match=r"simulation\.step"):
-        extent.checked_step(value)
+        experiment.checked_step(value)
 
 
 def test_sample_times_that_would_make_it_settle_for_long():

@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 
 import bywire
-from bywire.bench.energy_ledger import role_attributes
-from bywire.bench.recording import energy_doubts, energy_residual, parameter_hash
+from bywire.bench.energy_ledger import energy_doubts, energy_residual, role_attributes
+from bywire.bench.recording import parameter_hash
 from bywire.core.errors import FileError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of

@@ -13,12 +13,11 @@ import bywire
 from bywire.bench import ensemble, running, step_error
 from bywire.bench.ensemble import run_benches
 from bywire.bench.experiment import as_run
-from bywire.bench.result import Result
-from bywire.bench.running import run
+from bywire.bench.running import Result, run
 from bywire.brakes.motorcycle.case import settled_start
 from bywire.core.errors import WorkLimitError
+from bywire.simulation.ensemble import simulate_group
 from bywire.simulation.run import simulate
-from bywire.simulation.run_group import simulate_group
 from run_once import run_once
 
 SET = "dardanelli2010"
@@ -157,5 +156,5 @@ def test_work_is_counted_in_substeps_the_same_alone_and_side_by_side():
     alone = simulate(computed)
     assert alone.work >= 0.2 / 20e-6
     assert alone.work == simulate_group([computed] * 3)[1].work
-    with pytest.raises(WorkLimitError, match="more than"):
+    with pytest.raises(WorkLimitError, match="more work than"):
         simulate(replace(computed, most_work=0.5 * alone.work))

@@ -18,9 +18,8 @@ from bywire.bench.energy_ledger import (
     further_ledgers,
     role_attributes,
 )
-from bywire.bench.ensemble import simulate_ensemble
+from bywire.bench.ensemble import key_figures_of, simulate_ensemble
 from bywire.bench.running import run as run_bench
-from bywire.bench.side_by_side import key_figures_of
 from bywire.core.signals import Role
 from bywire.usecases.run import run
 from systems.loading import SPRING_AXIS, loaded
@@ -186,7 +185,7 @@ def test_every_run_tells_of_a_loss_that_gives_energy(
     axis: Callable[[str], Bench], warned: Callable[[Bench], Sequence[str]]
 ) -> None:
     (told,) = warned(axis("+"))
-    assert told.startswith("the loss 'viscous damping' (E_damping) gives ")
+    assert told.startswith("the loss 'viscous damping' (E_damping) delivers ")
 
 
 def test_no_run_tells_of_a_loss_that_loses(axis: Callable[[str], Bench]) -> None:

@@ -69,5 +69,5 @@ def test_a_summary_survives_copies_and_refuses_what_is_no_option():
     ):
         assert (copied, copied.template) == (experiment.summary, experiment.summary.template)
     for wrong in ("step to {p_end}", "step to {p_to", "step to {}"):
-        with pytest.raises(ModelError, match="names of options are wanted in braces"):
+        with pytest.raises(ModelError, match="braces must contain names of options"):
             replace(experiment, summary=wrong)

@@ -16,9 +16,8 @@ from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire
 from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear
 from bywire.brakes.wedge.model import WedgeBrake
-from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
 from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
-from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
+from bywire.brakes.wedge.rigs.shaft_rig import DrivenShaft, ShaftRig
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import Model
 from bywire.core.parameters import choice_fields

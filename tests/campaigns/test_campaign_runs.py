@@ -14,7 +14,6 @@ import bywire
 from bywire.api.run_faults import FaultCampaign
 from bywire.bench.running import run
 from bywire.campaigns.campaign_file import read_campaign
-from bywire.campaigns.findings import CampaignFindings, FaultFinding, finding
 from bywire.campaigns.judging import FACTORS, faulty_traces, healthy_traces, judge_healthy
 from bywire.campaigns.plan import Criterion
 from bywire.campaigns.residual import (
@@ -25,9 +24,9 @@ from bywire.campaigns.residual import (
     mean_of_the_last,
     threshold,
 )
-from bywire.campaigns.running import CampaignStore
+from bywire.campaigns.running import CampaignFindings, CampaignStore, FaultFinding, finding
 from bywire.core.errors import DeviceError, FileError, InputError
-from bywire.simulation.cuda_device import find_device
+from bywire.simulation.cuda import find_device
 
 SMALL = """
 bench = "hard-braking"

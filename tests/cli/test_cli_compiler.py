@@ -57,7 +57,7 @@ def test_broken_compiler_is_3_with_one_message(anew, bench, tmp_path):
     cache = str(tmp_path / "cache")
     outcome = anew("run", bench(), "--json", BYWIRE_CC="/bin/false", BYWIRE_CACHE=cache)
     assert (outcome.status, outcome.out) == (3, "")
-    assert outcome.lines[0].endswith("refused a generated kernel:") or len(outcome.lines) == 1
+    assert outcome.lines[0].endswith("rejected a generated kernel:") or len(outcome.lines) == 1
     assert len(outcome.lines) <= 3
     assert "set BYWIRE_CC to another C compiler" in outcome.lines[-1]
     assert not list(Path(cache).glob("*.so"))
@@ -68,13 +68,13 @@ def test_compiler_that_complains_is_quoted(anew, bench, tmp_path):
     cc = program(tmp_path / "cc", script)
     outcome = anew("run", bench(), BYWIRE_CC=cc, BYWIRE_CACHE=str(tmp_path / "cache"))
     assert (outcome.status, outcome.out) == (3, "")
-    assert "cc 1.0 refused a generated kernel:\nno such flag" in outcome.err
+    assert "cc 1.0 rejected a generated kernel:\nno such flag" in outcome.err
     assert "Traceback" not in outcome.err
 
 
 def test_compiler_that_is_not_there(anew, bench):
     outcome = anew("run", bench(), BYWIRE_CC="no-such-compiler")
-    refused(outcome, "BYWIRE_CC = 'no-such-compiler' names no program", status=3)
+    refused(outcome, "BYWIRE_CC = 'no-such-compiler' is not a program", status=3)
 
 
 def test_cache_that_is_a_file_is_no_obstacle(anew, bench, tmp_path):

@@ -50,5 +50,5 @@ def test_what_is_no_life_is_refused(bywire, tmp_path):
     refused(bywire("life", "wedge-pad"), "did you mean 'wedge-pads'")
     refused(bywire("life", tmp_path / "none.toml"), "cannot read life file")
     worn = bywire("life", "two-wheeler-pads", "--set", "wear.h_new=0.1mm")
-    refused(worn, "over before its first stop")
+    refused(worn, "ends before its first stop")
     refused(bywire("life", "two-wheeler-pads", "--check", "7"), "fewer than the 20 stops")

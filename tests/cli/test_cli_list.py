@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from command_line import Outcome, refused
 
-from bywire.analysis.linear.plant import PLANTS
-from bywire.analysis.loop import LOOPS
-from bywire.api.described import described_drive, described_loop, described_plant
+from bywire.analysis.loop import LOOPS, PLANTS
+from bywire.api.describe import described
 from bywire.api.overview import overview
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import FileError, UnknownNameError
 from bywire.core.model import ASSEMBLIES
 from bywire.identification.method import METHODS
-from bywire.simulation import kernel_cache
+from bywire.simulation import compiler
 from bywire.synthesis.study import STUDIES
 
 Bywire = Callable[..., Outcome]
+
+
+def about(kind: str, name: str) -> dict[str, Any]:
+    (one,) = (one for one in described(name) if one["kind"] == kind)
+    return one
 
 
 def only(found: Outcome, kind: str) -> dict[str, object]:
@@ -47,7 +52,7 @@ def test_a_method_says_all_that_its_use_takes(bywire: Bywire, name: str) -> None
 
 def test_what_is_found_under_a_name_of_several_kinds(bywire: Bywire) -> None:
     found = bywire("list", "friction-ramp", "--json")
-    assert [one["kind"] for one in found.object["found"]] == ["method", "experiment"]
+    assert [one["kind"] for one in found.object["found"]] == ["experiment", "method"]
     options = {row["name"]: row for row in only(found, "method")["options"]}
     assert options["least"]["value"] == "0.2 bar"
     assert options["least"]["range"] == "> 0 bar"
@@ -104,7 +109,7 @@ def test_an_assembly_says_its_signals_and_what_there_is_for_it(bywire: Bywire, n
 
 def test_every_experiment_says_what_it_drives(bywire: Bywire) -> None:
     for name, one in EXPERIMENTS.all().items():
-        rows = described_drive(one)["drives"]
+        rows = about("experiment", name)["drives"]
         assert rows or one.static is not None, name
     text = bywire("list", "hard-braking").out
     assert "p_set   bar   pressure demand  motorcycle-brake" in text
@@ -113,7 +118,7 @@ def test_every_experiment_says_what_it_drives(bywire: Bywire) -> None:
 
 def test_every_loop_and_plant_says_input_output_and_states(bywire: Bywire) -> None:
     for loop in LOOPS.all().values():
-        rows = described_loop(loop)["signals"]
+        rows = about("loop", loop.name)["signals"]
         told = {
             part: [r["signal"] for r in rows if r["as"] == part]
             for part in ("input", "output", "cut open at", "state")
@@ -123,7 +128,7 @@ def test_every_loop_and_plant_says_input_output_and_states(bywire: Bywire) -> No
         assert all(r["meaning"] for r in rows), loop.name
         assert told["state"]
     for plant in PLANTS.all().values():
-        parts = {row["as"] for row in described_plant(plant)["signals"]}
+        parts = {row["as"] for row in about("plant", plant.name)["signals"]}
         assert parts == {"input", "output", "state"}
     assert (
         "i_source  A      source current             input"
@@ -217,5 +222,5 @@ def test_a_list_is_made_where_nothing_can_be_kept(monkeypatch):
         raise FileError("a temporary folder cannot be made")
 
     before = overview()
-    monkeypatch.setattr(kernel_cache, "usable_folder", refused)
+    monkeypatch.setattr(compiler, "usable_folder", refused)
     assert overview().things == before.things

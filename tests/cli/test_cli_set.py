@@ -30,12 +30,12 @@ import bywire as package
         ("simulation.seed=x", ["simulation.seed = 'x'", "whole number"]),
         ("simulation.seed=" + "9" * 5000, ["simulation.seed = ", "whole number"]),
         ("requirements.overshot=<= 1 %", ["unknown KPI", "'overshoot'"]),
-        ("requirements.overshoot=1 %", ["write for instance '<= 15 %'"]),
+        ("requirements.overshoot=1 %", ["a limit such as '<= 15 %'"]),
         ("requirements.overshoot<=1 %", ["unknown KPI", "'overshoot'"]),
         ("experiment=hard-breaking", ["unknown experiment", "'hard-braking'"]),
         ("parameters=dardaneli", ["unknown parameter set", "'dardanelli2010'"]),
         ("assembly=wedge", ["assembly = 'wedge'", "motorcycle-brake"]),
-        ("stimulus.kind=step", ["brings its own stimulus"]),
+        ("stimulus.kind=step", ["has its own stimulus"]),
         ("gear.law=papr", ["gear.law", "did you mean 'paper'?"]),
     ],
 )
@@ -132,8 +132,8 @@ def test_shares_and_patterns_change_what_is_there(bench):
     ("change", "texts"),
     [
         ("seels.*=+50%", ["none is matched", "'seels.*'", "'seal.*'"]),
-        ("gear.law=+50%", ["gear.law = '+50%'", "quantities alone", "a choice, now paper"]),
-        ("*.law=+50%", ["none of what it matches is a quantity"]),
+        ("gear.law=+50%", ["gear.law = '+50%'", "a choice, now paper, cannot change"]),
+        ("*.law=+50%", ["matches no quantity"]),
         ("motor.R_m=-150%", ["motor.R_m = -0.175 ohm", "> 0 ohm", "got '-150%'"]),
         ("motor.R_n=+5%", ["unknown parameter 'motor.R_n'", "'motor.R_m'"]),
         ("motor.*=5", ["motor.R_m = '5' has the wrong unit"]),
@@ -145,5 +145,7 @@ def test_bad_shares_and_patterns(bywire, bench, change, texts):
 
 def test_a_share_of_zero_is_refused(bywire, bench):
     path = bench(f"{BRAKING}[set]\nseal.T_pr = 0\n")
-    refused(bywire("run", path, "--set", "seal.T_pr=+50%"), "a share of 0 changes nothing")
-    refused(bywire("run", path, "--set", "motor_heat.T_a=+5%"), "share of a temperature", "in K")
+    refused(bywire("run", path, "--set", "seal.T_pr=+50%"), "a percentage of 0 changes nothing")
+    refused(
+        bywire("run", path, "--set", "motor_heat.T_a=+5%"), "percentage of a temperature", "in K"
+    )

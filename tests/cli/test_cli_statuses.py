@@ -48,7 +48,7 @@ def test_bad_input_is_2(bywire, bench):
 
 def test_benchmarks_are_those_of_a_clone(bywire, process, tmp_path, monkeypatch):
     refused(process("benchmark", "comands"), "part of the benchmark 'comands'", "did you mean")
-    monkeypatch.setattr("bywire.cli.bench_commands.__file__", str(tmp_path / "a/b/c/d.py"))
+    monkeypatch.setattr("bywire.cli.app.__file__", str(tmp_path / "a/b/c/d.py"))
     refused(bywire("benchmark"), "benchmarks come with a clone", "tasks.py")
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bywire.bench.experiment import EXPERIMENTS
-from bywire.contracts.experiment_contracts import demands_on
+from bywire.contracts.subjects import demands_on_experiment
 from bywire.core.brake import load_system
 from bywire.report.bench_figures import FIGURES
 from systems.loading import SPRING_AXIS, forgotten
@@ -45,7 +45,9 @@ def _forgotten() -> Iterator[None]:
 
 @pytest.mark.parametrize("name", sorted(EXPERIMENTS.all()))
 def test_experiments_of_ours_name_what_there_is(name: str) -> None:
-    findings = [demand.settle() for demand in demands_on(EXPERIMENTS.find(name), FIGURES.all())]
+    findings = [
+        demand.settle() for demand in demands_on_experiment(EXPERIMENTS.find(name), FIGURES.all())
+    ]
     assert [str(finding) for finding in findings if finding.outcome != "holds"] == []
     assert all(Path(finding.place.file).name.endswith(".py") for finding in findings)
     assert all(finding.place.line for finding in findings)
@@ -71,7 +73,9 @@ def test_what_an_experiment_names_and_nobody_has(
     path = tmp_path / f"pushed_{abs(hash((contract, wrong)))}.py"
     path.write_text(source)
     load_system(path)
-    findings = [demand.settle() for demand in demands_on(EXPERIMENTS.find("push"), FIGURES.all())]
+    findings = [
+        demand.settle() for demand in demands_on_experiment(EXPERIMENTS.find("push"), FIGURES.all())
+    ]
     broken = {finding.contract: finding for finding in findings if finding.outcome == "broken"}
     assert set(broken) == ({contract} if contract else set())
     if contract:

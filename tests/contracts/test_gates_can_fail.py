@@ -12,7 +12,7 @@ from typing import NamedTuple
 import pytest
 
 import bywire
-from bywire.contracts import element_contracts, values
+from bywire.contracts import element_contracts
 from bywire.contracts.elements import functions, parameter_classes
 from bywire.contracts.evidence import Contract, Evidence, examine
 
@@ -44,8 +44,8 @@ check_back_ends, check_jacobian = (
     element_contracts.has_agreeing_back_ends,
     element_contracts.has_its_slopes,
 )
-round_trip = parameters(values.survives_json)
-ranges = parameters(values.keeps_its_ranges)
+round_trip = parameters(element_contracts.survives_json)
+ranges = parameters(element_contracts.keeps_its_ranges)
 
 
 class Mistake(NamedTuple):

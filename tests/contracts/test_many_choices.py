@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from bywire.contracts.sampling import MANY, combinations
+from bywire.contracts.element_contracts import MANY, combinations
 from bywire.core.parameters import ParameterSet
 
 Letter = Literal["a", "b", "c", "d", "e"]

@@ -10,10 +10,10 @@ import pytest
 from annotated_types import Ge
 
 from bywire.api.new import write_package
+from bywire.contracts.element_contracts import Sampler, combinations, described
 from bywire.contracts.elements import elements_by_name, numbers
 from bywire.contracts.evidence import examine, one_by_cause
 from bywire.contracts.model_contracts import OF_A_MODEL
-from bywire.contracts.sampling import Sampler, combinations, described
 from bywire.contracts.subjects import demands_on
 from bywire.contracts.trial import Start, start_of
 from bywire.core.catalog import parameters
@@ -96,4 +96,4 @@ def test_a_fault_of_an_unknown_signal_is_found(tmp_path: Path) -> None:
         trial = next(demand.on for demand in demands_on("unheard-actuator", ()))
         found = examine(OF_A_MODEL["faults"], trial, trial.place())
     assert not found.holds
-    assert "the channel 'angle' names no signal: 'fi'" in found.text
+    assert "the channel 'angle' names 'fi', which is not a signal" in found.text

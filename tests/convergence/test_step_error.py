@@ -144,8 +144,8 @@ def test_that_no_other_step_runs_is_said(monkeypatch, is_range):
         return simulate(each, **options)
 
     monkeypatch.setattr("bywire.bench.running.simulate", stubborn)
-    monkeypatch.setattr("bywire.bench.side_by_side.simulate", stubborn)
-    monkeypatch.setattr("bywire.bench.side_by_side.fit_lanes", lambda *_: False)
+    monkeypatch.setattr("bywire.bench.ensemble.simulate", stubborn)
+    monkeypatch.setattr("bywire.bench.ensemble.fit_lanes", lambda *_: False)
     results = (
         run_benches([bench, bench], estimate_error=True)
         if is_range
@@ -172,8 +172,8 @@ def test_that_a_case_of_a_range_has_no_other_step_costs_the_others_nothing(monke
             raise RunError("left the numbers")
         return simulate(each, **options)
 
-    monkeypatch.setattr("bywire.bench.side_by_side.simulate", fragile)
-    monkeypatch.setattr("bywire.bench.side_by_side.fit_lanes", lambda *_: False)
+    monkeypatch.setattr("bywire.bench.ensemble.simulate", fragile)
+    monkeypatch.setattr("bywire.bench.ensemble.fit_lanes", lambda *_: False)
     first, second = run_benches(benches, estimate_error=True)
     assert first.unestimated
     assert not second.unestimated

@@ -129,6 +129,21 @@ LEVER = {
 }
 
 
+@pytest.mark.parametrize(
+    "formula",
+    [
+        lambda par: (1e200 * par.arm) ** 2.0,
+        lambda par: 1.0 / (par.arm - 0.25),
+        lambda par: math.log(-par.arm),
+    ],
+)
+def test_a_formula_that_has_no_result_no_longer_matches(formula):
+    values = LEVER | {"T_hat": derived(lambda par: formula(par) if par.arm < 0.5 else 2.0, "?")}
+    lever = CitedSet("lever", "lever", "2026", "a lever", Lever, values)
+    (found,) = outdated_values(values, lever.parameters().replace({"arm": 0.25}), {"arm"})
+    assert math.isnan(found.formula)
+
+
 def test_a_derived_value_is_computed_once_and_found_where_it_no_longer_matches():
     lever = CitedSet("lever", "lever", "2026", "a lever", Lever, LEVER)
     par = lever.parameters()

@@ -32,8 +32,7 @@ from bywire.core.child_process import (
 from bywire.core.errors import CompilerError
 from bywire.core.scratch import process_folder
 from bywire.server.serving import opened
-from bywire.simulation.compiler import find_compiler
-from bywire.simulation.kernel_cache import usable_folder
+from bywire.simulation.compiler import find_compiler, usable_folder
 
 SOURCES = Path(bywire.__file__).parent
 COMMAND = str(Path(sysconfig.get_path("scripts")) / "bywire")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from bywire.data.recursive_filter import filtered
+from bywire.data.recursive_filter import filtered, low_passed
 
 
 @pytest.mark.parametrize(
@@ -31,3 +31,10 @@ def test_short_signals() -> None:
     np.testing.assert_allclose(filtered([0.5], [1.0, -0.5, 0.2, 0.1], np.ones(2)), [0.5, 0.75])
     settled = filtered([0.4, 0.4], [1.0, -0.5, 0.2, 0.1], np.full(1, 3.0), settled=True)
     np.testing.assert_allclose(settled, 3.0)
+
+
+@pytest.mark.parametrize("f_c", [20.0, 1e-3, 1e-300])
+def test_a_low_pass_begins_at_the_first_sample_however_low_its_corner(f_c):
+    t = np.arange(1000) * 1e-3
+    lag = -np.expm1(-2.0 * np.pi * f_c * t)  # answer to a step at the second sample
+    np.testing.assert_allclose(low_passed(np.where(t > 0.0, 7.0, 5.0), f_c, 1e-3), 5.0 + 2.0 * lag)

@@ -13,7 +13,7 @@ import pytest
 
 import bywire
 from bywire import authoring
-from bywire.bench.kpis.registry import definitions
+from bywire.bench.kpis.families import definitions
 from bywire.cli.app import program
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.parameters import leaf_fields
@@ -98,6 +98,8 @@ def command_lines(page: Path) -> Iterator[list[str]]:
         for line in block.replace("\\\n", "").splitlines():
             if line.startswith("bywire ") and "<TAB>" not in line:
                 yield shlex.split(line, comments=True)[1:]
+    for line in re.findall(r"^\| `bywire ([^`]+)` \|", page.read_text(encoding="utf-8"), re.M):
+        yield shlex.split(line)
 
 
 def parsed(words: list[str]) -> None:
@@ -121,6 +123,16 @@ def test_every_command_that_is_shown_can_be_parsed(page: Path) -> None:
 def test_a_command_with_an_option_that_does_not_exist_is_told() -> None:
     with pytest.raises(Exception, match="unheard"):
         parsed(["run", "hard-braking", "--unheard"])
+
+
+def test_messages_of_the_page_of_troubleshooting_are_in_the_product() -> None:
+    sources = [ROOT / "tasks.py", *sorted((ROOT / "src").rglob("*.py"))]
+    product = "\n".join(path.read_text(encoding="utf-8") for path in sources)
+    product = re.sub(r'"\s*\n\s*f?"', "", product)  # literals that follow each other are one text
+    rows = re.findall(r"^\|([^|]*)\|", (DOCS / "troubleshooting.md").read_text("utf-8"), re.M)
+    parts = [part for row in rows for part in re.findall(r"`([^`]+)`", row)]
+    assert len(parts) > 30
+    assert [part for part in parts if part not in product] == []
 
 
 def test_letters_that_mean_something_in_markdown_are_escaped() -> None:

@@ -22,14 +22,14 @@ def wrong_ones(rows):
     ]
 
 
-def test_the_cheap_rows_agree_or_say_why_not():
+def test_the_cheap_rows_agree_or_give_a_reason():
     rows = [row for row in ROWS if row.daily]
     assert len(rows) >= 6
     assert not wrong_ones(rows)
 
 
 @pytest.mark.trust
-def test_all_rows_agree_or_say_why_not():
+def test_all_rows_agree_or_give_a_reason():
     stated = [row for row in ROWS if row.stated is not None]
     assert not wrong_ones(stated)
 
@@ -41,7 +41,7 @@ def test_the_page_is_current():
 
 
 def test_a_row_without_a_reason_is_told():
-    row = next(row for row in ROWS if row.what == "most of the other, 20 A")
+    row = next(row for row in ROWS if row.what == "largest force of the other motor, 20 A")
     wrong = type(row)(row.fault, row.what, 0.8 * row.stated, row.unit, row.computed)
     assert wrong_ones([wrong])
     assert wrong_ones([type(row)(row.fault, row.what, row.stated, row.unit, row.computed, "so")])

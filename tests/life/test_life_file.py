@@ -54,36 +54,38 @@ def test_stops_that_differ_in_pauses_alone_are_simulated_once(plan_of):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "name", "valid"),
     [
-        ('lfe = "wedge-pads"', r"unknown key of a life file 'lfe': did you mean 'life'"),
-        ("[set]", r"life is missing: write life ="),
-        ('life = "wedge-pad"', r"unknown life 'wedge-pad': did you mean 'wedge-pads'"),
-        ("life = 3", r"life = 3: write life ="),
-        ('life = "wedge-pads"\nset = 1', r"\[set\] must be a section"),
-        ('life = "wedge-pads"\n[set]\nwear.h_ne = "1 mm"', r"'h_ne': did you mean 'h_new'"),
-        ('life = "wedge-pads"\n[set]\nwear.h_new = 9', r"write the value as a text, with its unit"),
-        ('life = "wedge-pads"\n[set]\nwear.h_new = "9"', r"h_new"),
-        ('life = "wedge-pads"\n[set]\nwear.h_new = "-9 mm"', r"h_new.*> 0 m"),
-        ('life = "wedge-pads"\n[set]\nstop.pauses = "9 s"', r"did you mean 'pause'"),
-        ('life = "wedge-pads"\n[set]\ncaliper.K = "9 N/m"', r"unknown parameter 'caliper.K'"),
-        ('life = "wedge-pads"\n[vary]\n"stop.paus" = "+-5 %"', r"did you mean 'stop.pause'"),
-        ('life = "wedge-pads"\n[vary]\n"caliper.clearance" = "+-5 %"', r"follows from what wears"),
+        ('lfe = "wedge-pads"', "", "life"),
+        ("[set]", "life", ""),
+        ('life = "wedge-pad"', "life", "wedge-pads"),
+        ("life = 3", "life", ""),
+        ('life = "wedge-pads"\nset = 1', "set", ""),
+        ('life = "wedge-pads"\n[set]\nwear.h_ne = "1 mm"', "name behind 'wear.'", "h_new"),
+        ('life = "wedge-pads"\n[set]\nwear.h_new = 9', "wear.h_new", "a text with its unit"),
+        ('life = "wedge-pads"\n[set]\nwear.h_new = "9"', "h_new", ""),
+        ('life = "wedge-pads"\n[set]\nwear.h_new = "-9 mm"', "h_new", "> 0 m"),
+        ('life = "wedge-pads"\n[set]\nstop.pauses = "9 s"', "name behind 'stop.'", "pause"),
+        ('life = "wedge-pads"\n[set]\ncaliper.K = "9 N/m"', "parameter", ""),
+        ('life = "wedge-pads"\n[vary]\n"stop.paus" = "+-5 %"', "", "stop.pause"),
+        ('life = "wedge-pads"\n[vary]\n"caliper.clearance" = "+-5 %"', "caliper.clearance", ""),
         (
             'life = "wedge-pads"\n[vary]\n"caliper.law".kind = "discrete"\n'
             '"caliper.law".values = ["linear", "table"]',
-            r"is a choice",
+            "caliper.law",
+            "",
         ),
-        ('life = "wedge-pads"\n[projection]\nstop = 3', r"did you mean 'stops'"),
-        ('life = "wedge-pads"\n[projection]\nstops = 1', r"whole number from 2 to 4096"),
-        ('life = "wedge-pads"\n[projection]\nstops = 2.5', r"whole number"),
-        ('life = "wedge-pads"\n[projection]\nshare = "90 %"', r">= 0.1 % and <= 50 %"),
-        ('life = "wedge-pads"\n[projection]\nshare = "5 mm"', r"share"),
+        ('life = "wedge-pads"\n[projection]\nstop = 3', "", "stops"),
+        ('life = "wedge-pads"\n[projection]\nstops = 1', "stops", "2 to 4096"),
+        ('life = "wedge-pads"\n[projection]\nstops = 2.5', "stops", "whole number"),
+        ('life = "wedge-pads"\n[projection]\nshare = "90 %"', "share", ">= 0.1 % and <= 50 %"),
+        ('life = "wedge-pads"\n[projection]\nshare = "5 mm"', "share", ""),
     ],
 )
-def test_what_does_not_fit_is_refused_with_the_files_name(plan_of, text, said):
-    with pytest.raises(InputError, match=r"some_life\.toml: .*" + said):
+def test_what_does_not_fit_is_refused_with_the_files_name(plan_of, text, name, valid):
+    with pytest.raises(InputError) as refusal:
         plan_of(text)
+    assert all(part in str(refusal.value) for part in ("some_life.toml: ", name, valid))
 
 
 def test_a_file_that_is_not_there_or_no_toml(plan_of, tmp_path):

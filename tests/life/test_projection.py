@@ -12,6 +12,7 @@ from bywire.life.life_file import LifePlan
 from bywire.life.projection import Rates, projected, standard_error
 from bywire.studies.distribution import Distribution
 from bywire.studies.plan import Varied
+from raising import raises
 
 AIR = StopConditions(pause=60.0, T_air=293.15)
 _UNIFORM = Distribution("uniform", "0 to 1", lambda u: u, 0.0, 1.0)
@@ -141,7 +142,7 @@ def test_a_life_without_an_end_is_followed_as_long_as_asked(made):
 
 def test_a_brake_at_its_end_is_refused(made):
     made(lambda z: 1e-3)
-    with pytest.raises(ParameterError, match=r"over before its first stop: lining left is 0 mm"):
+    with raises(ParameterError, name="lining left", value="0 mm", valid="above zero"):
         projected(_plan(_life(left=lambda z, par, wear: {"lining": 0.0})))
 
 

@@ -112,8 +112,7 @@ def test_a_study_names_what_varies_beside_what_is_changed(tmp_path):
     file.write_text(f'bench = "bench.toml"\n[vary]\n{vary}[design]\nkind = "corners"\n')
     found = bywire.run_study(file, tmp_path / "out", workers=1)
     shown = " ".join(str(found).split())
-    assert "motor.R_m varies: " in shown
-    assert "motor.L_m varies: " in shown
+    assert "varied: motor.R_m, motor.L_m" in shown
     page = fragment_html(found.document(), [])
     assert "Only motor.R_m, motor.L_m varied; apart from that, all parameters are those of" in page
     assert "Nothing was changed" not in page

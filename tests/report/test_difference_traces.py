@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.report.overlaid import difference_figure, differences_from_first
+from bywire.report.time_traces import difference_figure, differences_from_first
 
 
 def ramp(slope: float, step: float, end: float) -> xr.Dataset:

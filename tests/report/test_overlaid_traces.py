@@ -9,7 +9,7 @@ from matplotlib.colors import to_hex
 
 from bywire.core.errors import ParameterError
 from bywire.report import style
-from bywire.report.overlaid import overlaid_panels, overlaid_traces
+from bywire.report.time_traces import overlaid_panels, overlaid_traces
 
 NAMES = {"p_mc": "pressure", "omega": "speed"}
 

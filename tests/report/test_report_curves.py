@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.report.bode import Response, bode
 from bywire.report.energy_balance import energy_balance
 from bywire.report.friction_figures import hysteresis_loop, stribeck_curve
+from bywire.report.response_figures import Response, bode
 from bywire.report.step_response import tracking
 
 LOOP = ("p_mc", "i", "i_star")  # response, drive, demand

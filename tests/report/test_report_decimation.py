@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bywire.report.decimation import COLUMNS, decimate, lasting_phases, phases
+from bywire.report.channel import COLUMNS, decimate, lasting_phases, phases
 
 
 def test_single_sample_peaks_survive() -> None:

@@ -14,11 +14,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.report.bode import Response, bode
 from bywire.report.drawing import figure_bytes
 from bywire.report.energy_balance import energy_balance
 from bywire.report.friction_figures import hysteresis_loop, stribeck_curve
 from bywire.report.panels import Panel, Trace
+from bywire.report.response_figures import Response, bode
 from bywire.report.step_response import StepFacts, StepLimits, step_response, tracking
 from bywire.report.time_traces import time_traces
 

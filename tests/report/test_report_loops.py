@@ -13,8 +13,7 @@ from matplotlib.patches import Circle
 from bywire.analysis.agreement import Agreement
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.locus import Border, Locus
-from bywire.analysis.loop_curves import Family, LoopCurve
-from bywire.analysis.margins import UNSTABLE, LoopMargins
+from bywire.analysis.margins import UNSTABLE, Family, LoopCurve, LoopMargins
 from bywire.api.agreement import agreement_table, verdict
 from bywire.api.linear_texts import left_out, rate_table
 from bywire.api.margins import margins_table, worst_texts

@@ -17,7 +17,6 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from bywire.core.errors import FileError
-from bywire.report.bode import Response, bode
 from bywire.report.document import (
     Banner,
     Details,
@@ -29,6 +28,7 @@ from bywire.report.document import (
 )
 from bywire.report.drawing import inline_figures
 from bywire.report.page import page_html, write_page
+from bywire.report.response_figures import Response, bode
 from bywire.report.step_response import step_response
 from bywire.report.tables import text_table
 from bywire.report.time_traces import time_traces

@@ -10,10 +10,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from bywire.core.copies import processes
-from bywire.report import side_by_side
+from bywire.report import drawing
 from bywire.report.document import FigureBlock, Picture
-from bywire.report.drawing import figure_bytes, inline_figures
-from bywire.report.side_by_side import FEW, drawn_side_by_side
+from bywire.report.drawing import FEW, drawn_side_by_side, figure_bytes, inline_figures
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="copies are of Linux alone"),
@@ -33,7 +32,7 @@ def blocks(count: int) -> list[FigureBlock]:
 
 @pytest.fixture(autouse=True)
 def copied(monkeypatch):
-    monkeypatch.setattr(side_by_side, "may_copy", lambda: True)
+    monkeypatch.setattr(drawing, "may_copy", lambda: True)
     monkeypatch.setattr(os, "cpu_count", lambda: 2)
 
 
@@ -55,7 +54,7 @@ def test_copies_draw_the_same():
 def test_what_is_long_is_begun_first(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: 9)
     monkeypatch.setattr(
-        side_by_side, "processes", lambda _, *rest, **is_copied: processes(1, *rest, **is_copied)
+        drawing, "processes", lambda _, *rest, **is_copied: processes(1, *rest, **is_copied)
     )
     begun = tmp_path / "begun"
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from bywire.api.run_faults import Quantity, record_data, record_table
 from bywire.core.parameters import ParameterSet
 from bywire.core.provenance import chosen, paper
 from bywire.core.quantities import Fraction, Length, Resistance
 from bywire.report.answer import frame_of
 from bywire.report.page import table_html
-from bywire.report.record import Quantity, record_data, record_table
 from bywire.report.subject import parameter_rows
 from bywire.report.tables import (
     KpiRow,
@@ -115,7 +115,7 @@ def test_tables_and_choices_may_be_parameters() -> None:
 def test_text_is_aligned_and_wrapped() -> None:
     lines = table_text(KPIS, width=70).splitlines()
     assert max(map(len, lines)) <= 70
-    assert lines[0].split() == ["name", "value", "limit", "result", "definition"]
+    assert lines[0].split() == ["name", "value", "limit", "verdict", "definition"]
     assert lines[2].startswith("steady_state_error     0.12 bar  <= 0.1 bar  missed")
     assert table_text(text_table(["a", "b"], [])) == "a  b\n-  -"
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.report.bode import Response, bode
 from bywire.report.document import FigureBlock, Section, TableBlock
 from bywire.report.page import write_page
 from bywire.report.panels import Panel, Trace
+from bywire.report.response_figures import Response, bode
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.time_traces import time_traces
 

@@ -107,8 +107,9 @@ def test_terminal_shows_verdicts_then_causes_counts_and_the_report(
     lines = str(made_up).splitlines()
     assert lines[0].split() == ["statement", "kind", "stated", "computed", "verdict"]
     assert lines[2].split() == ["t.K", "printed", "10.1", "bar/A", "7.6", "bar/A", "disagrees"]
-    assert max(map(len, lines[:-1])) <= width + 8
-    assert lines[-1].endswith("bywire reproduce made-up --out FOLDER")
+    assert max(map(len, lines[:-2])) <= width + 8
+    assert lines[-2].endswith("bywire reproduce made-up --out FOLDER")
+    assert lines[-1].startswith("verdict: ")
     rest = " ".join(lines[lines.index("In short") :])
     assert "- Tables differ. [1 disagreement]" in rest
     assert "- The set: 0 agree, 2 disagree," in rest

@@ -13,7 +13,7 @@ from bywire.core.errors import RunError, UnknownNameError
 from bywire.server import job_process
 from bywire.server.contents import Contents, contents
 from bywire.server.exchange import RefusedError
-from bywire.server.pages.frame import form
+from bywire.server.pages import form
 from bywire.server.place import Place
 from bywire.server.task import Task, tasks
 from undrawn import drawn, undrawn_unless_asked
@@ -71,7 +71,7 @@ BAD = [
     ("life", {"life": "two-wheeler-pads", "check": "1"}, "check", "fewer than"),
     ("life", {"life": "wedge-pads", "set": "wear.x=1"}, "set", "unknown"),
     ("compare", {"runs": "curve.toml"}, "runs", "two at least"),
-    ("compare", {"runs": "curve.toml\naside"}, "runs", "no finished result"),
+    ("compare", {"runs": "curve.toml\naside"}, "runs", "not a finished result"),
     ("compare", {"runs": "curve.toml\nseal-stribek"}, "runs", "seal-stribeck"),
     ("compare", {"runs": "curve.toml\nseal-stribeck", "set": "motor.x=1"}, "set", "motor.x"),
     (

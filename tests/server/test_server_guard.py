@@ -15,10 +15,9 @@ import pytest
 from bywire.core.errors import FileError, ParameterError, UnknownNameError
 from bywire.server import service
 from bywire.server.address import HERE, NAMES
-from bywire.server.handler import Handler
 from bywire.server.place import safe_name
 from bywire.server.routes import addresses
-from bywire.server.serving import opened
+from bywire.server.serving import Handler, opened
 
 
 def test_the_link_gives_a_cookie_and_leads_on_without_the_token(visit):

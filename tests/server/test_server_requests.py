@@ -18,7 +18,7 @@ import pytest
 
 from bywire.core import scratch
 from bywire.core.child_process import environment, python_command
-from bywire.server import handler
+from bywire.server import serving
 from bywire.server.address import HERE, NAMES
 from bywire.server.exchange import RefusedError
 from bywire.server.guard import require_place
@@ -101,8 +101,8 @@ def random_request(chance: random.Random, port: int, token: str) -> bytes:
 def test_random_requests_are_answered_without_a_defect(visit, monkeypatch):
     """What is wrong stands in every place of a request, in every order."""
     defects = []
-    monkeypatch.setattr(handler.traceback, "print_exception", lambda *a: defects.append(a))
-    monkeypatch.setattr(handler, "_LINGER", 0.01)
+    monkeypatch.setattr(serving.traceback, "print_exception", lambda *a: defects.append(a))
+    monkeypatch.setattr(serving, "_LINGER", 0.01)
     chance = random.Random(7)
     requests = [
         random_request(chance, visit.server.port, visit.server.service.token) for _ in range(2000)

@@ -19,13 +19,12 @@ from bywire.server.exchange import RefusedError
 from bywire.server.field import Field
 from bywire.server.jobs import Job, Jobs
 from bywire.server.live_pages import LivePages, shown_bench
-from bywire.server.pages.file_pages import bench_page
-from bywire.server.pages.frame import form
+from bywire.server.pages import bench_page, form
 from bywire.server.place import Place
 from bywire.server.study_so_far import StudyProgress, so_far
 from bywire.server.task import tasks
-from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.findings import Findings
+from bywire.studies.store import CASE, FAILURE, WARNINGS
 from bywire.studies.study_file import read_study
 
 STUDY = """
@@ -148,7 +147,7 @@ def test_a_study_tells_now_and_then_what_there_is(monkeypatch, tmp_path):
             raise ParameterError("too few cases")
         return []
 
-    monkeypatch.setattr("bywire.api.run_study.kept_study", lambda _: Report())
+    monkeypatch.setattr("bywire.api.study_run.kept_study", lambda _: Report())
     monkeypatch.setattr("bywire.usecases.study_report.study_report", lambda _: Report())
     monkeypatch.setattr(study_so_far, "so_far", estimate)
     monkeypatch.setattr(study_so_far, "tell", lambda **said: told.append(said))

@@ -14,9 +14,8 @@ from bywire.core.model import Task
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Force, Length, Mass
 from bywire.core.signals import Signal
-from bywire.simulation.ensemble import simulate_ensemble
+from bywire.simulation.ensemble import simulate_ensemble, simulate_group
 from bywire.simulation.run import Run, simulate
-from bywire.simulation.run_group import simulate_group
 from bywire.simulation.sensitivity import simulate_with_sensitivities
 from systems.describing import Held, Recorded, System
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from bywire.core.errors import CompilerError
-from bywire.simulation import kernel_cache
+from bywire.simulation import compiler as compiler_module
 from bywire.simulation.compiler import PLAIN, compile_library
 from simulation.small_library import SOURCE, system_compiler, twice
 
@@ -20,9 +20,9 @@ def test_folders_that_others_may_write_to_are_not_trusted(tmp_path, monkeypatch)
     shared.chmod(0o777)
     monkeypatch.setenv("BYWIRE_CACHE", str(shared))
     with pytest.raises(CompilerError, match="not yours alone"):
-        kernel_cache.usable_folder()
+        compiler_module.usable_folder()
     shared.chmod(0o700)
-    assert kernel_cache.usable_folder() == shared
+    assert compiler_module.usable_folder() == shared
 
 
 PLANTED = "double twice(double x) { return 666.0; }\n"
@@ -35,7 +35,7 @@ def planted(library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         foreign = compile_library(PLANTED, PLAIN, system_compiler())
     library.unlink()
     shutil.copy(foreign, library)
-    shutil.copy(kernel_cache.digest_of(foreign), kernel_cache.digest_of(library))
+    shutil.copy(compiler_module.digest_of(foreign), compiler_module.digest_of(library))
 
 
 def test_a_planted_library_does_not_run(cache, tmp_path, monkeypatch):
@@ -45,7 +45,7 @@ def test_a_planted_library_does_not_run(cache, tmp_path, monkeypatch):
     planted(library, tmp_path, monkeypatch)
     library.chmod(0o666)
     with pytest.raises(CompilerError, match="not yours alone"):
-        kernel_cache.load(library, "twice")
+        compiler_module.load(library, "twice")
     assert twice(compile_library(SOURCE, PLAIN, compiler)) == 42.0
 
 
@@ -55,9 +55,9 @@ def test_a_library_of_somebody_else_does_not_run(cache, tmp_path, monkeypatch, w
     compiler = system_compiler()
     library = compile_library(SOURCE, PLAIN, compiler)
     planted(library, tmp_path, monkeypatch)
-    digest = kernel_cache.digest_of(library)
+    digest = compiler_module.digest_of(library)
     os.chown({"library": library, "digest": digest, "folder": cache, "above": tmp_path}[what], 1, 1)
-    assert not kernel_cache.is_intact(library, "twice")
+    assert not compiler_module.is_intact(library, "twice")
     if what in ("library", "digest"):
         assert twice(compile_library(SOURCE, PLAIN, compiler)) == 42.0
         assert library.stat().st_uid == 0
@@ -65,7 +65,7 @@ def test_a_library_of_somebody_else_does_not_run(cache, tmp_path, monkeypatch, w
         with pytest.raises(CompilerError, match="not yours alone"):
             compile_library(SOURCE, PLAIN, compiler)
         with pytest.raises(CompilerError, match="not yours alone"):
-            kernel_cache.load(library, "twice")
+            compiler_module.load(library, "twice")
 
 
 def test_folders_above_count_unless_others_cannot_replace_what_is_not_theirs(tmp_path, monkeypatch):
@@ -75,15 +75,15 @@ def test_folders_above_count_unless_others_cannot_replace_what_is_not_theirs(tmp
     monkeypatch.setenv("BYWIRE_CACHE", str(inner))
     above.chmod(0o777)
     with pytest.raises(CompilerError, match=rf"{above} is not yours alone"):
-        kernel_cache.usable_folder()
+        compiler_module.usable_folder()
     above.chmod(0o1777)
-    assert kernel_cache.usable_folder() == inner
+    assert compiler_module.usable_folder() == inner
     link = tmp_path / "link"
     link.symlink_to(inner)
     above.chmod(0o777)
     monkeypatch.setenv("BYWIRE_CACHE", str(link))
     with pytest.raises(CompilerError, match="not yours alone"):
-        kernel_cache.usable_folder()
+        compiler_module.usable_folder()
 
 
 def test_the_usual_folder_is_left_alone_with_a_word(tmp_path, monkeypatch):
@@ -92,9 +92,9 @@ def test_the_usual_folder_is_left_alone_with_a_word(tmp_path, monkeypatch):
     open_folder.chmod(0o777)
     monkeypatch.delenv("BYWIRE_CACHE", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(open_folder))
-    monkeypatch.setattr(kernel_cache, "user_cache_path", lambda *_: open_folder / "bywire")
+    monkeypatch.setattr(compiler_module, "user_cache_path", lambda *_: open_folder / "bywire")
     with pytest.warns(UserWarning, match="compiled kernels are not kept"):
-        folder = kernel_cache.usable_folder()
+        folder = compiler_module.usable_folder()
     assert folder != open_folder / "bywire" / "kernels"
 
 
@@ -103,6 +103,6 @@ def test_a_private_group_may_write(tmp_path, monkeypatch):
     folder = tmp_path / "group"
     folder.mkdir()
     folder.chmod(0o770)
-    assert kernel_cache.open_to_others(folder) == ""
-    monkeypatch.setattr(kernel_cache, "_is_private", lambda group: False)
-    assert kernel_cache.open_to_others(folder) == str(folder)
+    assert compiler_module.open_to_others(folder) == ""
+    monkeypatch.setattr(compiler_module, "_is_private", lambda group: False)
+    assert compiler_module.open_to_others(folder) == str(folder)

@@ -12,8 +12,8 @@ from bywire.bench.energy_ledger import actuator_ledger
 from bywire.bench.running import run as run_bench
 from bywire.core.errors import ParameterError
 from bywire.simulation.advance import Change
+from bywire.simulation.ensemble import fit_lanes, simulate_group
 from bywire.simulation.run import Run, simulate
-from bywire.simulation.run_group import fit_lanes, simulate_group
 from bywire.simulation.sensitivity import simulate_with_sensitivities
 from systems.sampled_lag import LAG, Memory, SampledLag, State
 
@@ -98,5 +98,7 @@ def test_what_cannot_change_is_refused():
     with pytest.raises(ParameterError, match="alters a sample time"):
         simulate(replace(RUN, changes=(Change(0.2, LAG.replace({"T_s": 0.02})),)))
     assert not fit_lanes([replace(RUN, changes=(Change(0.2, LAG.replace({"T_s": 0.02})),))])
-    with pytest.raises(ParameterError, match="sensitivities of a run whose parameters change"):
+    with pytest.raises(
+        ParameterError, match="sensitivities are not available for a run whose parameters change"
+    ):
         simulate_with_sensitivities(CHANGED, ["tau"], ["y"])

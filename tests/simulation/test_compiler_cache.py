@@ -18,7 +18,6 @@ from bywire.core import scratch
 from bywire.core.errors import CompilerError
 from bywire.simulation import compiler as compiler_module
 from bywire.simulation import engine as engine_module
-from bywire.simulation import kernel_cache
 from bywire.simulation.compiler import (
     PLAIN,
     VECTOR,
@@ -158,9 +157,9 @@ def script(path: Path, text: str) -> Path:
 def test_a_compiler_that_fails(cache: Path, tmp_path: Path) -> None:
     """Its own words are passed on; nothing is left in the cache."""
     broken = script(tmp_path / "brokencc", "echo 'fatal: no space left' >&2; exit 1")
-    with pytest.raises(CompilerError, match=r"(?s)refused a generated kernel.*no space left"):
+    with pytest.raises(CompilerError, match=r"(?s)rejected a generated kernel.*no space left"):
         compile_library(SOURCE, PLAIN, Compiler((str(broken),), "broken 1.0"))
-    with pytest.raises(CompilerError, match=r"refused a generated kernel"):
+    with pytest.raises(CompilerError, match=r"rejected a generated kernel"):
         compile_library("this is not C\n", PLAIN, system_compiler())
     with pytest.raises(CompilerError, match="did not run"):
         compile_library(SOURCE, PLAIN, Compiler((str(tmp_path / "gone"),), "gone 1.0"))
@@ -213,7 +212,7 @@ def test_choosing_a_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
         find_compiler.cache_clear()
         monkeypatch.delenv("BYWIRE_CC_QUICK")
         monkeypatch.setenv("BYWIRE_CC", str(tmp_path / "missing"))
-        with pytest.raises(CompilerError, match="missing' names no program"):
+        with pytest.raises(CompilerError, match="missing' is not a program"):
             find_compiler()
     finally:
         monkeypatch.undo()
@@ -244,7 +243,7 @@ def test_a_library_that_is_none_is_rebuilt_and_not_loaded(cache, monkeypatch, co
         made = compile_library("int other;", PLAIN, compiler).read_bytes()
     library.unlink()
     library.write_bytes(made)
-    kernel_cache.digest_of(library).write_text(kernel_cache.sha256(library))
+    compiler_module.digest_of(library).write_text(compiler_module.sha256(library))
     loaded, again = load_library(SOURCE, PLAIN, compiler, "twice")
     assert again == library
     assert loaded.twice

@@ -8,8 +8,7 @@ import pytest
 
 from bywire.bench.bench_file import read
 from bywire.core.errors import CompilerError, DeviceError
-from bywire.simulation.cuda_device import cuda_binary
-from bywire.simulation.cuda_kernel import ENTRY, emit_cuda
+from bywire.simulation.cuda import ENTRY, cuda_binary, emit_cuda
 from bywire.simulation.engine import prepare
 from bywire.simulation.stages import build_stages
 
@@ -63,5 +62,5 @@ def test_a_processor_that_is_too_old_is_refused(kernel):
 
 
 def test_what_the_compiler_refuses_is_said():
-    with pytest.raises(CompilerError, match=r"(?s)NVRTC refused a generated kernel:.*expected"):
+    with pytest.raises(CompilerError, match=r"(?s)NVRTC rejected a generated kernel:.*expected"):
         cuda_binary("KERNEL void bw_run_cases(double) { 1 +; }", 90, ENTRY)

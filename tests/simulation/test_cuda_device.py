@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from bywire.core.errors import DeviceError, ParameterError
-from bywire.simulation.cuda_device import find_device
+from bywire.simulation.cuda import find_device
 from emulated_driver import EmulatedDriver, Status, emulated
 
 
@@ -39,7 +39,7 @@ def test_one_that_is_not_there_is_refused(wanted, driver, monkeypatch):
     [
         (RuntimeError("no library"), 1, "the driver's library is not there"),
         (Status.CUDA_ERROR_NO_DEVICE, 1, "CUDA_ERROR_NO_DEVICE"),
-        (Status.CUDA_SUCCESS, 0, "graphics processor of NVIDIA's: see that nvidia-smi lists one"),
+        (Status.CUDA_SUCCESS, 0, "no NVIDIA graphics processor: check that nvidia-smi lists one"),
     ],
 )
 def test_a_machine_without_one_is_told(started, count, said, driver):
@@ -52,7 +52,7 @@ def test_one_that_is_full_before_it_begins_is_told(driver, monkeypatch):
     full, unknown = Status.CUDA_ERROR_OUT_OF_MEMORY, Status.CUDA_ERROR_INVALID_CONTEXT
     monkeypatch.setattr(driver, "cuDevicePrimaryCtxRetain", lambda _: (full, None))
     monkeypatch.setattr(driver, "cuMemGetInfo", lambda: (unknown, None, None))
-    with pytest.raises(DeviceError, match="emulated 0 has no memory left: end what else"):
+    with pytest.raises(DeviceError, match="emulated 0 has no free memory: end other programs"):
         find_device()
 
 

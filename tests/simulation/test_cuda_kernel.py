@@ -14,10 +14,9 @@ from bywire.bench.bench_file import read
 from bywire.bench.ensemble import simulate_ensemble as simulate_ensemble_of_bench
 from bywire.core.brake import load_system
 from bywire.core.errors import DeviceError, UnknownNameError
-from bywire.simulation import cuda_device, cuda_kernel
-from bywire.simulation.ensemble import Ensemble, simulate_ensemble
+from bywire.simulation import cuda
+from bywire.simulation.ensemble import Ensemble, simulate_ensemble, simulate_group
 from bywire.simulation.run import Run, simulate
-from bywire.simulation.run_group import simulate_group
 from emulated_driver import OK, EmulatedDriver, Status, emulated
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -71,7 +70,7 @@ def computed(experiment: str) -> tuple[Ensemble, Ensemble]:
 
 @pytest.mark.parametrize("experiment", BRAKES)
 def test_every_case_has_the_digits_that_it_has_in_lanes(experiment, driver, monkeypatch):
-    monkeypatch.setattr(cuda_kernel, "_SUBSTEPS", 1_500)
+    monkeypatch.setattr(cuda, "_SUBSTEPS", 1_500)
     lanes, there = computed(experiment)
     assert there.engine == "CUDA C, emulated 0"
     assert set(driver.launches) == {128}
@@ -85,7 +84,7 @@ def test_every_case_has_the_digits_that_it_has_in_lanes(experiment, driver, monk
 @pytest.mark.parametrize("experiment", BRAKES)
 def test_a_processor_that_is_there_agrees_with_this_machines(experiment):
     try:
-        device = cuda_device.find_device()
+        device = cuda.find_device()
     except DeviceError as error:
         pytest.skip(str(error))
     lanes, there = computed(experiment)
@@ -104,7 +103,7 @@ def runs() -> list[Run]:
 
 
 def test_runs_go_there_in_batches_that_its_memory_holds(runs, driver, monkeypatch):
-    monkeypatch.setattr(cuda_kernel, "_SUBSTEPS", 600)
+    monkeypatch.setattr(cuda, "_SUBSTEPS", 600)
     lanes = simulate_group(runs, first=7)
     driver.capacity = 40_000
     there = simulate_group(runs, first=7, engine="cuda")
@@ -118,7 +117,7 @@ def test_runs_go_there_in_batches_that_its_memory_holds(runs, driver, monkeypatc
 def test_an_ensemble_goes_there_in_batches(runs, driver, monkeypatch):
     signals, cases = BRAKES["hard-braking"][2], {"motor.R_m": np.linspace(0.3, 0.4, 5)}
     lanes = simulate_ensemble(runs[0], cases, signals)
-    monkeypatch.setattr(cuda_kernel, "MOST", 2)
+    monkeypatch.setattr(cuda, "MOST", 2)
     there = simulate_ensemble(runs[0], cases, signals, engine="cuda")
     assert len(driver.launches) == 3
     np.testing.assert_array_equal(there.values, lanes.values)
@@ -148,14 +147,14 @@ def test_a_bench_says_that_its_cases_go_there(driver):
 
 def test_memory_that_is_too_small_is_said(runs, driver):
     driver.capacity = 10_000
-    with pytest.raises(DeviceError, match=r"emulated 0 has 0\.01 MB free.*takes .* MB: record"):
+    with pytest.raises(DeviceError, match=r"emulated 0 has 0\.01 MB free.*needs .* MB: record"):
         simulate_group(runs, engine="cuda")
 
 
 def test_memory_that_others_took_meanwhile_is_said(runs, driver, monkeypatch):
     monkeypatch.setattr(driver, "cuMemGetInfo", lambda: (OK, 10**9, 10**9))
     driver.capacity = 50_000
-    with pytest.raises(DeviceError, match=r"no room for .* MB: .* are free: end what else"):
+    with pytest.raises(DeviceError, match=r"no room for .* MB: .* are free: end other programs"):
         simulate_group(runs, engine="cuda")
     assert not driver.places
 

@@ -59,11 +59,11 @@ class GroupWithoutGap(NonlinearDrive):
     [
         (IfOnAValue, "core.ops.where instead of if"),
         (MathOnASymbol, "core.ops"),
-        (TooFewRows, "balance returns 2 values, wanted are 3"),
-        (NoMass, "mass returns 0 values, wanted are 3"),
+        (TooFewRows, "balance returns 2 values: it must return 3"),
+        (NoMass, "mass returns 0 values: it must return 3"),
         (NoTask, "tasks returns none"),
         (Misspelled, "frictions names 'omga'"),
-        (BareBounds, "bounds returns 2 values, wanted are 1"),
+        (BareBounds, "bounds returns 2 values: it must return 1"),
         (GroupWithoutGap, "must match"),
     ],
 )

@@ -11,8 +11,9 @@ import pytest
 import xarray as xr
 
 from bywire.bench.bench import Bench
+from bywire.bench.energy_ledger import energy_residual
 from bywire.bench.experiment import as_run
-from bywire.bench.recording import energy_residual, record
+from bywire.bench.recording import record
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.plant import battery_supply, caliper, dc_motor, master_cylinder, pipeline
 from bywire.simulation.run import simulate

@@ -10,8 +10,8 @@ import pytest
 from bywire.bench.bench_file import read
 from bywire.core.errors import ParameterError, SolverError
 from bywire.simulation import case_kernels
+from bywire.simulation.ensemble import fit_lanes, simulate_group
 from bywire.simulation.run import simulate
-from bywire.simulation.run_group import fit_lanes, simulate_group
 
 
 def braking(p_to: str, R_m: str = "0.35 ohm", **options: str):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from bywire.simulation.ensemble import simulate_ensemble
-from bywire.simulation.layout import FLAG
 from bywire.simulation.run import Run, Trajectory, simulate
+from bywire.simulation.schedule import FLAG
 from bywire.simulation.sensitivity import simulate_with_sensitivities
 from bywire.simulation.virtual_machine import VirtualMachine
 from systems.three_contacts import heart

@@ -11,9 +11,9 @@ import pytest
 from bywire.bench import running
 from bywire.core.errors import DeviceError, RunError
 from bywire.core.parameters import ParameterSet
-from bywire.studies import chunk as chunks
-from bywire.studies.chunk import case_bench, computed_chunk
+from bywire.studies import store as chunks
 from bywire.studies.executor import InProcess
+from bywire.studies.store import case_bench, computed_chunk
 from bywire.studies.study_file import read_study
 from emulated_driver import EmulatedDriver, Status, emulated
 
@@ -46,7 +46,7 @@ t_step = "0 s"
 
 @pytest.fixture
 def plan(study, monkeypatch):
-    monkeypatch.setattr("bywire.studies.chunk.CHUNK", 8)
+    monkeypatch.setattr("bywire.studies.store.CHUNK", 8)
     monkeypatch.setattr("bywire.studies.plan.CHUNK", 8)
     return read_study(study())
 

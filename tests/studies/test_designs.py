@@ -11,7 +11,7 @@ from bywire.core.errors import ParameterError
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
 from bywire.studies.designs import SAMPLED, Sampled, spanned
-from bywire.studies.distribution_section import read_distribution
+from bywire.studies.distribution import read_distribution
 from bywire.studies.plan import correlation_factor
 
 LEAF = Leaf("x", Unit("m"), -np.inf, np.inf, False, False)

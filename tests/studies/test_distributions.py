@@ -10,8 +10,7 @@ import pytest
 from bywire.core.errors import InputError
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
-from bywire.studies.distribution import read_choice
-from bywire.studies.distribution_section import read_distribution
+from bywire.studies.distribution import read_choice, read_distribution
 
 LEAF = Leaf("motor.R_m", Unit("ohm"), 0.0, 10.0, True, False)
 MIDDLES = (np.arange(200_000) + 0.5) / 200_000
@@ -171,7 +170,7 @@ def test_widths_of_a_temperature_are_differences():
 def test_a_temperature_has_no_shares(entry):
     """5 % of 20 degC would be 15 K."""
     leaf = Leaf("motor_heat.T_a", Unit("K"), 200.0, 400.0, False, False)
-    with pytest.raises(InputError, match="share of a temperature"):
+    with pytest.raises(InputError, match="percentage of a temperature"):
         read_distribution("motor_heat.T_a", entry, leaf, 293.15)
     law = read_distribution("motor_heat.T_a", "+-10 K", leaf, 293.15)
     assert (law.low, law.high) == pytest.approx((283.15, 303.15))

@@ -11,8 +11,8 @@ import pytest
 from bywire.api.study_figures import study_figures
 from bywire.api.study_run import findings_data
 from bywire.api.study_tables import effect_tables, unmoved
-from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.findings import Findings
+from bywire.studies.store import CASE, FAILURE, WARNINGS
 from bywire.studies.study_file import read_study
 
 TEXT = """

@@ -9,12 +9,11 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from bywire.api.study_rare import drivers_data
-from bywire.api.study_tables import influence_tables
+from bywire.api.study_tables import drivers_data, influence_tables
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.findings import Findings, choice_influence
+from bywire.studies.store import CASE, FAILURE, WARNINGS
 from bywire.studies.study_file import read_study
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bywire.studies.laws import (
+from bywire.studies.distribution import (
     LogNormal,
     Normal,
     Triangular,

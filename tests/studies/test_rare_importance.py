@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bywire.studies.rare_failures import importance_of
+from bywire.studies.sought_cases import importance_of
 from bywire.studies.statistics import UNKNOWN, FailureProbability, counted
 from bywire.studies.study_file import read_study
 

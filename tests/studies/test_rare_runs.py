@@ -16,8 +16,7 @@ from scipy import stats
 import bywire
 from bywire.core.errors import FileError, InputError, RunError
 from bywire.studies import executor
-from bywire.studies.chunk import case_bench
-from bywire.studies.store import StudyStore
+from bywire.studies.store import StudyStore, case_bench
 from bywire.studies.study_file import read_study
 from undrawn import undrawn
 

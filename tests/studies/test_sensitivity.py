@@ -12,13 +12,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bywire.api.study_rare import drivers_data, sensitivity_tables
 from bywire.api.study_run import StudyRun
+from bywire.api.study_tables import drivers_data, sensitivity_tables
 from bywire.core.errors import FileError, InputError, ParameterError
-from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.designs import MOST, SENSITIVITY, SensitivityDesign
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan
+from bywire.studies.store import CASE, FAILURE, WARNINGS
 from bywire.studies.study_file import read_study
 
 NAMES = ("motor.R_m", "motor.K_e", "motor.L_m")

@@ -17,11 +17,11 @@ from bywire.api.study_run import StudyRun
 from bywire.api.study_surrogate import StudySurrogates
 from bywire.api.study_tables import influence_tables, spread_table
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.report.document import FigureBlock, TableBlock
 from bywire.report.readable_axis import scale_of
-from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.findings import Findings
+from bywire.studies.store import CASE, FAILURE, WARNINGS
 from bywire.studies.study_file import read_study
 from bywire.studies.surrogate import surrogate_of
 

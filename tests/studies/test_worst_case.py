@@ -9,8 +9,8 @@ import pytest
 import bywire
 from bywire.core.errors import InputError
 from bywire.studies.limit_state import BudgetSpentError
+from bywire.studies.sought_cases import worst_case
 from bywire.studies.study_file import read_study
-from bywire.studies.worst_case import worst_case
 
 CURRENT = """
 [vary]

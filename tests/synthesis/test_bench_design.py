@@ -23,12 +23,19 @@ from bywire.bench.bench_file import from_mapping
 from bywire.bench.running import run
 from bywire.core.catalog import main_set, parameters
 from bywire.synthesis.bench_figures import BenchFigures, Small, bench_figures, loop_gain
-from bywire.synthesis.bench_tuning import Candidate, Tuning, bench_slacks, judged, linear_slacks
-from bywire.synthesis.linear_case import NOMINAL, cases_of
-from bywire.synthesis.optimizer import Problem
+from bywire.synthesis.designer import Problem
+from bywire.synthesis.linear_case import NOMINAL, cases_of, read
 from bywire.synthesis.outcome import bench_text
-from bywire.synthesis.requirement import read
-from bywire.synthesis.verification import Trial, Verification, verify
+from bywire.synthesis.verification import (
+    Candidate,
+    Trial,
+    Tuning,
+    Verification,
+    bench_slacks,
+    judged,
+    linear_slacks,
+    verify,
+)
 
 PAPER = (
     "bandwidth >= 10 Hz",

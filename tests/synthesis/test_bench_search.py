@@ -7,12 +7,11 @@ from collections.abc import Mapping, Sequence
 
 import pytest
 
-from bywire.synthesis import bench_tuning
+from bywire.synthesis import verification
 from bywire.synthesis.bench_figures import BenchFigures, Small
-from bywire.synthesis.bench_tuning import Tuning, Worth, bench_slacks, ceiling, tune
-from bywire.synthesis.linear_case import NOMINAL
-from bywire.synthesis.optimizer import Problem
-from bywire.synthesis.requirement import read
+from bywire.synthesis.designer import Problem
+from bywire.synthesis.linear_case import NOMINAL, read
+from bywire.synthesis.verification import Promising, Tuning, bench_slacks, ceiling, tune
 
 REQUIRED = read(
     ["bandwidth >= 10 Hz", "phase margin >= 60 deg", "overshoot <= 15 %", "disk margin >= 0.5"]
@@ -44,11 +43,11 @@ def linear(problem: Problem, gains: Mapping[str, float]) -> dict[str, float]:
 
 def searched(monkeypatch: pytest.MonkeyPatch, asked: bool) -> tuple[Tuning, list[int]]:
     """Return a search, and how many candidates passed each stage."""
-    monkeypatch.setattr(bench_tuning, "linear_slacks", linear)
+    monkeypatch.setattr(verification, "linear_slacks", linear)
     stages = [0, 0, 0]
 
     def measure(
-        gains: Mapping[str, Sequence[float]], worth: Worth
+        gains: Mapping[str, Sequence[float]], worth: Promising
     ) -> list[Mapping[str, BenchFigures] | None]:
         rows: list[Mapping[str, BenchFigures] | None] = []
         for j, (k, d) in enumerate(zip(*gains.values(), strict=True)):
@@ -66,7 +65,7 @@ def searched(monkeypatch: pytest.MonkeyPatch, asked: bool) -> tuple[Tuning, list
 
 
 def test_what_is_left_changes_no_step_of_the_search(monkeypatch):
-    monkeypatch.setattr(bench_tuning, "ceiling", lambda *_: math.inf)
+    monkeypatch.setattr(verification, "ceiling", lambda *_: math.inf)
     full, all_stages = searched(monkeypatch, asked=False)
     monkeypatch.undo()
     fewer, stages = searched(monkeypatch, asked=True)

@@ -17,8 +17,7 @@ from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError
 from bywire.simulation.run import simulate
 from bywire.synthesis.designer import Design, design
-from bywire.synthesis.linear_case import NOMINAL, LinearCase, cases_of
-from bywire.synthesis.requirement import read
+from bywire.synthesis.linear_case import NOMINAL, LinearCase, cases_of, read
 from few_starts import few_starts
 
 MEDIUM = first_orders("medium", 10.2e5, (0.096,), (1.25, 7.15, 0.104))

@@ -18,10 +18,17 @@ from bywire.analysis.margins import margins
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import UnitError
 from bywire.synthesis.bench_figures import BenchFigures, Small
-from bywire.synthesis.bench_tuning import Candidate, judged
 from bywire.synthesis.designer import DISK, bench_floors, design, linear_floors
-from bywire.synthesis.linear_case import NOMINAL, LinearCase, cases_of, room, slack
-from bywire.synthesis.requirement import read, share_left
+from bywire.synthesis.linear_case import (
+    NOMINAL,
+    LinearCase,
+    cases_of,
+    read,
+    room,
+    share_left,
+    slack,
+)
+from bywire.synthesis.verification import Candidate, judged
 from few_starts import few_starts
 
 

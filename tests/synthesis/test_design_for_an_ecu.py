@@ -9,7 +9,7 @@ import pytest
 
 import bywire
 from bywire.analysis.loop import LOOPS
-from bywire.synthesis.optimizer import piece, stage, suffixed
+from bywire.synthesis.designer import piece, stage, suffixed
 from few_starts import few_starts
 from undrawn import undrawn
 

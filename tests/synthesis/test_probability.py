@@ -7,12 +7,11 @@ from dataclasses import replace
 import pytest
 
 import bywire
-from bywire.api.design_drawn import probability_of
+from bywire.api.design import probability_of
 from bywire.api.loop_case import loop_case
 from bywire.core.errors import ParameterError
-from bywire.synthesis.linear_case import cases_of
+from bywire.synthesis.linear_case import cases_of, read
 from bywire.synthesis.outcome import judged_over
-from bywire.synthesis.requirement import read
 from few_starts import few_starts
 
 STUDY = """
@@ -51,7 +50,7 @@ def test_models_are_counted_by_what_they_meet():
 
 def test_gains_hold_as_probably_as_is_wanted(study, monkeypatch):
     """And a margin that half of the models miss is not."""
-    monkeypatch.setattr("bywire.api.design_drawn._JUDGES", 48)
+    monkeypatch.setattr("bywire.api.design._JUDGES", 48)
     with few_starts():
         found = bywire.design(
             "current",

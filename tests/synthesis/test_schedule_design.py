@@ -11,13 +11,11 @@ from bywire.bench.bench import Bench
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.synthesis.bench_figures import BenchFigures, bench_figures
-from bywire.synthesis.bench_tuning import judged
-from bywire.synthesis.linear_case import cases_of
-from bywire.synthesis.optimizer import Problem
+from bywire.synthesis.designer import Problem
+from bywire.synthesis.linear_case import cases_of, read
 from bywire.synthesis.outcome import ScheduleDesign
-from bywire.synthesis.requirement import read
 from bywire.synthesis.schedules import design_schedule, points_by_region, verify_schedule
-from bywire.synthesis.verification import MOST, Trial, corners_of, verify
+from bywire.synthesis.verification import MOST, Trial, corners_of, judged, verify
 from few_starts import few_starts
 
 ON = {"ecu.schedule.law": "regions"}

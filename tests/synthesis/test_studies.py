@@ -11,13 +11,13 @@ import xarray as xr
 
 import bywire
 from bywire.brakes.motorcycle.studies import actuator_sizing
-from bywire.brakes.wedge.sizing.design import Demand, answer, closing_speed, redesigned
+from bywire.brakes.wedge.sizing import Demand, answer, closing_speed, redesigned
 from bywire.brakes.wedge.studies import drive_train
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
 from bywire.core.model import ASSEMBLIES
 from bywire.plant import roller_screw, seal_friction
-from bywire.report.contour import contour, levels_between
+from bywire.report.range_figures import contour, levels_between
 from bywire.synthesis.study import STUDIES, Map, Mark
 from run_once import run_once
 

@@ -20,8 +20,7 @@ from bywire.core.errors import ParameterError
 from bywire.server import task
 from bywire.server.contents import Contents
 from bywire.server.exchange import RefusedError
-from bywire.server.pages.file_pages import task_page
-from bywire.server.pages.index_page import index_page
+from bywire.server.pages import index_page, task_page
 from bywire.server.place import Place
 from bywire.usecases import use_cases
 from bywire.usecases.declare import DECLARED

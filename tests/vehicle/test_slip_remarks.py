@@ -1,4 +1,4 @@
-"""Slip control that holds far less slip than its road holds most at is told."""
+"""Remarks on slip control that holds far less slip than that of the largest adhesion."""
 
 import numpy as np
 import pytest
@@ -28,8 +28,8 @@ def test_dry_cobble_is_told_and_where_it_comes_from(curve):
         "burckhardt": 1.3713 * (1 - np.exp(-6.4565 * 0.105)) - 0.6691 * 0.105,
         "magic-formula": np.sin(2.117 * np.arctan(Bs - 0.4782 * (Bs - np.arctan(Bs)))),
     }[curve]
-    assert f"slip of 0.105 (slip_set), but dry-cobble holds most at {peak:.3g}: " in text
-    assert f": {100 * share / 0.9999:.0f} % of that" in text
+    assert "slip of 0.105 (slip_set), but dry-cobble has its largest adhesion" in text
+    assert f"at {peak:.3g}: {100 * share / 0.9999:.0f} % of it" in text
 
 
 def test_surfaces_whose_peak_is_near_are_not():
@@ -54,7 +54,7 @@ def test_a_stop_by_pi_on_cobble_says_so_above_its_figures():
     result = bywire.run(
         bywire.Bench("straight-stop", "sport600", options=options), estimate_error=False
     )
-    told = [text for text in result.document().data["remarks"] if "most at 0.4" in text]
+    told = [text for text in result.document().data["remarks"] if "largest adhesion at 0.4" in text]
     assert ["ecu.front_slip.slip_set" in text for text in told] == [True, False]
     run, par = result.recording, result.bench.par.replace(laid("vehicle.road", "dry-cobble"))
     assert TwoWheelerByWire().remarks(run, par) == told

@@ -1,1 +1,1 @@
-"""Linear models, frequency responses, margins, hysteresis: what recordings and models tell."""
+"""Linear models, frequency responses, and margins of loops."""

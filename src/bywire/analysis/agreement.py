@@ -53,7 +53,7 @@ class Agreement:
         return bool(gain <= GAIN and phase <= PHASE)  # NaN agrees with nothing
 
     def beyond_limits(self, cause: str) -> tuple[Array, Array]:
-        """Return what a cause adds to the limits at the same amplitude.
+        """Return the effect of a cause in addition to the limits at the same amplitude.
 
         Returns
         -------
@@ -162,5 +162,5 @@ def _in_dB_and_degree(ratio: Complex) -> tuple[Array, Array]:
 
 
 def _move(gain: Array, phase: Array) -> Array:
-    """Return by how much a response moves in the complex plane, relative to where it was."""
+    """Return the change of a response in the complex plane, relative to its magnitude before."""
     return np.abs(10.0 ** (gain / 20.0) * np.exp(1j * np.radians(phase)) - 1.0)

@@ -1,6 +1,6 @@
-"""Where a response passes a level: gain and phase crossovers, margins, bandwidth.
+"""Crossings of a level by a response: gain and phase crossovers, margins, bandwidth.
 
-Any response over ascending frequencies is taken, from a model or measured. Between its points it
+The response may be computed or measured, over ascending frequencies. Between its points it
 is read straight on logarithmic axes, or exactly where it is at hand as a function.
 """
 
@@ -27,7 +27,7 @@ _BRACKETS = 4000  # points of the grid that brackets what a function of frequenc
 
 
 class Crossing(NamedTuple):
-    """Where a loop gain is 1.
+    """Frequency at which a loop gain is 1.
 
     Parameters
     ----------
@@ -236,12 +236,12 @@ def real_factor(real: float, frequency: float) -> list[GainFactor]:
 
 
 def upper_factor(factors: Sequence[GainFactor]) -> GainFactor:
-    """Return by how much a stable loop's gain may grow, and where; infinity, NaN for any."""
+    """Return the factor by which a stable loop's gain may grow, and where; or inf, NaN."""
     return min((each for each in factors if each.factor > 1.0), default=_ANY_GROWTH)
 
 
 def lower_factor(factors: Sequence[GainFactor]) -> GainFactor:
-    """Return to what share a stable loop's gain may fall, and where; 0, NaN for any."""
+    """Return the share to which a stable loop's gain may fall, and its frequency; else 0, NaN."""
     lower = (each for each in factors if _LEAST_FACTOR < each.factor < 1.0)
     return max(lower, default=_ANY_FALL)
 

@@ -14,7 +14,7 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array, Complex
 
-_OUTSIDE = 1e-9  # by so much a pole must leave the unit circle: rounding of an integrator
+_OUTSIDE = 1e-9  # distance from the unit circle of an unstable pole: above an integrator's rounding
 _AT_REST = 1e-6  # poles this close to 1 are integrators that the loop does not move
 _SLOWEST = 1e-3  # rates below it [1/s] are integrators of a continuous model
 _HALVINGS = 50
@@ -126,7 +126,12 @@ def locus_of(
         For fewer than two values.
     """
     if len(values) < 2:
-        raise ParameterError(f"{name}: a locus needs two values or more, got {len(values)}")
+        raise ParameterError(
+            f"{name}: a locus needs two values or more, got {len(values)}",
+            name=name,
+            value=str(len(values)),
+            valid=">= 2 values",
+        )
     models = [model(at) for at in values]
     tracked = [models[0].poles()]
     for linear in models[1:]:

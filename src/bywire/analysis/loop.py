@@ -1,9 +1,10 @@
-"""A control loop of a brake: where it works, what shakes it, where it can be cut open."""
+"""Control loops and plants of a brake: operating points, excitation, and cuts."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from bywire.analysis.linear.corners import taking
 from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.linearize import Friction
 from bywire.analysis.linear.sampled_loops import (
     analog_gain,
     closed_again,
@@ -32,12 +34,12 @@ _ROUNDING = 1e-12  # share of a limit by which a demand clipped to it may differ
 
 @dataclass(frozen=True)
 class Saturation:
-    """A limit that a model does not record as a mode of its own.
+    """Limit that a model does not record as a mode.
 
     Parameters
     ----------
     name
-        What its share of the time is called, for instance ``"sat_current"``.
+        Name of its share of the time, for instance ``"sat_current"``.
     signals
         Outputs that are limited; one at its limit is enough.
     limits
@@ -92,7 +94,7 @@ class LoopSchedule:
     points: tuple[float, ...]
 
     def is_on(self, par: ParameterSet) -> bool:
-        """Tell whether parameters have the schedule switched on."""
+        """Return whether parameters have the schedule switched on."""
         values = par.flat()
         return all(values[name] == value for name, value in self.changes.items())
 
@@ -144,7 +146,7 @@ class Point:
 @checked
 @dataclass(frozen=True)
 class Quantity:
-    """What an operating point is given by.
+    """Quantity that defines an operating point.
 
     Parameters
     ----------
@@ -159,11 +161,15 @@ class Quantity:
     default: float
 
     def refused(self, value: float, why: object) -> ParameterError:
-        """Return the error of a value that is no operating point."""
-        return ParameterError(f"{self.name} = {value:g} {self.unit} is no operating point: {why}")
+        """Return the error for a value that is not an operating point."""
+        return ParameterError(
+            f"{self.name} = {value:g} {self.unit} is not an operating point: {why}",
+            name=self.name,
+            value=f"{value:g} {self.unit}",
+        )
 
     def require_positive(self, value: float, remark: str = "") -> None:
-        """Refuse a value that is not positive; ``remark``: what follows in the error."""
+        """Reject a value that is not positive; ``remark``: end of the error's text."""
         if not value > 0.0:
             raise self.refused(value, f"it must be > 0 {self.unit}{remark}")
 
@@ -176,15 +182,15 @@ class Loop:
     Parameters
     ----------
     name
-        What the command line calls it.
+        Name on the command line.
     assembly
-        What it is a loop of.
+        Assembly that contains it.
     summary
         One line for listings.
     at
-        What its operating point is given by.
+        Quantity that defines its operating point.
     inputs
-        Signals of the stimulus that are shaken together; the first gives the unit.
+        Signals of the stimulus that are excited together; the first determines the unit.
     output
         Signal that answers.
     cut
@@ -193,7 +199,7 @@ class Loop:
     point
         ``point(par, value) -> Point``.
     causes
-        What makes it nonlinear: name -> parameters that switch it off.
+        Nonlinearities: name -> parameters that switch it off.
     band
         Frequencies usually looked at [Hz].
     amplitudes
@@ -210,7 +216,7 @@ class Loop:
         Parameters with which the loop can be shaken for as long as it takes, for instance a disc
         that does not slow down; applied by a design's trial with sines.
     proof
-        Experiment in which the whole brake shows what the loop is worth.
+        Experiment that judges the loop in the whole brake.
     laws
         ``laws(par, value, frequencies [Hz])``: responses of the controller, at an operating point,
         to its set point and to a fall of the output, sensor and filters included, of shape (n,)
@@ -260,7 +266,7 @@ class Loop:
     side: str = ""
 
     def require_number(self, par: ParameterSet, name: str) -> None:
-        """Refuse a name that is neither the operating quantity nor a parameter.
+        """Reject a name that is neither the operating quantity nor a parameter.
 
         Raises
         ------
@@ -363,3 +369,89 @@ class Loop:
 
 LOOPS = Kind("loop", ("loops",), instances(Loop), declared="a Loop")
 """every control loop"""
+
+
+# --- Plants
+
+
+@dataclass(frozen=True)
+class PlantPoint:
+    """Operating point of a plant, with the treatment of dry friction.
+
+    Parameters
+    ----------
+    quantity, value
+        Quantity that defines the operating point, and its value [SI].
+    friction
+        As in `bywire.analysis.linear.linearize.linearize`.
+    speed
+        Motor speed [rad/s], positive toward clamping; nonzero for sliding friction only.
+    """
+
+    quantity: Quantity
+    value: float
+    friction: Friction = "removed"
+    speed: float = 0.0
+
+    @contextmanager
+    def named(self, unless: Quantity) -> Iterator[None]:
+        """Name the value in errors of what follows from it; ``unless``: whose errors name it."""
+        try:
+            yield
+        except ParameterError as error:
+            if self.quantity is unless:
+                raise
+            raise self.quantity.refused(self.value, error) from None
+
+
+@dataclass(frozen=True)
+class Plant:
+    """Plant of a brake, without its controllers.
+
+    Parameters
+    ----------
+    name
+        Name on the command line.
+    assembly
+        Assembly that contains it.
+    summary
+        One line for listings.
+    at
+        Quantities that may define its operating point; the first one is the default.
+    model
+        ``model(par, point) -> LinearModel``.
+    band
+        Usual upper end of the frequency range [Hz].
+    whole
+        The model that this one simplifies, of the same inputs and outputs; None for the exact one.
+    side
+        As of `bywire.analysis.loop.Loop`.
+    """
+
+    name: str
+    assembly: str
+    summary: str
+    at: tuple[Quantity, ...]
+    model: Callable[[ParameterSet, PlantPoint], LinearModel]
+    band: float
+    whole: Callable[[ParameterSet, PlantPoint], LinearModel] | None = None
+    side: str = ""
+
+    def linear(self, par: ParameterSet, point: PlantPoint) -> LinearModel:
+        """Return `model` on the plant's side of corners."""
+        with taking(self.side):
+            return self.model(par, point)
+
+    def exact(self, par: ParameterSet, point: PlantPoint) -> LinearModel | None:
+        """Return the model that this one simplifies, likewise; None for the exact one."""
+        with taking(self.side):
+            return None if self.whole is None else self.whole(par, point)
+
+    @property
+    def usual(self) -> PlantPoint:
+        """Default operating point."""
+        return PlantPoint(self.at[0], self.at[0].default)
+
+
+PLANTS = Kind("plant", ("plants",), instances(Plant), declared="a Plant")
+"""every plant and simplified model of one"""

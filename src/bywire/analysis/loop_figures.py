@@ -25,7 +25,7 @@ from bywire.analysis.linear.linear_model import LinearModel
 from bywire.core.typing import Array, Complex
 
 NO_LOOP = 1e-9
-"""a loop gain that is nowhere larger is that of no loop: what is fed back does nothing"""
+"""largest loop gain of a loop without effective feedback"""
 _SLOWEST, _SLOW_POINTS = 1e-6, 40  # below the grid, where the loop gain is real, Hz
 _BEYOND = 100.0  # times the fastest pole: where a grid without sampling ends
 _LOWEST = 1e-2  # lower end of the frequencies looked at, Hz
@@ -40,18 +40,18 @@ _SETTLED = 1e-4  # share of the slowest mode that may be left where a step respo
 
 @dataclass(frozen=True)
 class LoopFigure:
-    """What a figure of a loop is called, measured in and good for.
+    """Declaration of a figure of a loop: name, unit and meaning.
 
     Parameters
     ----------
     name
-        What requirements call it, and the attribute of `LoopFigures` that computes it.
+        Name in requirements, and attribute of `LoopFigures` that computes it.
     unit
         SI unit, ``"deg"`` or ``"%"``.
     meaning
         One line.
     low, high
-        What any loop can have.
+        Range that a loop can have.
     is_less_better
         Whether a smaller value is better.
     margin
@@ -74,7 +74,7 @@ class LoopFigure:
 
     @property
     def heading(self) -> str:
-        """What tables of margins call it."""
+        """Name in tables of margins."""
         return self.title or self.name.replace("_", " ")
 
 
@@ -153,7 +153,7 @@ LOOP_FIGURES: Mapping[str, LoopFigure] = {
         LoopFigure(
             "steady_state_error",
             "%",
-            "what is left of a unit step after ten periods of the bandwidth",
+            "residual of a unit step after ten periods of the bandwidth",
             is_less_better=True,
         ),
     )
@@ -185,7 +185,7 @@ def _of_an_answer(figure: Figure) -> Figure:
 
 @dataclass(frozen=True, eq=False)
 class LoopFigures:
-    """Figures of a linear loop, each computed when it is asked for.
+    """Figures of a linear loop, each computed on demand.
 
     Between the points of a logarithmic grid of frequencies the responses are interpolated:
     400 points are good for 0.1 % of a frequency, 4000 for 0.001 %.
@@ -231,7 +231,7 @@ class LoopFigures:
 
     @cached_property
     def answers(self) -> bool:
-        """Whether the output answers to the set point at all."""
+        """Whether the output responds to the set point."""
         return bool(np.max(np.abs(self.T)) > 0.0)
 
     @cached_property
@@ -281,7 +281,7 @@ class LoopFigures:
     @_of_a_loop
     def delay_margin(self) -> float:
         """Additional dead time that the loop can take [s]; inf where there is no crossover."""
-        # What is missing to -1 in the direction of a delay, which turns clockwise.
+        # Angle to -1 in the direction of a delay, which turns clockwise.
         return min(
             (at.margin % 360.0 / 360.0 / at.frequency for at in self.crossings), default=math.inf
         )
@@ -382,7 +382,7 @@ class LoopFigures:
     @property
     @_of_an_answer
     def steady_state_error(self) -> float:
-        """What a unit step leaves after ten periods of the bandwidth [%].
+        """Residual of a unit step after ten periods of the bandwidth [%].
 
         Not for ever: with an integrator nothing would be left, however slow it is.
         """

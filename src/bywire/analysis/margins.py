@@ -1,4 +1,4 @@
-"""Margins of a loop at an operating point, over a range of a parameter, and the worst of them."""
+"""Margins of a loop at an operating point or over a range, and its gain over frequency."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bywire.analysis.crossings import lower_factor, margin_of, upper_factor
+from bywire.analysis.crossings import NEARLY_ZERO, lower_factor, margin_of, upper_factor
 from bywire.analysis.loop import Loop
 from bywire.analysis.loop_figures import LOOP_FIGURES, LoopFigure, LoopFigures
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, not_valid
 from bywire.core.parameters import ParameterSet
+from bywire.core.typing import Array, Complex
 from bywire.core.undefined import EqualWhereUndefined
 
 _SHOWN = (
@@ -110,7 +111,7 @@ UNSTABLE = LoopMargins(
     bandwidth=math.nan,
     stable=False,
 )
-"""what an unstable loop has: no margins"""
+"""margins of an unstable loop"""
 
 
 def figures_at(loop: Loop, par: ParameterSet, value: float) -> LoopFigures:
@@ -166,10 +167,10 @@ def worst(
     Nothing is worse than an unstable loop, or none, whose margins are NaN.
     """
     if not margins:
-        raise ParameterError("no margins to choose from: give at least one value")
+        raise ParameterError("margins need at least one value", name="values")
     result: dict[str, tuple[float, float]] = {}
     for field, figure in MARGINS.items():
-        if field == "crossover":  # a place, of which neither more nor less is better
+        if field == "crossover":  # neither a larger nor a smaller one is better
             continue
         sense = -1.0 if figure.is_less_better else 1.0
         sizes = [sense * getattr(row, field) if row.is_sound else -math.inf for row in margins]
@@ -180,3 +181,130 @@ def worst(
 
 def _or_nan(figure: float) -> float:
     return figure if math.isfinite(figure) else math.nan
+
+
+# --- Loop gain over frequency, for Nyquist and Nichols charts
+
+_BELOW = 30.0  # ratio of the loop's band to the lowest frequency of a chart
+_CHART_POINTS = 1500
+
+
+@dataclass(frozen=True, eq=False)
+class LoopCurve:
+    """Frequency response of a loop that is cut open, negative feedback not counted.
+
+    Parameters
+    ----------
+    frequency
+        Frequencies [Hz], ascending, shape (n,).
+    L
+        Loop gain, shape (n,).
+    margins
+        Margins of the loop.
+    """
+
+    frequency: Array
+    L: Complex
+    margins: LoopMargins
+
+    @property
+    def S(self) -> Complex:
+        """Sensitivity 1/(1 + L), shape (n,)."""
+        return np.asarray(1.0 / (1.0 + self.L))
+
+    @property
+    def T(self) -> Complex:
+        """Complementary sensitivity L/(1 + L), shape (n,)."""
+        return np.asarray(self.L / (1.0 + self.L))
+
+    @property
+    def phase(self) -> Array:
+        """Phase [degree] without jumps, between -360 and 0 at the lowest frequency; shape (n,)."""
+        phase = np.degrees(np.unwrap(np.angle(self.L)))
+        return np.asarray(phase - 360.0 * math.ceil((phase[0] - NEARLY_ZERO) / 360.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Curves of a loop over the values of a parameter; one curve where nothing is varied.
+
+    Parameters
+    ----------
+    curves
+        One per value.
+    name, unit
+        Parameter and its SI unit; empty and ``"1"`` for a single curve.
+    values
+        Its values [SI].
+    """
+
+    curves: tuple[LoopCurve, ...]
+    name: str = ""
+    unit: str = "1"
+    values: tuple[float, ...] = (math.nan,)
+
+    @property
+    def worst(self) -> int:
+        """Index of the least disk margin; an unstable loop, or none, is worse than any."""
+        disks = [c.margins.disk if c.margins.is_sound else -math.inf for c in self.curves]
+        return int(np.argmin(disks))
+
+
+@dataclass(frozen=True)
+class Disk:
+    """Circle on the real axis of the Nyquist plane that the loop gain stays out of.
+
+    Parameters
+    ----------
+    middle, radius
+        Of the circle; both infinite for the largest margin, where it is the left half plane.
+    """
+
+    middle: float
+    radius: float
+
+
+def disk(margin: float) -> Disk:
+    r"""Return the circle that a loop gain of a disk margin touches.
+
+    .. math:: \left|\frac{1 - L}{1 + L}\right| = \frac{2}{\alpha} \;\Leftrightarrow\;
+        \left|L + \frac{1 + a^2}{1 - a^2}\right| = \frac{2 a}{1 - a^2}, \quad a = \alpha/2
+
+    Parameters
+    ----------
+    margin
+        Disk margin :math:`\alpha`, symmetric (skew 0): above 0, at most 2.
+
+    Raises
+    ------
+    ParameterError
+        When it is not in that range.
+
+    References
+    ----------
+    P. Seiler, A. Packard, P. Gahinet, "An Introduction to Disk Margins", IEEE Control Systems
+    Magazine 40(5), 2020: the symmetric margin, drawn in the Nyquist plane.
+    """
+    if not 0.0 < margin <= 2.0:
+        raise not_valid("disk margin", f"{margin:g}", "> 0 and <= 2")
+    a = 0.5 * margin
+    if a == 1.0:  # |S - T| = 1 at the imaginary axis: the circle has become a line
+        return Disk(-math.inf, math.inf)
+    return Disk(-(1.0 + a * a) / (1.0 - a * a), 2.0 * a / (1.0 - a * a))
+
+
+def loop_curve(loop: Loop, figures: LoopFigures, points: int = _CHART_POINTS) -> LoopCurve:
+    """Return the loop gain at an operating point, up to half its sampling frequency.
+
+    Parameters
+    ----------
+    loop
+        The loop, whose band a chart shows.
+    figures
+        Its figures there, see `margins.figures_at`.
+    points
+        Number of frequencies n.
+    """
+    margins = margins_of(figures)
+    shown = replace(figures, points=points, lowest=loop.band[0] / _BELOW)
+    return LoopCurve(shown.frequencies, shown.L, margins)

@@ -76,7 +76,7 @@ def period_of(frequencies: Sequence[float], intervals: Sequence[float], step: fl
     Raises
     ------
     ParameterError
-        When a frequency's period is no whole number of substeps.
+        When a frequency's period is not a multiple of the step.
     """
     wanted = [*intervals, *(1.0 / f for f in frequencies)]
     counts = [round(interval / step) for interval in wanted]
@@ -84,9 +84,11 @@ def period_of(frequencies: Sequence[float], intervals: Sequence[float], step: fl
         count = 1.0 / (f * step)
         if abs(count - round(count)) > 1e-6 * count:
             raise ParameterError(
-                f"a period of 1/({f:g} Hz) = {1e3 / f:.6g} ms is no whole number of substeps of "
-                f"{step * 1e6:g} us, and never repeats with them: take a frequency that divides "
-                "the sample rate"
+                f"a period of 1/({f:g} Hz) = {1e3 / f:.6g} ms is not a multiple of the step of "
+                f"{step * 1e6:g} us, and never repeats with it: take a frequency that divides the "
+                "sample rate",
+                name="frequency",
+                value=f"{f:g} Hz",
             )
     return math.lcm(*counts) * step
 
@@ -134,9 +136,10 @@ def find_orbit(stroboscope: Stroboscope, run: Run) -> PeriodicOrbit:
     raise SolverError(
         f"{run.model.name}: no motion repeats itself with the period {run.duration * 1e3:g} ms: "
         f"after {periods} periods {stroboscope.names[int(np.argmax(apart))]} still changes by "
-        f"{apart.max():.2g} of its usual magnitude per period; it hunts or drifts, as a loop does "
+        f"{apart.max():.2g} of its usual magnitude per period; it hunts or drifts, like a loop "
         "whose dither is too weak to keep it moving: raise the dither's gain, or move the "
-        "operating point"
+        "operating point",
+        name=stroboscope.names[int(np.argmax(apart))],
     )
 
 
@@ -408,8 +411,9 @@ def require_moving(model: PeriodicModel) -> None:
     """
     if model.orbit.stuck == 1.0:
         raise SolverError(
-            f"{model.run.model.name}: it sticks during the whole period, and answers to nothing "
-            "small: raise the dither's gain"
+            f"{model.run.model.name}: it sticks during the whole period, and does not respond to "
+            "small signals: raise the dither's gain",
+            name=model.run.model.name,
         )
 
 

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from bywire.analysis.linear.linear_model import LinearModel, rates
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, not_valid, unknown_name
 from bywire.core.typing import Array
 
 Matrices = tuple[Array, Array, Array]
@@ -137,7 +137,7 @@ def _factor(A: Array, B: Array, period: float) -> Array:
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-# --- What a reduced model leaves out: its largest error over a band, channel by channel
+# --- Largest error of a reduced model over a band, channel by channel
 
 _POINTS = 300
 _DECADES = 4.0  # below the band's end at which the search begins
@@ -230,17 +230,16 @@ def frequencies(full: LinearModel, reduced: LinearModel, high: float) -> Array:
     same = ("inputs", "outputs", "period")
     if any(getattr(full, name) != getattr(reduced, name) for name in same):
         raise ParameterError(
-            f"{full.name} and {reduced.name} have other inputs, outputs or sample times: "
-            "only models of the same signals compare"
+            f"{full.name} and {reduced.name} have different inputs, outputs or sample times: only "
+            "models with the same signals can be compared",
+            name=reduced.name,
         )
     nyquist = 0.5 / full.period if full.period else math.inf
     if not 0.0 < high < math.inf:
-        raise ParameterError(f"band = {high:g} Hz is not valid: it must be > 0 Hz and finite")
+        raise not_valid("band", f"{high:g} Hz", "> 0 Hz and finite")
     if high > nyquist:
-        raise ParameterError(
-            f"band = {high:g} Hz is not valid: it must be <= {nyquist:g} Hz, half the "
-            "sampling frequency"
-        )
+        half = "half the sampling frequency"
+        raise not_valid("band", f"{high:g} Hz", f"<= {nyquist:g} Hz", half)
     low = high * 10.0**-_DECADES
     corners = np.concatenate([natural(full), natural(reduced)])
     inside = corners[(corners > low) & (corners < high)]
@@ -299,7 +298,7 @@ def residualized(
     UnknownNameError
         When a state is unknown.
     ParameterError
-        When the others have no rest of their own, as an integrator has none.
+        When the other states have no steady state, for instance an integrator.
 
     References
     ----------
@@ -316,11 +315,16 @@ def residualized(
     if second and (np.any(size == 0.0) or np.linalg.cond(inner / size[:, None]) > _NO_REST):
         names = ", ".join(model.states[k] for k in second)
         raise ParameterError(
-            f"{model.name}: the states left out ({names}) have no rest of their own: one of them "
-            "integrates; keep it"
+            f"{model.name}: the states left out ({names}) have no steady state, as one of them "
+            "integrates: keep it",
+            name="states",
+            value=names,
         )
     if corrected and model.period:
-        raise ParameterError(f"{model.name}: only continuous models are corrected, this is sampled")
+        raise ParameterError(
+            f"{model.name}: only continuous models can be corrected, but this one is sampled",
+            name=model.name,
+        )
     A21, A12 = model.A[np.ix_(second, first)], model.A[np.ix_(first, second)]
     C2 = model.C[:, second]
     drift = model.rate[second, None]
@@ -354,13 +358,13 @@ _DEAD = 1e-12  # poles of sampled models below it are dead beats
 _NEAR_REST = 1e-6  # frequency that stands for rest [Hz]
 
 TOLERANCE = 0.01
-"""relative error over the band that is admissible where nothing else is said"""
+"""default of the largest relative error over the band"""
 _FAR = 1e3  # of the fastest corner: a response so far beyond it is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """A reduced model, and what it leaves out.
+    """Reduced model, and its error.
 
     Parameters
     ----------
@@ -402,12 +406,12 @@ def reduce(
         Continuous or sampled, stable or not: integrators, undamped swings and unstable poles
         are split off first and kept.
     order
-        Number of states; as few as `tolerance` allows where it is not given.
+        Number of states; by default the least that `tolerance` allows.
     band
         Frequency [Hz] up to which the error counts; by default that of the fastest pole, or 0.4
         of the sampling frequency (at half of it many a sampled model has a zero).
     tolerance
-        Admissible relative error over the band, where no order is given.
+        Largest relative error over the band, if no order is given.
     method
         ``"balanced"``: states that show least are taken as always at rest (singular perturbation
         of the balanced realization: exact at rest, with a bound at every frequency).
@@ -430,19 +434,18 @@ def reduce(
     high, n = _band(full, band), len(acting)
     if not acting:
         raise ParameterError(
-            f"{full.name}: no input reaches an output (what sticks does not move): there is "
-            "nothing to reduce"
+            f"{full.name}: no input reaches an output, for instance because of stiction: there is "
+            "nothing to reduce",
+            name=full.name,
         )
     lasts = lasting(full)
     kept = sum(lasts(pole) for pole in full.poles())
     least = max(kept, 1)
     if order is not None and not least <= order <= n:
-        raise ParameterError(
-            f"order = {order} is not valid: {full.name} has {n} states that act, {kept} of "
-            f"them unstable or on the border of stability: it must be >= {least} and <= {n}"
-        )
+        states = f"as {full.name} has {n} effective states, {kept} of them not stable"
+        raise not_valid("order", str(order), f">= {least} and <= {n}", states)
     if not 0.0 < tolerance < 1.0:
-        raise ParameterError(f"tolerance = {tolerance:g} is not valid: it must be > 0 and < 1")
+        raise not_valid("tolerance", f"{tolerance:g}", "> 0 and < 1")
     rungs = _balanced(full) if method == "balanced" else _modal(full)
     best = math.inf
     for size in range(least, n + 1) if order is None else (order,):
@@ -452,14 +455,17 @@ def reduce(
             return Reduced(rung.model, error, kept, rung.hankel, rung.bound)
         best = min(best, error.relative)
     raise ParameterError(
-        f"{full.name}: no order is within {100.0 * tolerance:g} % up to {high:g} Hz, the best is "
-        f"{100.0 * best:.2g} % off; allow more, or take a lower band"
+        f"{full.name}: no order has an error within {100.0 * tolerance:g} % up to {high:g} Hz, the "
+        f"least is {100.0 * best:.2g} %; allow more, or take a lower band",
+        name="tolerance",
+        value=f"{100.0 * tolerance:g} %",
+        valid=f">= {100.0 * best:.2g} %",
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Rung:
-    """A model of one order, and what is known of it without looking at its response."""
+    """Model of one order, with properties that do not need its response."""
 
     model: LinearModel
     hankel: Array
@@ -501,7 +507,7 @@ def _modal(full: LinearModel) -> Callable[[int], _Rung]:
 
 
 def _rate(pole: complex, full: LinearModel, lasts: Choice) -> float:
-    """Return how fast a mode is [1/s]; 0 for what must be kept."""
+    """Return the rate of a mode [1/s]; 0 for a mode that must be kept."""
     if lasts(pole):
         return 0.0
     if not full.period:
@@ -529,7 +535,7 @@ def _peaks(part: Matrices, full: LinearModel) -> tuple[Array, Array]:
 
 
 def _joined(full: LinearModel, first: Matrices, second: Matrices) -> LinearModel:
-    """Return both parts side by side, their states without a meaning of their own."""
+    """Return the sum of both parts, with states that have no physical meaning."""
     from scipy.linalg import block_diag
 
     n = len(first[0]) + len(second[0])
@@ -550,10 +556,8 @@ def _band(model: LinearModel, band: float | None) -> float:
     if band is not None:
         most = _FAR * float(natural(model).max(initial=0.0))
         if not model.period and band > most > 0.0:
-            raise ParameterError(
-                f"band = {band:g} Hz is not valid: it must be <= {most:.3g} Hz, {_FAR:g} "
-                f"times the fastest corner of {model.name}"
-            )
+            far = f"{_FAR:g} times the fastest corner of {model.name}"
+            raise not_valid("band", f"{band:g} Hz", f"<= {most:.3g} Hz", far)
         return band
     if model.period:
         return 0.4 / model.period

@@ -13,18 +13,25 @@ from bywire.analysis.margins import NO_LOOP
 from bywire.analysis.response.frequency_response import require_stable
 from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase, spread
-from bywire.bench.running import Progress
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Progress
 from bywire.report.answer import Answer
-from bywire.report.document import Banner, Document, FigureBlock, Paragraph, Section, TableBlock
+from bywire.report.document import (
+    Banner,
+    Details,
+    Document,
+    FigureBlock,
+    Paragraph,
+    Section,
+    TableBlock,
+)
 from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_WIDTH = 140  # characters of a line of the table
 
 LABELS = {NOTHING: "nothing, small amplitude", LIMITS: "limits", EVERYTHING: "everything"}
 """what a reader calls what is left on"""
@@ -75,7 +82,7 @@ class LoopAgreement(Answer):
     def document(self) -> Document:
         """Return table, verdict and figure."""
         case, compared = self.case, self.differences
-        table = TableBlock(agreement_table(compared), width=_WIDTH)
+        table = TableBlock(agreement_table(compared))
         legend, text = Paragraph(LEGEND), verdict(compared)
         small, large = amount(self.small, self.unit, 3), amount(self.large, self.unit, 3)
         sizes = f"small amplitude {small}, large amplitude {large}"
@@ -93,7 +100,12 @@ class LoopAgreement(Answer):
                 Section("Differences", [figure, table, legend]),
                 case.subject.provenance(f"{sizes[0].upper()}{sizes[1:]}."),
             ],
-            brief=[f"{head}: nonlinear less linear", sizes, table, legend, text],
+            brief=[
+                f"{head}: nonlinear response minus linear response",
+                sizes,
+                table,
+                Details("", [legend]),
+            ],
             data=self._data(),
             banner=Banner(text[0].upper() + text[1:], "good" if compared.holds else "bad"),
             changes=case.subject.changes,

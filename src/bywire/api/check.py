@@ -76,7 +76,7 @@ class Check(Answer):
                 Section("What could not be checked", [TableBlock(_table(self.not_checked))]),
                 Section("All contracts", [TableBlock(_table(self.findings))]),
             ],
-            brief=[*brief, summary],
+            brief=brief,
             data=self._data(),
             banner=Banner(summary, "good" if self.holds else "bad"),
             record="check.json",

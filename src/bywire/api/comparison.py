@@ -2,27 +2,41 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from bywire.api.compared_run import ComparedRun, Setting, ran
-from bywire.bench import bench_file, running
+import numpy as np
+import xarray as xr
+
+from bywire.api.run import bench_of
+from bywire.bench import running
 from bywire.bench.bench import Bench
-from bywire.bench.bench_source import names_experiment
-from bywire.bench.result import Result
-from bywire.bench.result_folder import is_result_folder, verdict_record
-from bywire.bench.running import Progress
+from bywire.bench.bench_file import flattened, names_experiment
+from bywire.bench.changes import OPTION
+from bywire.bench.experiment import Experiment
+from bywire.bench.generic_experiment import experiment_of
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.requirements import Verdict
+from bywire.bench.result_folder import is_result_folder, read_result, verdict_record
+from bywire.bench.running import Result
 from bywire.bench.step_error import are_distinct
+from bywire.bench.stimulus import STIMULI
 from bywire.core.callers import is_command_line
-from bywire.core.errors import ParameterError
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.errors import InputError, ParameterError
+from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.typing import Progress
 from bywire.core.units import difference_unit
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Block,
+    Change,
     Document,
     FigureBlock,
     Flat,
@@ -32,15 +46,194 @@ from bywire.report.document import (
     TableBlock,
     spaced,
 )
+from bywire.report.subject import bench_changes
 from bywire.report.tables import Cell, Column, Table, measured_cell, value_text
 from bywire.report.terminal import change_texts
 from bywire.report.wording import clean, duration, measured_amount
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.figure import Figure
 
     from bywire.report.step_response import StepLimits
+
+_BENCH = {
+    "experiment": "experiment",
+    "parameter_set": "parameters",
+    "model": "assembly",
+    "step": "simulation.step",
+    "seed": "simulation.seed",
+}
+"""attributes of a recording that bench files set, by what they call them"""
+_PROGRAM = ("bywire_version", "engine")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a bench was set to: a value in an SI unit, or a choice."""
+
+    value: Any
+    unit: str = "1"
+
+
+@dataclass(frozen=True)
+class ComparedRun:
+    """A bench that was run.
+
+    Parameters
+    ----------
+    label
+        What the comparison calls it.
+    source
+        Where it comes from: a folder, a bench file, an experiment.
+    recordings
+        One dataset per run of the experiment, by label.
+    kpis, verdicts
+        Key figures, and the requirements beside them.
+    warnings
+        What its run warned of.
+    changes
+        What of it was changed.
+    """
+
+    label: str
+    source: str
+    recordings: Mapping[str, xr.Dataset]
+    kpis: tuple[Kpi, ...]
+    verdicts: tuple[Verdict, ...]
+    warnings: tuple[str, ...] = ()
+    changes: tuple[Change, ...] = ()
+
+    @cached_property
+    def attributes(self) -> Mapping[str, Any]:
+        """What the first recording says of how it was made, as plain numbers and texts."""
+        said = next(iter(self.recordings.values())).attrs
+        return {key: v.item() if isinstance(v, np.generic) else v for key, v in said.items()}
+
+    @property
+    def model(self) -> str:
+        """Name of the assembly that was tested."""
+        return str(self.attributes.get("model", ""))
+
+    @cached_property
+    def definition(self) -> Experiment | None:
+        """The experiment; None where this installation does not know it."""
+        said = self.attributes
+        name, cited, model = (
+            str(said.get(k, "")) for k in ("experiment", "parameter_set", "model")
+        )
+        with contextlib.suppress(InputError):
+            return experiment_of(name, cited, model, flattened(_object(said, "options")))
+        return None
+
+    @cached_property
+    def options(self) -> Any:
+        """The options of the experiment; None where they cannot be read."""
+        if self.definition is None:
+            return None
+        with contextlib.suppress(InputError):
+            return self.definition.options.create(_tupled(_object(self.attributes, "options")))
+        return None
+
+    @cached_property
+    def settings(self) -> dict[str, Setting]:
+        """Everything that was set, by the names that ``--set`` takes."""
+        said = self.attributes
+        settings = {
+            name: Setting(said[key], "s" if key == "step" else "1")
+            for key, name in _BENCH.items()
+            if key in said
+        }
+        options = None if self.definition is None else self.definition.options
+        settings |= dict(_settings(_object(said, "options"), options, OPTION))
+        settings |= dict(self._stimuli())
+        settings |= dict(_settings(_object(said, "parameters"), self._parameter_class))
+        return settings | {key: Setting(said[key]) for key in _PROGRAM if key in said}
+
+    @property
+    def has_units(self) -> bool:
+        """Whether the units of its parameters are known: its parameter set is installed."""
+        return self._parameter_class is not None
+
+    @property
+    def _parameter_class(self) -> type[ParameterSet] | None:
+        name = str(self.attributes.get("parameter_set", ""))
+        cited = PARAMETER_SETS.all().get(name)
+        return None if cited is None else cited.parameter_class
+
+    def _stimuli(self) -> Iterator[tuple[str, Setting]]:
+        """Yield what ``[stimulus]`` and its further sections were set to."""
+        sections = _object(self.attributes, "stimulus")
+        further = {name: each for name, each in sections.items() if isinstance(each, Mapping)}
+        plain = {name: each for name, each in sections.items() if name not in further}
+        units: dict[str, str] = {}
+        if self.definition is not None and self.options is not None:
+            known = self.definition
+            units = dict(known.beside(self.options)) if known.beside is not None else {}
+            if known.driven_unit is not None:
+                units[""] = known.driven_unit(self.options)
+        for signal, section in {"": plain, **further}.items():
+            kind = STIMULI.all().get(str(section.get("kind", "")))
+            prefix = f"stimulus.{signal}." if signal else "stimulus."
+            cls = None if kind is None else kind.parameter_class
+            yield from _settings(section, cls, prefix, units.get(signal, "1"))
+
+
+def ran(result: Result, label: str, source: str) -> ComparedRun:
+    """Return a bench that was run just now."""
+    warned = tuple(result.warnings)
+    return ComparedRun(
+        label,
+        source,
+        result.recordings,
+        result.kpis,
+        result.verdicts,
+        warned,
+        bench_changes(result.bench),
+    )
+
+
+def kept(folder: Path) -> ComparedRun:
+    """Return what a result folder holds.
+
+    Raises
+    ------
+    FileError
+        As `read_result`.
+    """
+    result = read_result(folder)
+    name = folder.resolve().name
+    changes = tuple(
+        Change(changed, each["value"], each["instead_of"], each["of"])
+        for changed, each in result.changes.items()
+    )
+    return ComparedRun(
+        name, str(folder), result.recordings, result.kpis, result.verdicts, result.warnings, changes
+    )
+
+
+def _settings(
+    values: Mapping[str, Any], cls: type[ParameterSet] | None, prefix: str = "", level: str = "1"
+) -> Iterator[tuple[str, Setting]]:
+    leaves = {} if cls is None else leaf_fields(cls)
+    for name, value in _tupled(values).items():
+        unit = leaves[name].unit.symbol if name in leaves else "1"
+        yield f"{prefix}{name}", Setting(value, unit.replace("level", level))
+
+
+def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
+    flat = flattened(values)
+    return {name: tuple(v) if isinstance(v, list) else v for name, v in flat.items()}
+
+
+def _object(said: Mapping[str, Any], key: str) -> dict[str, Any]:
+    """Return an attribute that holds a JSON object; an empty one where there is none."""
+    with contextlib.suppress(ValueError):
+        content = json.loads(str(said.get(key, "{}")))
+        return content if isinstance(content, dict) else {}
+    return {}
+
+
+# --- Benches beside each other: what differs of settings and key figures, verdicts, curves
 
 _LONGEST = 48  # characters of a value in a table
 
@@ -77,7 +270,7 @@ class Compared:
         return are_distinct(values, self.errors)
 
 
-def compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tuple[Compared, ...]:
+def _compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tuple[Compared, ...]:
     """Return everything that was set, or what all runs have of it."""
     names = list(dict.fromkeys(name for each in runs for name in each.settings))
     if shared_only:
@@ -90,7 +283,7 @@ def compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tupl
     return tuple(rows)
 
 
-def compared_figures(runs: Sequence[ComparedRun]) -> tuple[Compared, ...]:
+def _compared_figures(runs: Sequence[ComparedRun]) -> tuple[Compared, ...]:
     """Return every key figure that some run has; those of another unit stay apart."""
     keys = dict.fromkeys((kpi.name, kpi.unit) for each in runs for kpi in each.kpis)
     each_run = [{(k.name, k.unit): (k.value, k.bound) for k in each.kpis} for each in runs]
@@ -101,7 +294,7 @@ def compared_figures(runs: Sequence[ComparedRun]) -> tuple[Compared, ...]:
     return tuple(rows)
 
 
-def settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
+def _settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
     """Return settings of all runs, a column each."""
     return Table(
         (Column("setting"), *(Column(label, numeric=True) for label in labels)),
@@ -112,7 +305,7 @@ def settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
     )
 
 
-def kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
+def _kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
     """Return key figures of all runs, a column each, and their change; of many, the spread."""
     change = "change" if len(labels) == 2 else "spread"
     return Table(
@@ -135,7 +328,7 @@ def kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
     )
 
 
-def verdict_table(runs: Sequence[ComparedRun]) -> Table:
+def _verdict_table(runs: Sequence[ComparedRun]) -> Table:
     """Return the requirements of all runs, one row each, with what every run makes of it."""
     each_run = [{(v.kpi, v.limit): v for v in each.verdicts} for each in runs]
     keys = dict.fromkeys(key for verdicts in each_run for key in verdicts)
@@ -210,12 +403,12 @@ class Comparison(Answer):
     @cached_property
     def settings(self) -> tuple[Compared, ...]:
         """Everything that was set; of different brakes, what all of them have."""
-        return compared_settings(self.runs, shared_only=self._mixed)
+        return _compared_settings(self.runs, shared_only=self._mixed)
 
     @cached_property
     def figures(self) -> tuple[Compared, ...]:
         """Every key figure that some run has; those of one name but another unit stay apart."""
-        return compared_figures(self.runs)
+        return _compared_figures(self.runs)
 
     @property
     def warnings(self) -> list[str]:
@@ -249,7 +442,7 @@ class Comparison(Answer):
     def document(self) -> Document:
         """Return what differs, key figures, verdicts and curves."""
         settings, figures = self._tables()
-        verdicts = [TableBlock(verdict_table(self.runs), title="Requirements:")]
+        verdicts = [TableBlock(_verdict_table(self.runs), title="Requirements:")]
         verdicts = verdicts if any(each.verdicts for each in self.runs) else []
         sources = [f"{each.label}: {each.source}" for each in self.runs]
         changed = self._changed()
@@ -335,25 +528,25 @@ class Comparison(Answer):
         labels = [each.label for each in self.runs]
         blocks_of: list[list[Flat]] = []
         for title, shown, rows in (
-            ("Settings", self.settings, settings_table),
-            ("Key figures", self.figures, kpi_table),
+            ("Settings", self.settings, _settings_table),
+            ("Key figures", self.figures, _kpi_table),
         ):
             differing = [each for each in shown if each.differs]
             same = [each for each in shown if not each.differs]
             blocks: list[Flat] = []
             if differing:
                 caption = f"{title} that differ."
-                blocks.append(TableBlock(rows(labels, differing), caption, 0, f"{caption[:-1]}:"))
+                blocks.append(TableBlock(rows(labels, differing), caption, f"{caption[:-1]}:"))
             else:
                 blocks.append(Paragraph(f"{title}: all {len(same)} are the same."))
             if same and self.is_full:
                 caption = f"{title} that are the same."
-                blocks.append(TableBlock(rows(labels, same), caption, 0, f"{caption[:-1]}:"))
+                blocks.append(TableBlock(rows(labels, same), caption, f"{caption[:-1]}:"))
             blocks_of.append(blocks)
         return blocks_of[0], blocks_of[1]
 
     def _curves(self) -> list[Block]:
-        from bywire.report.overlaid import can_overlay
+        from bywire.report.time_traces import can_overlay
 
         return [
             FigureBlock(
@@ -367,7 +560,7 @@ class Comparison(Answer):
 
     def _differences(self) -> list[Block]:
         """Return what each run differs from the first by, over time, where that can be drawn."""
-        from bywire.report.overlaid import difference_figure
+        from bywire.report.time_traces import difference_figure
 
         first, *_ = self.runs
         blocks: list[Block] = []
@@ -432,7 +625,7 @@ _NOT_NAMED = ("experiment", "bywire_version", "engine")
 
 
 def _drawn(recordings: Mapping[str, xr.Dataset], step: tuple[str, StepLimits] | None) -> Figure:
-    from bywire.report.overlaid import overlaid_panels
+    from bywire.report.time_traces import overlaid_panels
 
     return overlaid_panels(recordings, step=step)
 
@@ -441,6 +634,24 @@ def _drawn(recordings: Mapping[str, xr.Dataset], step: tuple[str, StepLimits] | 
 
 Comparable = Bench | Result | str | Path
 Run = TypeVar("Run", bound=Comparable)
+
+
+def compared(
+    runs: Sequence[Comparable],
+    overrides: Mapping[str, str],
+    is_full: bool,
+    progress: Progress | None,
+    estimate_error: bool,
+) -> Comparison:
+    """Return a comparison of runs; see `bywire.compare`."""
+    require_comparable(runs, overrides)
+    # Folders first: what they lack is said before anything is computed.
+    read = {k: kept(Path(str(each))) for k, each in enumerate(runs) if _is_folder(each)}
+    shown = [
+        read.get(k) or _resolved(each, overrides, progress, estimate_error)
+        for k, each in enumerate(runs)
+    ]
+    return Comparison(tuple(_told_apart(shown)), is_full)
 
 
 def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> list[Run]:
@@ -456,7 +667,7 @@ def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> lis
             f"{len(runs)} {'run is' if len(runs) == 1 else 'runs are'} nothing to compare: name "
             "two at least, bench files, experiments or result folders"
         )
-    benches = [each for each in runs if not was_run(each)]
+    benches = [each for each in runs if not _was_run(each)]
     if overrides and not benches:
         raise ParameterError(
             f"{', '.join(overrides)} would have no effect: what is compared was run before"
@@ -464,12 +675,12 @@ def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> lis
     return benches
 
 
-def was_run(source: Comparable) -> bool:
+def _was_run(source: Comparable) -> bool:
     """Return whether something was run before."""
-    return isinstance(source, Result) or is_folder(source)
+    return isinstance(source, Result) or _is_folder(source)
 
 
-def is_folder(source: Comparable) -> bool:
+def _is_folder(source: Comparable) -> bool:
     """Return whether something is to be read as a result folder."""
     if not isinstance(source, str | Path):
         return False
@@ -479,7 +690,7 @@ def is_folder(source: Comparable) -> bool:
     return is_result_folder(path) or not names_experiment(source)
 
 
-def resolved(
+def _resolved(
     source: Comparable,
     overrides: Mapping[str, str],
     progress: Progress | None,
@@ -488,12 +699,9 @@ def resolved(
     """Return what a bench gives, run now unless it was."""
     if isinstance(source, Result):
         result, text = source, "given"
-    elif isinstance(source, Bench):
-        bench = source.with_overrides(overrides) if overrides else source
-        result, text = _run(bench, progress, estimate_error), "a bench, run now"
     else:
-        bench = bench_file.read(source, overrides)
-        result, text = _run(bench, progress, estimate_error), f"{source}, run now"
+        result = _run(bench_of(source, overrides), progress, estimate_error)
+        text = f"{'a bench' if isinstance(source, Bench) else source}, run now"
     if result.status == "interrupted":
         raise KeyboardInterrupt
     return ran(result, result.bench.name or result.bench.experiment, text)
@@ -509,7 +717,7 @@ def _reported(progress: Progress, name: str, label: str, share: float) -> None:
     progress(f"{name}, {label}", share)
 
 
-def told_apart(runs: Sequence[ComparedRun]) -> list[ComparedRun]:
+def _told_apart(runs: Sequence[ComparedRun]) -> list[ComparedRun]:
     """Return runs whose labels differ: by their sources, and else by their numbers."""
     labels = [clean(each.label) for each in runs]
     if len(set(labels)) < len(runs):

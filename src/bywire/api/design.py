@@ -1,4 +1,4 @@
-"""What a design of gains, or of a gain schedule, starts from and says."""
+"""Gains of a loop, or a gain schedule, from requirements, also for drawn models."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.loop_curves import loop_curve
-from bywire.analysis.margins import NO_LOOP, figures_at
+from bywire.analysis.margins import NO_LOOP, figures_at, loop_curve
 from bywire.api import design_parts
-from bywire.api.design_drawn import Probability
-from bywire.api.design_parts import Part, judged_on, verdict_text
+from bywire.api.design_parts import Part, figure_cell, judged_on, verdict_text
 from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase, loop_case, over_range, spread
+from bywire.api.study_tables import percent
 from bywire.bench.bench import Bench
+from bywire.bench.changes import OPTION
 from bywire.bench.requirements import Limit
-from bywire.bench.running import Progress
 from bywire.core.callers import option
-from bywire.core.errors import ParameterError
+from bywire.core.errors import InputError, ParameterError, quoted
 from bywire.core.parameters import leaf_fields
-from bywire.core.units import shown
+from bywire.core.typing import Progress, silent
+from bywire.core.units import parse, shown
 from bywire.data.toml_file import read_toml
 from bywire.report.answer import Answer
 from bywire.report.document import (
@@ -38,10 +38,22 @@ from bywire.report.document import (
     Listing,
     Paragraph,
     Section,
-    TableBlock,
 )
-from bywire.synthesis.outcome import Across, Design, ScheduleDesign, Status, bench_text
-from bywire.synthesis.requirement import read
+from bywire.report.tables import Cell, text_table
+from bywire.studies.plan import CHUNK, StudyPlan
+from bywire.studies.statistics import Outcome, Share, judged, share
+from bywire.studies.study_file import read_study
+from bywire.synthesis import designer
+from bywire.synthesis.linear_case import LinearCase, cases_of, existing_case, read, require_given
+from bywire.synthesis.outcome import (
+    Across,
+    Design,
+    Judged,
+    ScheduleDesign,
+    Status,
+    bench_text,
+    judged_over,
+)
 from bywire.synthesis.schedules import (
     design_schedule,
     frozen,
@@ -49,12 +61,222 @@ from bywire.synthesis.schedules import (
     scheduled,
     verify_schedule,
 )
-from bywire.synthesis.verification import Trial, Verification
+from bywire.synthesis.verification import Trial, Verification, verify
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from bywire.report.design_curves import DesignCurve
+    from bywire.report.loop_curves import DesignCurve
+
+_JUDGES = 512  # further ones, that judge the gains
+_MOST = 1000
+
+
+@dataclass(frozen=True)
+class DrawnModels:
+    """Models as a study draws its cases.
+
+    Parameters
+    ----------
+    study
+        The study's name.
+    cases
+        Models that gains are chosen for.
+    lacking
+        How many of those that were drawn for it do not exist.
+    judges
+        Further models, which judge the gains; None for one that does not exist.
+    confidence
+        Of intervals.
+    """
+
+    study: str
+    cases: tuple[LinearCase, ...]
+    lacking: int
+    judges: tuple[LinearCase | None, ...]
+    confidence: float
+
+
+@dataclass(frozen=True)
+class Probability:
+    """How probably gains meet their requirements, on the linear models.
+
+    Parameters
+    ----------
+    drawn
+        The models.
+    requirements
+        The requirements.
+    judged
+        How many of the judging models meet each.
+    wanted
+        Probability that is wanted of all requirements together; None for none.
+    """
+
+    drawn: DrawnModels
+    requirements: tuple[Limit, ...]
+    judged: Judged
+    wanted: float | None
+
+    @property
+    def together(self) -> Share:
+        """Probability with which all requirements are met, and its interval."""
+        return self._share(self.judged.all_met)
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """Whether they are met as probably as wanted; None where nothing is."""
+        if self.wanted is None:
+            return None
+        return judged(self.together, self.together, self.wanted)
+
+    def _share(self, count: int) -> Share:
+        return share(count, self.judged.models, self.drawn.confidence)
+
+    def parts(self) -> Sequence[Part]:
+        """Return a table and sentences."""
+        told = f"{100.0 * self.drawn.confidence:g} % interval"
+        rows: list[tuple[str | Cell, ...]] = [
+            (str(wanted), *self._words(self._share(count)), figure_cell(wanted.figure, worst))
+            for wanted, count, worst in zip(
+                self.requirements, self.judged.met, self.judged.worst, strict=True
+            )
+        ]
+        if len(rows) > 1:
+            rows.append(("all together", *self._words(self.together), "-"))
+        lines: list[Part] = [
+            f"gains chosen for {len(self.drawn.cases)} models drawn from study "
+            f"{self.drawn.study!r}, judged by {self.judged.models} others",
+            text_table(["of other models", "met by", "probability", told, "worst"], rows),
+        ]
+        if self.judged.unstable:
+            lines.append(
+                f"{self.judged.unstable} of them are unstable, or do not exist: they "
+                "count as missing every requirement"
+            )
+        if self.drawn.lacking:
+            lines.append(f"{self.drawn.lacking} more that were drawn for the gains do not exist")
+        return [*lines, self.verdict] if self.wanted is not None else lines
+
+    @property
+    def verdict(self) -> str:
+        """Whether all requirements are met as probably as wanted, in words."""
+        wanted = "" if self.wanted is None else f" with {100.0 * self.wanted:.10g} %"
+        return f"all requirements{wanted}: {self.outcome or 'no probability is wanted'}"
+
+    def _words(self, told: Share) -> tuple[str, str, str]:
+        return (
+            f"{told.count} of {told.cases}",
+            percent(told.value, told),
+            f"{percent(told.low, told)} to {percent(told.high, told)}",
+        )
+
+    def data(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+
+        def said(told: Share) -> dict[str, Any]:
+            return {
+                "met": told.count,
+                "probability": told.value,
+                "low": told.low,
+                "high": told.high,
+            }
+
+        return {
+            "study": self.drawn.study,
+            "designed_for": len(self.drawn.cases),
+            "lacking": self.drawn.lacking,
+            "judged_by": self.judged.models,
+            "unstable": self.judged.unstable,
+            "wanted": self.wanted,
+            "outcome": self.outcome,
+            "all": said(self.together),
+            "requirements": [
+                {"requirement": str(wanted), "worst": worst, **said(self._share(count))}
+                for wanted, count, worst in zip(
+                    self.requirements, self.judged.met, self.judged.worst, strict=True
+                )
+            ],
+        }
+
+
+def _drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
+    """Return models of a loop whose parameters vary as in a study file.
+
+    What the study says of cases, requirements and its bench's experiment does not count.
+
+    Parameters
+    ----------
+    case
+        The loop, its parameters and operating point.
+    file
+        Study file; shares in it are of what its own bench has.
+    count
+        Models that gains are chosen for.
+
+    Raises
+    ------
+    InputError
+        For a study file that does not fit the loop, a count that is not valid, and models of
+        which none exists.
+    """
+    if not 1 <= count <= _MOST:
+        raise ParameterError(f"drawn = {count} is not valid: 1 to {_MOST} models")
+    plan = replace(read_study(file), design="monte-carlo")
+    _require_fitting(case, plan, file)
+    columns = [plan.values(chunk) for chunk in range(-(-(count + _JUDGES) // CHUNK))]
+    models = [
+        _model(case, {name: column[k].item() for name, column in values.items()}, number)
+        for number, (values, k) in enumerate(
+            ((values, k) for values in columns for k in range(CHUNK)), 1
+        )
+    ]
+    designed = tuple(each for each in models[:count] if each is not None)
+    if not designed:
+        raise ParameterError(f"{file}: none of {count} models drawn of it exists")
+    judges = tuple(models[count : count + _JUDGES])
+    return DrawnModels(plan.name, designed, count - len(designed), judges, plan.confidence)
+
+
+def _probability(text: str) -> float | None:
+    """Return the probability that is wanted; None for an empty text.
+
+    Raises
+    ------
+    ParameterError
+        For what is no probability between 0 and 1.
+    """
+    if not text:
+        return None
+    wanted = parse(text, "1", "probability")
+    if not 0.0 < wanted < 1.0:
+        raise ParameterError(f"probability = {quoted(text)} must lie between 0 and 100 %")
+    return wanted
+
+
+def _require_fitting(case: LoopCase, plan: StudyPlan, file: str | Path) -> None:
+    if type(plan.bench.par) is not type(case.par):
+        raise ParameterError(
+            f"{file}: its bench is of {plan.bench.system}, and loop {case.loop.name!r} of another "
+            "brake: name a study of this one"
+        )
+    for name in (name for v in plan.varied for name in (v.name, *v.together)):
+        if name.startswith(OPTION):
+            raise ParameterError(
+                f"{file}: {name} is an option of the experiment, which the loop does not have: "
+                "leave it out"
+            )
+        require_given(case.loop, name)
+
+
+def _model(case: LoopCase, values: Mapping[str, Any], number: int) -> LinearCase | None:
+    try:
+        return existing_case(case.loop, f"drawn model {number}", case.par, values, case.value)
+    except InputError:
+        return None
+
+
+# --- What a design starts from
 
 Spans = Mapping[str, tuple[float, float]]
 
@@ -64,7 +286,7 @@ def requirements_of(file: str | Path | None, texts: Sequence[str]) -> tuple[Limi
     return read([*_from_file(None if file is None else Path(file)), *texts])
 
 
-def left_to_choose(
+def _left_to_choose(
     loop: str, spans: Spans, changes: Mapping[str, Any]
 ) -> dict[str, tuple[float, float]]:
     """Return what may be chosen: what the user has set stays.
@@ -84,7 +306,7 @@ def left_to_choose(
     return left
 
 
-def for_ecu(
+def _for_ecu(
     case: LoopCase, changes: Mapping[str, Any], free: bool
 ) -> tuple[LoopCase, dict[str, Any], Spans]:
     """Return a case, its changes, and the spans that an ECU can run, but for what the user has set.
@@ -101,12 +323,12 @@ def for_ecu(
     return replace(case, par=case.par.replace(fixed)), {**changes, **texts}, limits
 
 
-def narrowed(spans: Spans, limits: Spans) -> Spans:
+def _narrowed(spans: Spans, limits: Spans) -> Spans:
     """Return spans with the limits in their place where there are any."""
     return {name: limits.get(name, span) for name, span in spans.items()}
 
 
-def tunables_of(case: LoopCase) -> Spans:
+def _tunables_of(case: LoopCase) -> Spans:
     """Return the loop's tunables; with its schedule on, those of the operating point's region."""
     schedule = case.loop.schedule
     if schedule is None or not schedule.is_on(case.par):
@@ -114,7 +336,7 @@ def tunables_of(case: LoopCase) -> Spans:
     return schedule.regions[schedule.region(case.par, case.value)]
 
 
-def trial_of(case: LoopCase, changes: Mapping[str, Any], amplitudes: str) -> Trial:
+def _trial_of(case: LoopCase, changes: Mapping[str, Any], amplitudes: str) -> Trial:
     """Return what the design is tried on; ``amplitudes`` are those of the sines, with units."""
     loop = case.loop
     sizes = spread(amplitudes, case.input_unit, "amplitudes") if amplitudes else loop.amplitudes[1:]
@@ -231,7 +453,7 @@ class DesignAnswer(Answer):
                 Section("Figures", self._figures()),
                 self.case.subject.provenance("Parameters as they were before the design."),
             ],
-            brief=[part if isinstance(part, str) else TableBlock(part) for part in parts],
+            brief=design_parts.brief_blocks(parts),
             data={**self.data(), "kept_for_the_ecu": {k: list(v) for k, v in self.limits.items()}},
             banner=Banner(verdict, "good" if self.holds else "bad"),
             attachments=[Attachment(f"{loop.name}-design.toml", self._write_bench)],
@@ -298,7 +520,7 @@ class DesignAnswer(Answer):
         ]
 
     def _draw(self, kind: str, limits: Mapping[tuple[str, bool], float]) -> Figure:
-        from bywire.report.design_curves import loop_gains, sensitivities, steps
+        from bywire.report.loop_curves import loop_gains, sensitivities, steps
 
         if kind == "loop-gain":
             return loop_gains(self._curves, limits.get(("phase_margin", False)))
@@ -384,7 +606,7 @@ class LoopScheduleDesign(DesignAnswer):
 
 
 def _curve(case: LoopCase, label: str, gains: Mapping[str, float]) -> DesignCurve:
-    from bywire.report.design_curves import DesignCurve
+    from bywire.report.loop_curves import DesignCurve
 
     figures = figures_at(case.loop, case.par.replace(gains), case.value)
     step: NDArray[np.float64] = np.zeros(1)
@@ -398,6 +620,49 @@ def _curve(case: LoopCase, label: str, gains: Mapping[str, float]) -> DesignCurv
 
 
 # --- The design
+
+
+def designed_at_point(
+    case: LoopCase,
+    overrides: Mapping[str, Any],
+    wanted: tuple[Limit, ...],
+    over: Sequence[str],
+    amplitudes: str | None,
+    free_derivative: bool,
+    vary: str | Path,
+    drawn: int,
+    probability: str,
+    seed: int,
+    progress: Progress | None,
+) -> LoopDesign:
+    """Return gains of a loop at its operating point, over ranges, and for drawn models.
+
+    ``wanted``: the requirements; ``amplitudes``: None without the nonlinear bench; all else as of
+    `bywire.design`.
+    """
+    least = _probability(probability)
+    if least is not None and not vary:
+        raise ParameterError(
+            f"probability needs drawn models: name a study file, {option('vary')} FILE"
+        )
+    case, overrides, limits = _for_ecu(case, overrides, free_derivative)
+    tunables = _left_to_choose(case.loop.name, _narrowed(_tunables_of(case), limits), overrides)
+    ranges = dict(over_range(text, case)[::2] for text in over)
+    models = _drawn_models(case, vary, drawn) if vary else None
+    cases = cases_of(case.loop, case.par, case.value, ranges)
+    cases += () if models is None else models.cases
+    trial = None if amplitudes is None else _trial_of(case, overrides, amplitudes)
+    start = {name: case.par.leaves()[name] for name in tunables}
+    tried = None
+    designed = designer.design(tunables, wanted, cases, start, seed=seed, progress=progress)
+    if trial is not None and designed.status == "met":
+        tried = verify(designed.gains, wanted, tunables, cases, trial, seed=seed, progress=progress)
+    judged = None
+    if models is not None:
+        gains = designed.gains if tried is None else tried.final.gains
+        met = judged_over(models.judges, wanted, gains, progress or silent)
+        judged = Probability(models, wanted, met, least)
+    return LoopDesign(case, overrides, wanted, limits, tried, designed, judged)
 
 
 def designed_by_region(
@@ -422,16 +687,16 @@ def designed_by_region(
     overrides = {**overrides, **schedule.changes}
     case = loop_case(name, parameters, "", overrides, side)
     loop = case.loop
-    case, overrides, limits = for_ecu(case, overrides, free_derivative)
+    case, overrides, limits = _for_ecu(case, overrides, free_derivative)
     given = spread(at, loop.at.unit, loop.at.name) if at else []
     points = points_by_region(loop, case.par, given)
     case = replace(case, value=points[schedule.main][0])
     tunables = {
-        region: {n: span for n, span in narrowed(spans, limits).items() if n not in overrides}
+        region: {n: span for n, span in _narrowed(spans, limits).items() if n not in overrides}
         for region, spans in schedule.regions.items()
     }
     ranges = dict(over_range(text, case)[::2] for text in over)
-    trial = None if amplitudes is None else trial_of(case, overrides, amplitudes)
+    trial = None if amplitudes is None else _trial_of(case, overrides, amplitudes)
     tried = None
     designed = design_schedule(
         loop, case.par, wanted, points, tunables, over=ranges, seed=seed, progress=progress

@@ -12,14 +12,13 @@ from bywire.bench.requirements import Limit
 from bywire.core.callers import option
 from bywire.core.parameters import leaf_fields
 from bywire.core.units import shown
-from bywire.report.document import Flat, Listing, TableBlock
+from bywire.report.document import Block, Flat, Listing, TableBlock
 from bywire.report.tables import Cell, Table, amount_cell, text_table
 from bywire.report.wording import amount
 from bywire.synthesis.bench_figures import BenchFigures
-from bywire.synthesis.bench_tuning import Candidate
 from bywire.synthesis.outcome import Across, Design, ScheduleDesign
 from bywire.synthesis.schedules import scheduled
-from bywire.synthesis.verification import Verification
+from bywire.synthesis.verification import Candidate, Verification
 
 Part = str | Table
 """a sentence or a table of a result"""
@@ -103,11 +102,11 @@ def verdict_text(requirements: Sequence[Limit], tried: Verification) -> str:
 
 
 def figure_cell(name: str, value: float) -> Cell:
-    """Return the cell of a figure; see `figure_text`."""
-    return Cell(figure_text(name, value), value=value, unit=LOOP_FIGURES[name].unit)
+    """Return the cell of a figure; see `_figure_text`."""
+    return Cell(_figure_text(name, value), value=value, unit=LOOP_FIGURES[name].unit)
 
 
-def figure_text(name: str, value: float) -> str:
+def _figure_text(name: str, value: float) -> str:
     """Return a figure with its unit; a gain margin as a factor and in dB."""
     text = amount(value, LOOP_FIGURES[name].unit, 3)
     if LOOP_FIGURES[name].in_decibel and math.isfinite(value) and value > 0.0:
@@ -170,7 +169,7 @@ def _reasons(case: LoopCase, tries: Sequence[BenchFigures]) -> list[Part]:
     return [*dict.fromkeys(texts)]
 
 
-def verification_object(case: LoopCase, tried: Verification) -> dict[str, Any]:
+def _verification_object(case: LoopCase, tried: Verification) -> dict[str, Any]:
     """Return the same as plain data."""
     conflict = tried.conflict()
     return {
@@ -238,7 +237,7 @@ def as_object(
         "requirements": [str(requirement) for requirement in requirements],
         "status": design.status,
         "gains": dict(final),
-        "gain_units": {name: unit_of(case, name) for name in final},
+        "gain_units": {name: _unit_of(case, name) for name in final},
         "linear": {
             "gains": dict(design.gains),
             "units": {name: figure.unit for name, figure in LOOP_FIGURES.items()},
@@ -266,7 +265,7 @@ def as_object(
                 for conflict in design.conflicts
             ],
         },
-        "bench": None if tried is None else verification_object(case, tried),
+        "bench": None if tried is None else _verification_object(case, tried),
     }
 
 
@@ -284,10 +283,10 @@ def as_parts(
     ]
     final = design.gains if tried is None else tried.final.gains
     heading = ["gain", "linear design"]
-    rows = [[name, gain_text(case, name, value)] for name, value in design.gains.items()]
+    rows = [[name, _gain_text(case, name, value)] for name, value in design.gains.items()]
     if tried is not None and tried.tuning is not None:
         heading.append("retuned on the bench")
-        rows = [[*row, gain_text(case, row[0], final[row[0]])] for row in rows]
+        rows = [[*row, _gain_text(case, row[0], final[row[0]])] for row in rows]
     parts.append(text_table(heading, rows))
     wanted = {requirement.figure: str(requirement) for requirement in (*requirements, *design.kept)}
     figures = [
@@ -298,13 +297,13 @@ def as_parts(
             design.worst[name][1],
             wanted.get(name, "").removeprefix(name).strip(),
         ]
-        for name in LOOP_FIGURES
+        for name in sorted(LOOP_FIGURES, key=lambda name: name not in wanted)
     ]
-    parts.append(text_table(["linear", "nominal", "worst", "at", "wanted"], figures))
-    parts += kept_lines(design) + unsound_lines(design)
+    parts.append(text_table(["linear model", "nominal", "worst", "at", "limit"], figures))
+    parts += _kept_lines(design) + _unsound_lines(design)
     parts += [
         f"{'binds' if design.binds else 'tightest'}: {binding.requirement}, "
-        f"{figure_text(binding.requirement.figure, binding.value)} at {binding.case}"
+        f"{_figure_text(binding.requirement.figure, binding.value)} at {binding.case}"
         for binding in design.binding
     ]
     parts += [
@@ -317,7 +316,7 @@ def as_parts(
     return parts
 
 
-def kept_lines(design: Design) -> list[str]:
+def _kept_lines(design: Design) -> list[str]:
     """Return what is kept besides the requirements, a sentence or none."""
     if not design.kept:
         return []
@@ -325,7 +324,7 @@ def kept_lines(design: Design) -> list[str]:
     return [f"kept besides: {texts} (require another limit of the same figure to change it)"]
 
 
-def unsound_lines(design: Design) -> list[str]:
+def _unsound_lines(design: Design) -> list[str]:
     """Return which models have no figures, and why, a sentence for each reason."""
     states = dict.fromkeys(design.unsound.values())
     return [
@@ -339,22 +338,35 @@ def limit_lines(case: LoopCase, limits: Mapping[str, tuple[float, float]]) -> li
     if not limits:
         return []
     texts = [
-        f"{name} = {gain_text(case, name, low)}"
+        f"{name} = {_gain_text(case, name, low)}"
         if low == high
-        else f"{name} >= {gain_text(case, name, low)}"
+        else f"{name} >= {_gain_text(case, name, low)}"
         for name, (low, high) in limits.items()
     ]
     return [f"kept for an ECU: {', '.join(texts)} ({option('free_derivative')} does not)"]
 
 
-def unit_of(case: LoopCase, name: str) -> str:
+def _unit_of(case: LoopCase, name: str) -> str:
     """Return the unit of a gain."""
     return leaf_fields(type(case.par))[name].unit.symbol
 
 
-def gain_text(case: LoopCase, name: str, value: float) -> str:
+def _gain_text(case: LoopCase, name: str, value: float) -> str:
     """Return a gain with its unit."""
-    return amount(value, unit_of(case, name))
+    return amount(value, _unit_of(case, name))
+
+
+def brief_blocks(parts: Sequence[Part]) -> list[str | Block]:
+    """Return parts as a terminal shows them: of loop figures, those that have a limit."""
+    blocks: list[str | Block] = []
+    for part in parts:
+        if isinstance(part, str):
+            blocks.append(part)
+            continue
+        is_limited = part.columns[-1].heading == "limit"
+        limited = sum(bool(row[-1].text) for row in part.rows) if is_limited else 0
+        blocks.append(TableBlock(part, most=limited))
+    return blocks
 
 
 def as_blocks(parts: Sequence[Part]) -> list[Flat]:
@@ -404,7 +416,7 @@ def schedule_as_object(
         "requirements": [str(requirement) for requirement in requirements],
         "status": design.status,
         "gains": dict(final),
-        "gain_units": {name: unit_of(case, name) for name in final},
+        "gain_units": {name: _unit_of(case, name) for name in final},
         "regions": {
             region: {
                 "status": regional.status,
@@ -428,7 +440,7 @@ def schedule_as_object(
             "worst": _case(design.worst, at.name),
             "retuned": [_case(across, at.name) for across in retuned],
         },
-        "bench": None if tried is None else verification_object(case, tried),
+        "bench": None if tried is None else _verification_object(case, tried),
     }
 
 
@@ -461,12 +473,12 @@ def schedule_as_parts(
     for region, regional in design.regions.items():
         where = ", ".join(shown(point, at.unit) for point in design.points[region])
         bound = ", ".join(
-            f"{b.requirement} ({figure_text(b.requirement.figure, b.value)})"
+            f"{b.requirement} ({_figure_text(b.requirement.figure, b.value)})"
             for b in regional.binding
         )
         word = "binds" if regional.binds else "tightest"
         parts.append(f"{region}, designed at {where}: {regional.status}; {word}: {bound}")
-        parts += [f"  {line}" for line in kept_lines(regional)]
+        parts += [f"  {line}" for line in _kept_lines(regional)]
         parts += [
             f"  {c.wanted}: at best {amount(c.best, c.wanted.unit, 3)} with {c.kept}"
             for c in regional.conflicts
@@ -507,7 +519,7 @@ def _gains(case: LoopCase, design: ScheduleDesign, gains: Mapping[str, float], t
     for region, spans in regions.items():
         for name in spans:
             if name in gains:
-                cells.setdefault(name.rpartition(".")[2], {})[region] = gain_text(
+                cells.setdefault(name.rpartition(".")[2], {})[region] = _gain_text(
                     case, name, gains[name]
                 )
     rows = [[name, *(row.get(region, "") for region in regions)] for name, row in cells.items()]

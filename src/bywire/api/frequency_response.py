@@ -13,31 +13,29 @@ from numpy.typing import NDArray
 
 from bywire.analysis.margins import NO_LOOP
 from bywire.analysis.response import frequency_response as by_sines
-from bywire.analysis.response.broadband import Broadband, broadband_response
-from bywire.analysis.response.frequency_response import largest, require_stable, with_step_errors
+from bywire.analysis.response.frequency_response import (
+    Broadband,
+    broadband_response,
+    largest,
+    require_stable,
+    with_step_errors,
+)
 from bywire.analysis.response.large_signal import (
     Variant,
     leaving,
+    narrowest,
     variants_over,
     widths,
     with_widths,
 )
 from bywire.analysis.response.sweep import Sweep
-from bywire.api.bandwidth_tables import (
-    NOTE,
-    figures_object,
-    figures_table,
-    over_object,
-    over_table,
-    worst_line,
-)
 from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase
-from bywire.bench.running import Progress
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, of_difference
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields
+from bywire.core.typing import Progress
 from bywire.core.units import shown
 from bywire.report.answer import Answer
 from bywire.report.document import (
@@ -50,8 +48,8 @@ from bywire.report.document import (
     TableBlock,
     recording_file,
 )
-from bywire.report.tables import Table, text_table
-from bywire.report.wording import amount
+from bywire.report.tables import Table, amount_cell, measured_cell, text_table
+from bywire.report.wording import amount, measured_amount
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -214,8 +212,8 @@ class FrequencyResponse(Answer):
         case, response = self.case, self.data
         head = f"closed loop {case.loop.name} of {case.name} at {case.point}"
         if self.range[0]:
-            over = TableBlock(over_table(response, self.variants, self.range, self.unit))
-            worst = worst_line(response, self.variants, self.range, self.unit)
+            over = TableBlock(_over_table(response, self.variants, self.range, self.unit))
+            worst = _worst_line(response, self.variants, self.range, self.unit)
             return [f"{head}: bandwidth (-3 dB) by amplitude", over, worst]
         excitation = response.attrs["excitation"]
         peaks = [f"excitation: {excitation}, amplitudes are its peaks"]
@@ -225,19 +223,19 @@ class FrequencyResponse(Answer):
             table,
             *filter(None, [purity(response), largest(response)]),
             "",
-            TableBlock(figures_table(response, self.unit)),
-            NOTE,
+            TableBlock(_figures_table(response, self.unit)),
+            _NOTE,
         ]
 
     def _bandwidths(self) -> list[Block]:
         """Return what a page says of bandwidths."""
-        note = f"{NOTE[0].upper()}{NOTE[1:]}.{self._first(' Of the first case: ', '.')}"
-        blocks: list[Block] = [TableBlock(figures_table(self.data, self.unit), note)]
+        note = f"{_NOTE[0].upper()}{_NOTE[1:]}.{self._first(' Of the first case: ', '.')}"
+        blocks: list[Block] = [TableBlock(_figures_table(self.data, self.unit), note)]
         if not self.range[0]:
             return blocks
         caption = "Bandwidth over the range; rings: worst cases. All else shows the first case."
         over = TableBlock(
-            over_table(self.data, self.variants, self.range, self.unit), "Bandwidth by amplitude."
+            _over_table(self.data, self.variants, self.range, self.unit), "Bandwidth by amplitude."
         )
         name = f"{self.case.loop.name}-bandwidth"
         return [*blocks, FigureBlock(self._over_range, caption, name), over]
@@ -250,7 +248,7 @@ class FrequencyResponse(Answer):
         return f"{before}{self.range[0]} = {label}{after}"
 
     def _bode(self) -> Figure:
-        from bywire.report.bode import Response, bode
+        from bywire.report.response_figures import Response, bode
 
         response = self.data
         f = response["frequency"].values
@@ -282,10 +280,10 @@ class FrequencyResponse(Answer):
                 "gain": np.abs(self.linear).tolist(),
                 "phase": np.degrees(np.unwrap(np.angle(self.linear))).tolist(),
             },
-            "figures": figures_object(response, 0),
+            "figures": _figures_object(response, 0),
         }
         if self.range[0]:
-            shown |= over_object(response, self.variants, self.range[0])
+            shown |= _over_object(response, self.variants, self.range[0])
         return shown
 
 
@@ -450,3 +448,182 @@ def _measured(
         return response.assign_attrs(excitation=excitation)
     kind = Broadband(cast(Any, excitation))
     return broadband_response(points[0], sweep, kind, progress, points=points)
+
+
+# --- Bandwidths by amplitude, of one case or over a range, as tables and as JSON
+
+_NOTE = (
+    "bandwidth: -3 dB; crossover and margins of the loop gain's describing function; shares "
+    "of the time: the largest of all frequencies"
+)
+
+
+_WIDTHS = ("bandwidth", "crossover", "phase_margin", "gain_margin", "lower_gain_margin")
+
+
+def shares(response: xr.Dataset) -> dict[str, str]:
+    """Return the shares of the time that a response tells, with the titles of their columns."""
+    names = [str(name) for name in response if str(name).startswith("share_")]
+    return {name: _title(name.removeprefix("share_")) for name in names}
+
+
+def _title(flag: str) -> str:
+    """Return a mode's title; ``sat_`` names a limit."""
+    if flag.startswith("sat_"):
+        return f"at {flag.removeprefix('sat_').replace('_', ' ')} limit"
+    return flag.replace("_", " ")
+
+
+def _figures_table(response: xr.Dataset, unit: str) -> Table:
+    """Return bandwidth, crossover, margins and limits of the first variant by amplitude."""
+    known = shares(response)
+    heading = [
+        "amplitude",
+        "bandwidth",
+        "crossover",
+        "phase margin",
+        "gain margin",
+        "lower gain margin",
+        *known.values(),
+    ]
+    rows = []
+    for j, size in enumerate(response["amplitude"].values):
+        case = response.isel(variant=0, amplitude=j)
+        most = [f"{100.0 * float(case[name].max()):.3g} %" for name in known]
+        margin = measured_cell(
+            float(case["phase_margin"]), "deg", _step_error(case, "phase_margin"), 3
+        )
+        factors = [_factor(case, name) for name in ("gain_margin", "lower_gain_margin")]
+        rows.append(
+            [
+                amount_cell(float(size), unit, 3),
+                _frequency(case, "bandwidth"),
+                _frequency(case, "crossover"),
+                margin,
+                *factors,
+                *most,
+            ]
+        )
+    return text_table(heading, rows)
+
+
+def _worst_line(
+    response: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
+) -> str:
+    """Return the worst case of every amplitude over a range as a line; see `_over_table`."""
+    texts = []
+    for j, size in enumerate(response["amplitude"].values):
+        k = narrowest(response, j)
+        width = _frequency(response.isel(variant=k, amplitude=j), "bandwidth")
+        at = f"{range_[0]} = {amount(variants[k].label, range_[1])}"
+        texts.append(f"{width} for {amount(float(size), unit, 3)} at {at}")
+    return f"worst: {'; '.join(texts)}"
+
+
+def _over_table(
+    response: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
+) -> Table:
+    """Return the bandwidths over a range by amplitude.
+
+    Parameters
+    ----------
+    response
+        Response with its widths.
+    variants
+        Cases of the range.
+    range_
+        Name and unit of what is varied.
+    unit
+        Of the amplitudes.
+    """
+    sizes = [amount(float(size), unit, 3) for size in response["amplitude"].values]
+    rows = [
+        [
+            amount_cell(variant.label, range_[1]),
+            *(
+                _frequency(response.isel(variant=k, amplitude=j), "bandwidth")
+                for j in range(len(sizes))
+            ),
+        ]
+        for k, variant in enumerate(variants)
+    ]
+    return text_table([range_[0], *sizes], rows)
+
+
+def _figures_object(response: xr.Dataset, variant: int) -> list[dict[str, Any]]:
+    """Return the figures of a variant by amplitude; null beyond the measured frequencies."""
+    rows = []
+    for j, size in enumerate(response["amplitude"].values):
+        case = response.isel(variant=variant, amplitude=j)
+        row: dict[str, Any] = {"amplitude": float(size)}
+        row |= _bounded(case, "bandwidth") | _bounded(case, "crossover")
+        row |= {
+            name: _or_none(float(case[name]))
+            for name in ("phase_margin", "gain_margin", "lower_gain_margin")
+        }
+        row |= {
+            key: _or_none(float(case[key]))
+            for key in map("{}_step_error".format, _WIDTHS)
+            if key in case
+        }
+        row |= {f"largest_{name}": float(case[name].max()) for name in shares(response)}
+        rows.append(row)
+    return rows
+
+
+def _over_object(response: xr.Dataset, variants: Sequence[Variant], name: str) -> dict[str, Any]:
+    """Return the figures of all cases of a range, and the worst of every amplitude."""
+    cases = [
+        {
+            name: variant.label,
+            "figures": _figures_object(response, k),
+            "gain": _listed(response["gain"].values[k]),
+            "phase": _listed(response["phase"].values[k]),
+        }
+        for k, variant in enumerate(variants)
+    ]
+    worst = []
+    for j, size in enumerate(response["amplitude"].values):
+        k = narrowest(response, j)
+        row = _bounded(response.isel(variant=k, amplitude=j), "bandwidth")
+        worst.append({"amplitude": float(size), **row, name: variants[k].label})
+    return {"over": name, "cases": cases, "worst": worst}
+
+
+def _frequency(case: xr.Dataset, name: str) -> str:
+    value, f = float(case[name]), case["frequency"].values
+    if math.isnan(value):
+        return "-"
+    if math.isinf(value):
+        return f"> {amount(float(f[-1]), 'Hz', 3)}"
+    if value == 0.0:
+        return f"< {amount(float(f[0]), 'Hz', 3)}"
+    return measured_amount(value, "Hz", _step_error(case, name), 3)
+
+
+def _factor(case: xr.Dataset, name: str) -> str:
+    value = float(case[name])
+    return "-" if math.isnan(value) else measured_amount(value, "1", _step_error(case, name), 3)
+
+
+def _step_error(case: xr.Dataset, name: str) -> float:
+    key = f"{name}_step_error"
+    return float(case[key]) if key in case else math.nan
+
+
+def _bounded(case: xr.Dataset, name: str) -> dict[str, float | None]:
+    """Return a frequency, or null with the bound that is known."""
+    value, f = float(case[name]), case["frequency"].values
+    if math.isinf(value):
+        return {name: None, f"{name}_above": float(f[-1])}
+    if value == 0.0:
+        return {name: None, f"{name}_below": float(f[0])}
+    return {name: _or_none(value)}
+
+
+def _or_none(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _listed(values: NDArray[np.float64]) -> list[list[float | None]]:
+    return [[_or_none(value) for value in row] for row in values.tolist()]

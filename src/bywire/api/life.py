@@ -100,9 +100,9 @@ class LifeResult(Answer):
             plan.name,
             plan.life.summary,
             [each.name for each in plan.varied],
-            wear_changes(plan),
+            _wear_changes(plan),
         )
-        kpis, states = TableBlock(kpi_table(self._rows())), TableBlock(self._states(), width=110)
+        kpis, states = TableBlock(kpi_table(self._rows())), TableBlock(self._states())
         warned = [Listing([f"Warning: {text}." for text in self.warnings])] if self.warnings else []
         wear = Details(
             "Parameters of wear",
@@ -242,7 +242,7 @@ _CAPTION = (
 )
 
 
-def wear_changes(plan: LifePlan) -> tuple[Change, ...]:
+def _wear_changes(plan: LifePlan) -> tuple[Change, ...]:
     """Return what a life file sets of wear, of the conditions of stops, and of the projection."""
     life, wear = plan.life, plan.life.defaults()
     origins = {name: ", ".join(filter(None, (c.kind, c.where))) for name, c in life.values.items()}

@@ -9,8 +9,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from bywire.analysis.linear.corners import CornerError
-from bywire.analysis.loop_curves import Family, loop_curve
-from bywire.analysis.margins import MARGINS, NO_LOOP, LoopMargins, figures_at, margins_of, worst
+from bywire.analysis.margins import (
+    MARGINS,
+    NO_LOOP,
+    Family,
+    LoopMargins,
+    figures_at,
+    loop_curve,
+    margins_of,
+    worst,
+)
 from bywire.api.linear_texts import corner_notes
 from bywire.api.loop_case import LoopCase
 from bywire.core.parameters import ParameterSet
@@ -18,6 +26,7 @@ from bywire.report.answer import Answer
 from bywire.report.document import (
     Banner,
     Block,
+    Details,
     Document,
     FigureBlock,
     Listing,
@@ -117,7 +126,7 @@ class Margins(Answer):
                 Section("Figures", figures),
                 provenance,
             ],
-            brief=[head, table, *none, *worst_line, Paragraph(LEGEND)],
+            brief=[head, table, *none, *worst_line, Details("", [Paragraph(LEGEND)])],
             data=self._data(),
             banner=self._banner(),
             changes=self.case.subject.changes,

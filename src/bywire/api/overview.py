@@ -17,26 +17,6 @@ from bywire.report.answering import answering
 from bywire.report.document import Document, Section, TableBlock
 from bywire.report.tables import Table, text_table
 
-TOPICS = (
-    "brakes",
-    "assemblies",
-    "parameter_sets",
-    "experiments",
-    "generic_experiments",
-    "elements",
-    "loops",
-    "plants",
-    "studies",
-    "lives",
-    "methods",
-    "stimuli",
-    "faults",
-    "campaigns",
-    "residuals",
-    "kpis",
-    "kpis_of_experiments",
-)
-"""kinds of things that have a name"""
 _WIDTH = 80  # characters of a line of the index
 _NAME = 21  # columns of a topic
 _HINT = (
@@ -79,7 +59,7 @@ class Overview(Answer):
             "What there is",
             _HINT.replace("\n", " "),
             sections=[Section(title, [TableBlock(table)]) for title, table in tables.items()],
-            brief=[brief[0], TableBlock(brief[1], width=0)] if brief else [self._index()],
+            brief=[brief[0], TableBlock(brief[1])] if brief else [self._index()],
             data=shown,
             has_files=False,
         )
@@ -119,13 +99,13 @@ def overview(topic: str = "") -> Overview:
     things, doubts = _things()
     chosen = _plain(topic)
     if topic and chosen not in things:
-        raise unknown_name("topic", topic, TOPICS)
+        raise unknown_name("topic", topic, things)
     return Overview(things, chosen, tuple(doubts))
 
 
 def is_topic(name: str) -> bool:
     """Return whether a name is one of the kinds that `overview` opens."""
-    return _plain(name) in TOPICS
+    return _plain(name) in _things()[0]
 
 
 def _plain(topic: str) -> str:
@@ -134,7 +114,7 @@ def _plain(topic: str) -> str:
 
 def _things() -> tuple[Mapping[str, Any], list[str]]:
     """Return what there is, and what is doubtful of it."""
-    from bywire.simulation.kernel_cache import keep_text, usable_folder
+    from bywire.simulation.compiler import keep_text, usable_folder
 
     names = hashlib.sha256(" ".join(brakes()).encode()).hexdigest()[:8]
     index: Path | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from bywire.bench.relative_changes import settled
+from bywire.bench.changes import settled
 from bywire.core.catalog import PARAMETER_SETS, CitedSet, main_set
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet

@@ -91,7 +91,7 @@ class Replay(Answer):
         """Return how well it fits, stretch by stretch, with figures and tracked parameters."""
         bench, inputs = self.bench, ", ".join(map(str, self.replayed.inputs.data_vars))
         subject = Subject.of_bench(bench)
-        table = TableBlock(fit_table(self.fits), width=110)
+        table = TableBlock(_fit_table(self.fits))
         definitions = [f"{k.name}: {k.definition}" for k in self.fits[0].kpis] if self.fits else []
         head = f"{self.source} drives {bench.experiment} of {bench.parameters} by {inputs}"
         return Document(
@@ -115,7 +115,7 @@ class Replay(Answer):
         )
 
     def _figures(self) -> list[FigureBlock]:
-        from bywire.report.replay_figures import replay_figure
+        from bywire.report.estimate_figures import replay_figure
 
         return [
             FigureBlock(
@@ -134,7 +134,7 @@ class Replay(Answer):
         ]
 
     def _track_figures(self) -> list[FigureBlock]:
-        from bywire.report.replay_figures import track_figure
+        from bywire.report.estimate_figures import track_figure
 
         known = self.replayed.run.par.leaves()
         return [
@@ -215,7 +215,7 @@ class Replay(Answer):
         return write_recording(self.recording, path)
 
 
-def fit_table(fits: Sequence[SegmentFit]) -> Table:
+def _fit_table(fits: Sequence[SegmentFit]) -> Table:
     """Return the figures of every signal and stretch, with the tolerances that are missed."""
     rows = []
     for fit in fits:

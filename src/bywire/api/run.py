@@ -1,10 +1,11 @@
-"""A bench, run and judged: recordings, key figures, verdicts, books of energy."""
+"""A bench, run and judged: recordings, key figures, verdicts, energy balances."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bywire.api.run_sections import (
@@ -15,18 +16,23 @@ from bywire.api.run_sections import (
     schematic_section,
     source_says,
 )
+from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
 from bywire.bench.faults.fault_section import from_text
 from bywire.bench.requirements import Verdict
-from bywire.bench.result import Result
 from bywire.bench.result_folder import kpi_record, verdict_record
+from bywire.bench.running import Result
 from bywire.bench.stated import stated_figures
+from bywire.core.errors import ParameterError
+from bywire.core.typing import Progress
+from bywire.report.animation.scene import SCENES
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Attachment,
     Banner,
     Block,
+    Details,
     Document,
     FigureBlock,
     Listing,
@@ -42,6 +48,60 @@ from bywire.report.wording import amount, measured_amount
 
 if TYPE_CHECKING:
     from bywire.report.bench_figures import Shown
+
+
+def require_scene(bench: Bench, over: str = "") -> None:
+    """Refuse benches whose runs cannot be played.
+
+    Raises
+    ------
+    ParameterError
+        When the bench's assembly declares no animation, or a range of values is run.
+    """
+    assembly, known = bench.definition.assembly, SCENES.all()
+    if assembly not in known:
+        raise ParameterError(
+            f"{bench.experiment}: runs of {assembly} have no animation, those of "
+            f"{' and '.join(known)} have: leave animate out, or declare a SceneKind in a module "
+            "'animations' of the brake"
+        )
+    if over:
+        raise ParameterError("an animation shows single runs: leave either animate or over out")
+
+
+def _playable(result: Result) -> list[str]:
+    """Return the labels of the runs that an animation can show."""
+    place = SCENES.find(result.bench.definition.assembly).place
+    return [label for label, run in result.recordings.items() if place in run]
+
+
+def animations(result: Result) -> list[Attachment]:
+    """Return a page for each run of a result, as files of its folder."""
+    from bywire.report.animation.page import scene_page
+    from bywire.report.drawing import write_bytes
+
+    labels, draw = _playable(result), SCENES.find(result.bench.definition.assembly).draw
+    several = len(labels) > 1
+    title = result.bench.name or result.bench.experiment
+
+    def page(label: str) -> Attachment:
+        def write(path: Path) -> Path:
+            heading = f"{title}, {label}" if several else title
+            text = scene_page(draw(result.recordings[label]), heading, _SAID)
+            return write_bytes(path, text.encode())
+
+        return Attachment(f"animation-{label}.html" if several else "animation.html", write)
+
+    return [page(label) for label in labels]
+
+
+_SAID = (
+    "Where a tyre slides it marks the road; where its wheel stands the mark is black. Arrows are "
+    "braking forces, as long as a meter where they are as large as the weight."
+)
+
+
+# --- The result
 
 _SCATTERED = (
     'Errors "up to" belong to figures that do not converge: over double, single and half steps, '
@@ -107,7 +167,6 @@ class BenchResult(Result, Answer):
         """Return verdict and changes, figures, key figures, energy, and how it was made."""
         bench = self.bench
         table = TableBlock(kpi_table(self.rows))
-        narrow = TableBlock(kpi_table([replace(row, where="") for row in self.rows]))
         said = [*remarks(self), *self._unplayed()]
         notes: list[Block] = [Paragraph(f"Warning: {text}.") for text in self.warnings]
         notes += [Listing(said)] if said else []
@@ -124,8 +183,9 @@ class BenchResult(Result, Answer):
             ],
             brief=[
                 *([Listing(said)] if said else []),
-                *([narrow] if self.kpis else []),
-                *self._scatter(),
+                *([table] if self.kpis else []),
+                *self._undefined(),
+                Details("", self._scatter()),
             ],
             data={**self._data(), "remarks": said},
             banner=self._banner(),
@@ -140,6 +200,15 @@ class BenchResult(Result, Answer):
             changes=bench_changes(bench),
         )
 
+    def _undefined(self) -> list[Listing]:
+        """Return why key figures are not defined, each reason once."""
+        named: dict[str, list[str]] = {}
+        for kpi in self.kpis:
+            if not math.isfinite(kpi.value) and kpi.note:
+                named.setdefault(kpi.note, []).append(kpi.name)
+        texts = [f"{', '.join(names)}: {note}" for note, names in named.items()]
+        return [Listing(texts, "Not defined:")] if texts else []
+
     def _scatter(self) -> list[Paragraph]:
         """Return what the errors of figures that do not converge are; nothing without any."""
         if all(kpi.converges for kpi in self.kpis):
@@ -149,8 +218,6 @@ class BenchResult(Result, Answer):
     def _animations(self) -> list[Attachment]:
         if not self.animated or self.status == "interrupted":
             return []
-        from bywire.api.animation import animations
-
         return animations(self)
 
     def _unplayed(self) -> list[str]:
@@ -184,7 +251,7 @@ class BenchResult(Result, Answer):
 
     def _banner(self) -> Banner:
         if not self.verdicts:
-            return Banner("done")
+            return Banner("done, no requirement is stated")
         met = sum(v.met for v in self.verdicts)
         text = f"{met} of {len(self.verdicts)} requirements met"
         if open_ := sum(not v.is_decided for v in self.verdicts):
@@ -209,6 +276,29 @@ class BenchResult(Result, Answer):
             "step_errors": self._step_errors(),
             "warnings": self.warnings,
         }
+
+
+def run_once(
+    bench: Bench, progress: Progress | None, engine: str, estimate_error: bool, animated: bool
+) -> BenchResult:
+    """Return what a bench gives; see `bywire.run`."""
+    result = running.run(bench, progress, engine, estimate_error)
+    return BenchResult(
+        **{each.name: getattr(result, each.name) for each in fields(result)}, animated=animated
+    )
+
+
+def bench_of(bench: Bench | str | Path, overrides: Mapping[str, str]) -> Bench:
+    """Return a bench, a bench file's or an experiment's, changed as ``--set`` takes it.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, or a change does not fit.
+    """
+    if not isinstance(bench, Bench):
+        return bench_file.read(bench, overrides)
+    return bench.with_overrides(overrides) if overrides else bench
 
 
 def faulty(bench: Bench, faults: Sequence[str]) -> Bench:

@@ -1,32 +1,94 @@
-"""A campaign of faults, run and judged: what each one does, when it is seen, what is covered."""
+"""A campaign of faults, run and judged: what each one does, which monitor detects it, coverage."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
 from bywire.api.run_sections import varied_texts
-from bywire.campaigns.findings import CampaignFindings, FaultFinding
 from bywire.campaigns.residual import NEVER
+from bywire.campaigns.running import CampaignFindings, FaultFinding
 from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, display_factor
 from bywire.report.answer import Answer
-from bywire.report.document import Banner, Document, FigureBlock, Listing, Section, TableBlock
-from bywire.report.record import Quantity, record_data, record_table
+from bywire.report.document import (
+    Banner,
+    Details,
+    Document,
+    FigureBlock,
+    Listing,
+    Section,
+    TableBlock,
+)
 from bywire.report.subject import Subject
-from bywire.report.tables import Cell, Table, amount_cell, text_table
-from bywire.report.wording import amount
+from bywire.report.tables import Cell, Column, Table, amount_cell, text_table
+from bywire.report.wording import amount, clean
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class Quantity(Generic[R]):
+    """A quantity of every row.
+
+    Parameters
+    ----------
+    value
+        What it is of a row: what JSON holds.
+    key
+        Its name in JSON; empty where that does not have it.
+    heading
+        Of its column; empty where tables do not show it.
+    unit
+        SI unit of a number, ``"1"`` of a pure one; empty of anything else.
+    text
+        How a row shows it; by default a number with its unit, or the text itself.
+    number
+        What frames hold where that is neither the value nor the text, in the same unit.
+    """
+
+    value: Callable[[R], Any]
+    key: str = ""
+    heading: str = ""
+    unit: str = ""
+    text: Callable[[R], str] | None = None
+    number: Callable[[R], float] | None = None
+
+    def cell(self, row: R) -> Cell:
+        """Return the cell of a row."""
+        if not self.unit:
+            text = str(self.value(row) or "") if self.text is None else self.text(row)
+            return Cell(clean(text) or "-")
+        number = (self.number or self.value)(row)
+        if self.text is None:
+            return amount_cell(number, self.unit)
+        return Cell(clean(self.text(row)), "none", number, self.unit)
+
+
+def record_table(rows: Iterable[R], columns: Sequence[Quantity[R]]) -> Table:
+    """Return the table of rows, with the columns of those quantities that have a heading."""
+    shown = [each for each in columns if each.heading]
+    cells = tuple(tuple(each.cell(row) for each in shown) for row in rows)
+    return Table(tuple(Column(each.heading) for each in shown), cells)
+
+
+def record_data(row: R, quantities: Iterable[Quantity[R]]) -> dict[str, Any]:
+    """Return the JSON object of a row."""
+    return {each.key: each.value(row) for each in quantities if each.key}
+
+
+# --- The campaign
 
 _CLASSES = ((0.99, "high"), (0.90, "medium"), (0.60, "low"))
 """diagnostic coverage: ISO 26262-5:2018, annex D"""
@@ -41,6 +103,12 @@ _COLUMNS = (
     "severity",
     "with reaction",
 )
+
+_SHORT = ("fault", "class", "severity", "violates", "within", "seen within", "with reaction")
+"""columns of a terminal"""
+_RANK = ("undetected", "too late", "covered", "latent", "harmless, seen")
+"""classes of faults, the most dangerous first"""
+_MOST = 12
 
 
 @dataclass(frozen=True, repr=False)
@@ -95,8 +163,9 @@ class FaultCampaign(Answer):
         """Return the table of faults, coverage, and when each is too much and seen."""
         plan, bench, findings = self.findings.plan, self.findings.plan.bench, self.findings
         subject = Subject.of_bench(bench, plan.name, varied=[each.name for each in plan.varied])
-        table = TableBlock(self._table(), width=0)
-        residuals = TableBlock(self._residual_table(), width=120)
+        table = TableBlock(self._table())
+        residuals = TableBlock(self._residual_table())
+        uncovered = sum(f.kind in _RANK[:2] for f in findings.faults)
         kinds = ", ".join(f"{n} {kind}" for kind, n in findings.kinds().most_common())
         known = Listing([kinds, *varied_texts(plan.varied), *self.notes])
         return Document(
@@ -110,7 +179,11 @@ class FaultCampaign(Answer):
                 Section("Criteria", [TableBlock(self._criteria_table())]),
                 subject.provenance("" if self.folder is None else f"Outcomes: {self.folder}."),
             ],
-            brief=[table, "", residuals, "", known],
+            brief=[
+                TableBlock(self._worst_first(), most=max(_MOST, uncovered)),
+                f"{len(plan.faults)} faults: {kinds}",
+                Details("", [table, residuals, known]),
+            ],
             data=self._data(),
             banner=self._banner(),
             record="report.json",
@@ -123,7 +196,7 @@ class FaultCampaign(Answer):
         text = (
             "no fault is dangerous in this maneuver"
             if math.isnan(coverage)
-            else f"diagnostic coverage {100 * coverage:.3g} % ({coverage_class(coverage)})"
+            else f"diagnostic coverage {100 * coverage:.3g} % ({_coverage_class(coverage)})"
         )
         return Banner(_sentences([*harm, text]) if harm else text, "bad" if harm else "none")
 
@@ -173,6 +246,15 @@ class FaultCampaign(Answer):
     def _table(self) -> Table:
         columns = [self._quantities[name] for name in _COLUMNS if name in self._quantities]
         return record_table(self.findings.faults, columns)
+
+    def _worst_first(self) -> Table:
+        """Return what a terminal shows of each fault, beginning with the most dangerous."""
+        ranked = sorted(
+            self.findings.faults,
+            key=lambda f: (_RANK.index(f.kind), f.tolerance if f.dangerous else math.inf),
+        )
+        columns = [self._quantities[name] for name in _SHORT if name in self._quantities]
+        return record_table(ranked, columns)
 
     def _off_healthy(self, each: FaultFinding) -> str:
         signals = signals_of(self.findings.plan.case(0).model.Output)
@@ -257,7 +339,7 @@ class FaultCampaign(Answer):
             "folder": None if self.folder is None else str(self.folder),
             "runs": plan.total,
             "coverage": findings.coverage,
-            "coverage_class": coverage_class(findings.coverage),
+            "coverage_class": _coverage_class(findings.coverage),
             "weighted": findings.is_weighted,
             "dangerous_runs": cases.cases,
             "seen_in_time": cases.count,
@@ -279,7 +361,7 @@ def _sentences(texts: Sequence[str]) -> str:
     return " ".join(f"{text[:1].upper()}{text[1:]}." for text in texts)
 
 
-def coverage_class(coverage: float) -> str:
+def _coverage_class(coverage: float) -> str:
     """Return the class of a diagnostic coverage.
 
     Examples

@@ -17,12 +17,11 @@ from bywire.bench.bench import Bench
 from bywire.bench.ensemble import changed, run_benches, varied_leaf
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
-from bywire.bench.result import Result
 from bywire.bench.result_folder import kpi_record, verdict_record
-from bywire.bench.running import Progress
+from bywire.bench.running import Result
 from bywire.bench.step_error import are_distinct
 from bywire.core.errors import ParameterError
-from bywire.core.typing import Array
+from bywire.core.typing import Array, Progress
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Attachment,
@@ -111,7 +110,7 @@ class BenchRange(Answer):
         title = bench.name or bench.experiment
         subject = Subject.of_bench(bench, varied=[self.name])
         pieces = [kpis[k : k + _COLUMNS] for k in range(0, len(kpis), _COLUMNS)]
-        tables = [TableBlock(self._table(piece), width=110) for piece in pieces]
+        tables = [TableBlock(self._table(piece)) for piece in pieces]
         judged = list(self._judged())
         listing = [Listing([text for _, text in judged], "Requirements:")] if judged else []
         listing += [Listing(said)] if (said := self._indistinct()) else []
@@ -235,8 +234,8 @@ class BenchRange(Answer):
         return Banner(text, "good" if self.holds else "bad" if "failed" in statuses else "open")
 
     def _figures(self) -> list[Block]:
-        from bywire.report.kpi_curves import kpi_curves
-        from bywire.report.overlaid import can_overlay
+        from bywire.report.range_figures import kpi_curves
+        from bywire.report.time_traces import can_overlay
 
         captions = {
             "curves": "The values on top of each other, in the color that the scale shows.",
@@ -257,8 +256,8 @@ class BenchRange(Answer):
         return blocks
 
     def _drawn(self, label: str, recordings: Sequence[xr.Dataset]) -> Figure:
-        from bywire.report.overlaid import Scale, overlaid_panels
         from bywire.report.step_response import step_limits
+        from bywire.report.time_traces import Scale, overlaid_panels
 
         steps = [
             step_limits(r.bench.definition, r.bench.chosen_options, r.verdicts)

@@ -10,8 +10,8 @@ from typing import Any
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger
 from bywire.bench.experiment import Recordings
-from bywire.bench.kpis.registry import FAMILIES
-from bywire.bench.result import Result
+from bywire.bench.kpis.families import FAMILIES
+from bywire.bench.running import Result
 from bywire.bench.stated import stated_for
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES
@@ -118,7 +118,7 @@ def _set_point(result: Result) -> list[str]:
 
 # --- Sections
 
-RECORDED = ("bywire_version", "parameter_hash", "step", "engine", "status", "seed")
+_RECORDED = ("bywire_version", "parameter_hash", "step", "engine", "status", "seed")
 """attributes of a recording that say how it was made"""
 
 
@@ -133,7 +133,7 @@ def outcome(result: Result, rows: Sequence[KpiRow], notes: Sequence[Block]) -> S
     return Section("Outcome", [*blocks, Subject.of_bench(result.bench).changes_block, *notes])
 
 
-def options_in_use(bench: Bench) -> Details:
+def _options_in_use(bench: Bench) -> Details:
     """Return all options of a bench's experiment, folded."""
     table = parameter_table(parameter_rows(bench.chosen_options))
     return Details("Options of the experiment", [TableBlock(table)])
@@ -184,7 +184,7 @@ def how_it_was_made(
     """
     bench, cited = result.bench, PARAMETER_SETS.find(result.bench.parameters)
     attrs = next(iter(result.recordings.values())).attrs if result.recordings else {}
-    kept = "; ".join(f"{key} {attrs[key]}" for key in RECORDED if key in attrs)
+    kept = "; ".join(f"{key} {attrs[key]}" for key in _RECORDED if key in attrs)
     parameters = parameter_table(parameter_rows(bench.par, cited.values))
     return Section(
         "How it was made",
@@ -192,7 +192,7 @@ def how_it_was_made(
             Paragraph(f"Source of the parameters: {cited.source}."),
             Paragraph(f"{kept}."),
             *_signal_errors(errors),
-            options_in_use(bench),
+            _options_in_use(bench),
             Details("All parameters", [TableBlock(parameters)]),
         ],
     )
@@ -239,9 +239,12 @@ def tested_line(plan: StudyPlan) -> str:
     return f"{line}, with the fault{'s' * (len(names) > 1)} {', '.join(names)}"
 
 
-def tested_brief(nominal: Result, plan: StudyPlan) -> list[Listing]:
+def tested_brief(nominal: Result, plan: StudyPlan) -> list[Block]:
     """Return for a terminal the faults, if there are any, and what varies."""
-    return [Listing([*fault_texts(nominal.bench, nominal.recordings), *varied_texts(plan.varied)])]
+    names = ", ".join(each.name for each in plan.varied)
+    faults = fault_texts(nominal.bench, nominal.recordings)
+    listed = Listing([*faults, *([f"varied: {names}"] if names else [])])
+    return [listed, Details("", [Listing(varied_texts(plan.varied))])]
 
 
 def varied_texts(varied: Sequence[Varied]) -> list[str]:
@@ -264,7 +267,7 @@ def tested_section(nominal: Result, source: StudiedBench | None, subject: Subjec
     faults = fault_texts(nominal.bench, nominal.recordings)
     blocks: list[Block] = [Paragraph(f"{_source_text(source)}.")] if source is not None else []
     blocks += [Listing(faults)] if faults else []
-    blocks += [subject.changes_block, options_in_use(nominal.bench)]
+    blocks += [subject.changes_block, _options_in_use(nominal.bench)]
     return Section("What was tested", blocks)
 
 

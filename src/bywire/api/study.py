@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.api.parameter_choice import set_for
-from bywire.bench.relative_changes import settled
+from bywire.bench.changes import settled
 from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.values import parsed
@@ -33,8 +33,6 @@ from bywire.synthesis.study import STUDIES, Cut, Findings, Map, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_WIDTH = 140  # characters of a line of a table of designs
 
 
 @dataclass(frozen=True)
@@ -76,7 +74,7 @@ class StudyResult(Answer):
             further=value_changes(self.options, defaults, defaults_of(study.name)),
         )
         kpis = TableBlock(kpi_table(self._rows()))
-        tables = [TableBlock(cut_table(cut), f"{cut.title}.", _WIDTH) for cut in findings.cuts]
+        tables = [TableBlock(_cut_table(cut), f"{cut.title}.") for cut in findings.cuts]
         maps = [
             FigureBlock(
                 partial(_drawn, findings.data, shown), shown.caption, f"{study.name}-{kind}"
@@ -193,7 +191,7 @@ def _changed(
     )
 
 
-def cut_table(cut: Cut) -> Table:
+def _cut_table(cut: Cut) -> Table:
     """Return a cut of a study's designs as a table in display units."""
     heading: list[str] = []
     columns: list[list[object]] = []
@@ -210,6 +208,6 @@ def cut_table(cut: Cut) -> Table:
 
 
 def _drawn(data: xr.Dataset, shown: Map) -> Figure:
-    from bywire.report.contour import contour
+    from bywire.report.range_figures import contour
 
     return contour(data, shown)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bywire.api.study_rare import rare_figures, sensitivity_figures
 from bywire.api.study_tables import moving_effects, shown_figures, strongest
 from bywire.report.document import Block, FigureBlock
 from bywire.report.study.drawn_cases import LINES, POINTS, DrawnCases, drawn_cases
-from bywire.studies.findings import Findings, Judgment
+from bywire.studies.findings import Effect, Findings, Judgment
 from bywire.studies.plan import CHUNK
+from bywire.studies.sought_cases import RareFailure
 from bywire.studies.statistics import running_share
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bywire.report.study.cases import CaseAxis
-    from bywire.studies.findings import Effect, Judgment
+    from bywire.report.study.probabilities import Curve
 
 _DRIVERS = 3  # quantities that a key figure is drawn over
 _AXES = 9  # of parallel coordinates
@@ -108,7 +108,7 @@ def _scatter(findings: Findings, name: str, cases: DrawnCases) -> Figure:
     from bywire.report.study.cases import scatter
 
     drivers = [_axis(findings, each) for each in findings.drivers(name)[:_DRIVERS]]
-    limit = bound_of(findings, name)
+    limit = _bound_of(findings, name)
     assert limit is not None
     return scatter(_axis(findings, name), drivers, limit, cases)
 
@@ -121,11 +121,11 @@ def _parallel(findings: Findings, cases: DrawnCases) -> Figure:
     varied = [v.name for v in findings.plan.varied]
     names = list(dict.fromkeys([*ranked, *varied]))[: max(_AXES - len(figures), 2)]
     axes = [_axis(findings, name) for name in (*names, *figures)]
-    limits = {name: limit for name in figures if (limit := bound_of(findings, name)) is not None}
+    limits = {name: limit for name in figures if (limit := _bound_of(findings, name)) is not None}
     return parallel_coordinates(axes, cases, limits)
 
 
-def bound_of(findings: Findings, name: str) -> float | None:
+def _bound_of(findings: Findings, name: str) -> float | None:
     """Return the limit of a key figure in its unit; None where nothing is required of it."""
     return next((each.bound for each in findings.plan.demands if each.figure == name), None)
 
@@ -135,16 +135,16 @@ def bound_of(findings: Findings, name: str) -> float | None:
 _PANELS = 4  # requirements whose convergence is drawn
 _SHARES = 100  # points of a convergence, spaced by equal ratios
 
-Recordings = Callable[[], Mapping[str, Mapping[str, "xr.Dataset"]]]
+_Recordings = Callable[[], Mapping[str, Mapping[str, "xr.Dataset"]]]
 
 
 def load_drawing() -> None:
     """Load what draws the figures of a study and writes its report, ahead of its findings."""
     from bywire.data import netcdf  # noqa: F401
-    from bywire.report import overlaid, page  # noqa: F401
+    from bywire.report import page, time_traces  # noqa: F401
 
 
-def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
+def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
     """Return the figures of a study; none where no case has a result.
 
     Parameters
@@ -157,7 +157,7 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
     if not findings.spreads:
         return []
     if findings.rare:
-        return [*rare_figures(findings), *scatters(findings), *_overlays(findings, recordings)]
+        return [*_rare_figures(findings), *scatters(findings), *_overlays(findings, recordings)]
     band = (
         "; the shaded band holds 90 % of them."
         if findings.plan.is_sampled
@@ -195,7 +195,7 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
             )
         )
     if findings.plan.sensitivity is not None:
-        blocks += sensitivity_figures(findings)
+        blocks += _sensitivity_figures(findings)
     # Trajectories stand on a few levels: their points would be stripes.
     blocks += scatters(findings) if findings.plan.design != "morris" else []
     if findings.judgments and findings.plan.is_sampled:
@@ -238,7 +238,7 @@ def _histograms(findings: Findings) -> Figure:
     return histograms(
         {
             each.name: Spread(
-                findings.figure(each.name), each.unit, each.nominal, bound_of(findings, each.name)
+                findings.figure(each.name), each.unit, each.nominal, _bound_of(findings, each.name)
             )
             for each in findings.spreads
             if each.largest > each.least
@@ -261,7 +261,7 @@ def _influences(findings: Findings) -> Figure:
 def _tornado(findings: Findings, effects: Mapping[str, Sequence[Effect]]) -> Figure:
     from bywire.report.study.influences import tornado
 
-    limits = {name: limit for name in effects if (limit := bound_of(findings, name)) is not None}
+    limits = {name: limit for name in effects if (limit := _bound_of(findings, name)) is not None}
     return tornado(effects, findings.units, limits)
 
 
@@ -288,7 +288,7 @@ def _on_others(findings: Findings) -> str:
     return f" Not drawn: {'; '.join(others)}." if others else ""
 
 
-def _overlays(findings: Findings, recordings: Recordings) -> list[Block]:
+def _overlays(findings: Findings, recordings: _Recordings) -> list[Block]:
     which = "most probable failing" if findings.rare else "worst"
     return [
         FigureBlock(
@@ -303,7 +303,7 @@ def _overlays(findings: Findings, recordings: Recordings) -> list[Block]:
 
 
 def _overlaid(each: Mapping[str, xr.Dataset]) -> Figure:
-    from bywire.report.overlaid import overlaid_panels
+    from bywire.report.time_traces import overlaid_panels
 
     return overlaid_panels(_alike_once(each))
 
@@ -318,3 +318,71 @@ def _alike_once(each: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
         else:  # in its place: colors are given in order
             once = {f"{k}, {label}" if k == same else k: other for k, other in once.items()}
     return once
+
+
+# --- Rare failures and indices of sensitivity
+
+_POINTS = 200  # of a curve
+_CAPTIONS = {
+    "sobol-indices": "Shares of the variance of each key figure that a quantity makes, alone and "
+    "with all others, with their intervals. Pale: not distinct from none.",
+    "morris": "Mean size (with its interval) and standard deviation of the elementary effects of "
+    "each quantity. Pale: not distinct from none.",
+}
+
+
+def _rare_figures(findings: Findings) -> list[FigureBlock]:
+    """Return the figure of probabilities over the limit; none where nothing was found."""
+    if not any(each.failure.span for each in findings.rare):
+        return []
+    return [
+        FigureBlock(
+            partial(_curves, findings),
+            "Probability that a key figure comes worse than a value, with its interval. Dotted, "
+            "the limit and the probability that is admitted.",
+            "exceedance",
+        )
+    ]
+
+
+def _curves(findings: Findings) -> Figure:
+    from bywire.report.study.probabilities import exceedance
+
+    return exceedance([_curve(each) for each in findings.rare if each.failure.span])
+
+
+def _curve(each: RareFailure) -> Curve:
+    from bywire.report.study.probabilities import Curve
+
+    demand = each.demand
+    assert each.failure.span is not None
+    assert demand.probability is not None
+    margins = np.linspace(*each.failure.span, _POINTS)
+    intervals = [each.failure.below(float(margin)) for margin in margins]
+    return Curve(
+        demand.figure,
+        demand.unit,
+        demand.bound,
+        1.0 - demand.probability,
+        demand.bound + (-1.0 if demand.is_upper else 1.0) * margins,
+        np.array([interval.value for interval in intervals]),
+        np.array([interval.low for interval in intervals]),
+        np.array([interval.high for interval in intervals]),
+    )
+
+
+def _sensitivity_figures(findings: Findings) -> list[FigureBlock]:
+    """Return the figure of all indices; none where there are none."""
+    drivers = [findings.sensitivity(name).drivers for name in shown_figures(findings)]
+    if not any(drivers):
+        return []
+    caption = _CAPTIONS[findings.plan.design] + strongest(drivers)
+    return [FigureBlock(partial(_bars, findings), caption, "sensitivity")]
+
+
+def _bars(findings: Findings) -> Figure:
+    from bywire.report.study.influences import sensitivity_bars
+
+    each = {name: findings.sensitivity(name).drivers for name in shown_figures(findings)}
+    each = {name: found for name, found in each.items() if found}
+    return sensitivity_bars(each, findings.units, {name: findings.size(name) for name in each})

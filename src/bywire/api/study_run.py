@@ -1,57 +1,204 @@
-"""What a study found, as it is shown: verdicts, spread, remarks, what drives it, worst cases."""
+"""A study of many cases: computed or kept, judged, and shown with its worst cases.
+
+In a study of rare failures, the most probable failing one.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bywire.api.run_sections import tested_brief, tested_data, tested_line, tested_section
-from bywire.api.study_cases import ShownCases
-from bywire.api.study_figures import study_figures
-from bywire.api.study_rare import (
+from bywire.api.study_figures import load_drawing, study_figures
+from bywire.api.study_tables import (
+    correlated,
+    demand_table,
     drivers_data,
+    effect_tables,
     failure_table,
+    figure_text,
     importance_tables,
+    influence_tables,
     missing_indices,
     rare_data,
     rare_notes,
     search_notes,
     sensitivity_tables,
-    state_texts,
-)
-from bywire.api.study_tables import (
-    correlated,
-    demand_table,
-    effect_tables,
-    influence_tables,
     shown_figures,
     spread_blocks,
+    state_texts,
     unmoved,
     varied_table,
 )
+from bywire.bench import running
 from bywire.bench.bench import Bench
-from bywire.bench.result import Result
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.bench.bench_file import bench_text
+from bywire.bench.requirements import status_of
+from bywire.bench.running import Result
+from bywire.core.brake import loaded_files
+from bywire.core.callers import is_command_line
+from bywire.core.errors import FileError, InputError, ParameterError, unknown_name
+from bywire.core.field_notes import field_notes
+from bywire.core.typing import Progress, silent
 from bywire.core.units import shown
 from bywire.report.answer import Answer
-from bywire.report.document import Banner, Block, Document, Listing, Section, TableBlock, spaced
+from bywire.report.document import (
+    Attachment,
+    Banner,
+    Block,
+    Document,
+    Listing,
+    Section,
+    TableBlock,
+    recording_file,
+    spaced,
+)
 from bywire.report.subject import Subject
-from bywire.studies.designs import WORST
+from bywire.report.wording import amount
+from bywire.studies.designs import SPANNED, WORST
 from bywire.studies.findings import Findings, Judgment
 from bywire.studies.plan import CHUNK, StudyPlan
+from bywire.studies.running import complete
 from bywire.studies.sensitivity import VarianceShares
+from bywire.studies.sought_cases import rare_failures, worst_cases
 from bywire.studies.statistics import Spread
-from bywire.studies.store import StudyStore
+from bywire.studies.store import Origin, StudyStore, case_bench
+from bywire.studies.study_file import read_study
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+
+@dataclass(frozen=True)
+class ShownCases:
+    """One case of each requirement.
+
+    Parameters
+    ----------
+    findings
+        What was found.
+    nominal
+        The bench itself.
+    """
+
+    findings: Findings
+    nominal: Result
+
+    @property
+    def kind(self) -> str:
+        """What each is called, in names of files too."""
+        return "failing" if self.findings.rare else "worst"
+
+    @property
+    def title(self) -> str:
+        """What they are called together."""
+        return "Most probable failing cases" if self.findings.rare else "Worst cases"
+
+    @cached_property
+    def benches(self) -> Mapping[str, Bench]:
+        """What runs each that has a result, by its key figure."""
+        return {
+            j.demand.figure: self._bench(j, row)
+            for j in self.findings.judgments
+            if (row := j.worst) is not None and row not in self.findings.failures
+        }
+
+    @cached_property
+    def results(self) -> Mapping[str, Result]:
+        """Each one, run again, by its key figure."""
+        return {kpi: running.run(bench) for kpi, bench in self.benches.items()}
+
+    def texts(self) -> list[str]:
+        """Return each case in words."""
+        return [
+            self._text(each, each.worst)
+            for each in self.findings.judgments
+            if each.worst is not None
+        ]
+
+    def _text(self, judgment: Judgment, row: int) -> str:
+        kpi = judgment.demand.figure
+        if row in self.findings.failures:
+            return f"{kpi}: case {self.named(row)}, which has no result"
+        if not math.isfinite(self.findings.figure(kpi)[row]):
+            (why,) = [each.note for each in self.results[kpi].kpis if each.name == kpi]
+            return (
+                f"{kpi} is not defined in case {self.named(row)}{why and f': {why}'}; "
+                f"{self.kind}-{kpi}.toml runs it"
+            )
+        return (
+            f"{kpi} = {self._figure(kpi, row)}{self._doubt(judgment, row)} in case "
+            f"{self.named(row)}; {self.kind}-{kpi}.toml runs it"
+        )
+
+    def named(self, row: int) -> str:
+        """Return a case by its row: number and values."""
+        units = self.findings.plan.units
+        values = ", ".join(
+            f"{name} = {value if isinstance(value, str) else amount(value, units[name])}"
+            for name, value in self.findings.values(row).items()
+        )
+        return f"{self.findings.number(row)} ({values})"
+
+    def recordings(self) -> dict[str, dict[str, xr.Dataset]]:
+        """Return the recordings of the bench itself and of the cases, by run."""
+        each = {"the bench itself": self.nominal} | {
+            f"{self.kind} {kpi}": result for kpi, result in self.results.items()
+        }
+        return {
+            label: {name: r.recordings[label] for name, r in each.items() if label in r.recordings}
+            for label in self.nominal.recordings
+        }
+
+    def attachments(self) -> list[Attachment]:
+        """Return bench files and recordings."""
+        labels = list(self.nominal.recordings)
+        return [
+            *(
+                Attachment(f"{self.kind}-{kpi}.toml", partial(self._write_bench, bench))
+                for kpi, bench in self.benches.items()
+            ),
+            *(
+                Attachment(
+                    f"{self.kind}-{kpi}{'' if len(labels) == 1 else '-' + label}.nc",
+                    partial(self._write_recording, kpi, label),
+                )
+                for kpi in self.benches
+                for label in labels
+            ),
+        ]
+
+    def _bench(self, judgment: Judgment, row: int) -> Bench:
+        plan, findings = self.findings.plan, self.findings
+        made = case_bench(plan, findings.number(row), findings.values(row))
+        return replace(made, name=f"{self.kind} {judgment.demand.figure}")
+
+    def _doubt(self, judgment: Judgment, row: int) -> str:
+        """Return that a case is too close to the limit to be told from one that meets it."""
+        is_close = self.findings.is_close(judgment.demand)[row]
+        return " (closer to the limit than its error)" if is_close else ""
+
+    def _figure(self, name: str, row: int) -> str:
+        return figure_text(self.findings, name, float(self.findings.figure(name)[row]))
+
+    def _write_bench(self, bench: Bench, path: Path) -> Path:
+        what = "Most probable failing" if self.findings.rare else "Worst"
+        text = bench_text(bench, f"{what} case of study {self.findings.plan.name}")
+        path.write_text(text, "utf-8")
+        return path
+
+    def _write_recording(self, kpi: str, label: str, path: Path) -> Path:
+        return recording_file(path.name, self.results[kpi].recordings[label]).write(path)
+
+
+# --- The answer
 
 
 def findings_data(findings: Findings) -> dict[str, Any]:
@@ -181,7 +328,7 @@ def noted(findings: Findings, damaged: int) -> list[str]:
     ]
 
 
-def failure_texts(findings: Findings, named: Callable[[int], str]) -> list[str]:
+def _failure_texts(findings: Findings, named: Callable[[int], str]) -> list[str]:
     """Return why cases have no result, each reason once, with the first case that has it.
 
     Parameters
@@ -259,6 +406,7 @@ def _wide_shares(findings: Findings) -> list[str]:
 # --- The answer
 
 _BRIEF = 3  # tables of drivers that a terminal shows
+_DRIVERS = 3  # rows of each without --verbose
 
 
 @dataclass(frozen=True, repr=False)
@@ -378,7 +526,7 @@ class StudyRun(Answer):
         )
         is_rare = bool(findings.rare)
         table = failure_table(findings) if is_rare else demand_table(findings)
-        demands = TableBlock(table, width=120)
+        demands = TableBlock(table)
         is_indexed = plan.sensitivity is not None
         drivers = (
             importance_tables(findings)
@@ -394,7 +542,7 @@ class StudyRun(Answer):
         figures = spread_blocks(findings)
         texts = self._shown.texts()
         remarks = [*(f"Warning: {text}." for text in self.warnings), *self.notes]
-        missing = failure_texts(findings, self._shown.named)
+        missing = _failure_texts(findings, self._shown.named)
         return Document(
             f"Study {plan.name}",
             f"{len(self.cases)} cases ({plan.design}, seed {plan.seed}) of {subject.line}",
@@ -423,7 +571,7 @@ class StudyRun(Answer):
                     *tested_brief(self.nominal, plan),
                     *([demands] if judged else []),
                     *figures,
-                    *drivers[:_BRIEF],
+                    *[replace(each, most=_DRIVERS) for each in drivers[:_BRIEF]],
                     *(unexplained if findings.plan.sensitivity is None else []),
                     *([f"and {more} more such tables in the report"] if more > 0 else []),
                     *([Listing(missing, "Cases without a result")] if missing else []),
@@ -474,3 +622,96 @@ class StudyRun(Answer):
             "warnings": self.warnings,
             "notes": self.notes,
         }
+
+
+# --- Studies computed, or read from their folders
+
+
+def completed(
+    origin: Origin,
+    plan: StudyPlan,
+    store: StudyStore,
+    workers: int | None,
+    cluster: str,
+    progress: Progress | None,
+) -> StudyRun:
+    """Return a study with all of its cases, those that were missing computed."""
+
+    def ready() -> None:
+        if is_command_line():  # its report is drawn next; a program may want no figure
+            load_drawing()
+            field_notes(type(plan.bench.par))
+
+    try:
+        completed = complete(
+            plan,
+            store,
+            origin,
+            workers=workers,
+            cluster=cluster,
+            progress=progress or silent,
+            meanwhile=ready,
+        )
+    except KeyboardInterrupt:
+        of = "" if plan.sought is not None else f" of {plan.chunks}"
+        raise KeyboardInterrupt(
+            f"{len(store.finished())}{of} chunks are kept: {store.resume_command}"
+        ) from None
+    return replace(_run_of(plan, store, completed.nominal), damaged=completed.damaged)
+
+
+def kept_study(folder: str | Path) -> StudyRun:
+    """Return what `study_report` does, without warning of anything: for what is made of it."""
+    store = StudyStore(Path(folder))
+    plan, _ = kept_plan(store)
+    store.require(plan)
+    return _run_of(plan, store, running.run(plan.bench, estimate_error=True))
+
+
+def kept_plan(store: StudyStore) -> tuple[StudyPlan, Origin]:
+    """Return the study of a folder, with as many cases as were asked for, and its origin."""
+    said = store.record()
+    origin = Origin(Path(said["source"]), said["set"])
+    if not origin.file.is_file():
+        raise FileError(
+            f"the study file {origin.file} of {store.folder} is gone: run it from where it is now, "
+            f"bywire study run FILE --out {store.folder}"
+        )
+    try:
+        plan = read_study(origin.file, origin.overrides)
+    except InputError as error:
+        unloaded = [path for path in said["systems"] if path not in loaded_files()]
+        if not unloaded:
+            raise
+        raise error.reworded(
+            f"{error}; the study was run with {' '.join(map(_loaded_by, unloaded))}"
+        ) from None
+    is_listed = plan.design in SPANNED
+    return (plan if is_listed else replace(plan, cases=int(said["cases"]))), origin
+
+
+def with_engine(engine: str, plan: StudyPlan) -> StudyPlan:
+    """Return the plan computed by an engine; its cases are the same by whichever."""
+    return plan if engine == "auto" else replace(plan, bench=replace(plan.bench, engine=engine))
+
+
+def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
+    if plan.design == WORST:
+        searches, cases = worst_cases(plan, store)
+        findings = Findings(plan, cases, nominal.kpis, searches=searches)
+        is_whole = all(each.state != "unfinished" for each in searches)
+    elif plan.sought is not None:
+        rare, cases = rare_failures(plan, store)
+        findings = Findings(plan, cases, nominal.kpis, rare)
+        is_whole = all(each.failure.state != "unfinished" for each in rare)
+    else:
+        findings = Findings(plan, store.read(plan.chunks), nominal.kpis)
+        is_whole = len(findings.cases) == plan.total
+    judged = status_of(findings.judgments) if findings.spreads else "failed"
+    status = judged if is_whole else "unfinished"
+    return StudyRun(plan, store.folder, findings, nominal, status)
+
+
+def _loaded_by(path: str) -> str:
+    """Return how a reader loads a brake from a file."""
+    return f"--system {path}" if is_command_line() else f'bywire.load_system("{path}")'

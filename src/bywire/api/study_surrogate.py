@@ -74,7 +74,7 @@ class StudySurrogates(Answer):
     def document(self) -> Document:
         """Return how good the surrogates are, and what they say of the values asked for."""
         plan = self.study.plan
-        table = TableBlock(self._table(), width=140)
+        table = TableBlock(self._table())
         return Document(
             f"Surrogates of study {plan.name}",
             f"polynomials of {len(plan.varied)} quantities, from {len(self.study.cases)} cases",

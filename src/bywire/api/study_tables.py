@@ -1,9 +1,12 @@
-"""The tables of a study: requirements, key figures, what varies, and what drives them."""
+"""Tables and notes of a study: requirements, key figures, what varies, and what drives them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,10 +15,15 @@ from bywire.report.document import Listing, TableBlock
 from bywire.report.study.drawn_cases import BARS
 from bywire.report.tables import OUTCOMES, Cell, Column, Table, text_table, value_text
 from bywire.report.wording import amount, clean
-from bywire.studies.designs import WORST
+from bywire.studies.designs import IMPORTANCE, SUBSET, WORST
 from bywire.studies.findings import ONE, ChoiceInfluence, Effect, Findings, Judgment
 from bywire.studies.plan import StudyPlan
-from bywire.studies.statistics import Influence, Share
+from bywire.studies.sensitivity import ElementaryEffects, Estimate, VarianceShares
+from bywire.studies.sought_cases import Importance, RareFailure
+from bywire.studies.statistics import FailureProbability, Influence, Interval, Outcome, Share
+
+if TYPE_CHECKING:
+    pass
 
 _URGENCY = ("missed", "undecided", "met")  # outcomes, in the order in which they matter
 _SHOWN = 5  # quantities that drive a key figure
@@ -59,10 +67,10 @@ def _worst(findings: Findings, judgment: Judgment) -> Cell:
     if not known.size:
         return Cell("-" if judgment.worst is None else "not defined")
     value = float(figures[known[0] if judgment.worst is None else judgment.worst])
-    return figure_cell(findings, kpi, value)
+    return _figure_cell(findings, kpi, value)
 
 
-def figure_cell(
+def _figure_cell(
     findings: Findings, name: str, value: float, *, is_difference: bool = False
 ) -> Cell:
     """Return the cell of a value of a key figure; see `figure_text`."""
@@ -120,7 +128,7 @@ def spread_blocks(findings: Findings) -> list[TableBlock | Listing]:
         return []
     absent = [name for name in findings.units if name not in {s.name for s in findings.spreads}]
     said = [Listing([f"not defined in any case: {', '.join(absent)}"])] if absent else []
-    return [TableBlock(spread_table(findings), width=140), *said]
+    return [TableBlock(spread_table(findings)), *said]
 
 
 def spread_table(findings: Findings) -> Table:
@@ -133,7 +141,7 @@ def spread_table(findings: Findings) -> Table:
         values = [each.nominal, *middle, each.least, each.largest]
         name = clean(each.name)
         name += f" (not defined in {each.undefined})" if each.undefined else ""
-        cells = (figure_cell(findings, each.name, v) for v in values)
+        cells = (_figure_cell(findings, each.name, v) for v in values)
         rows.append((Cell(name), *cells))
     return Table((Column("name"), *(Column(h, numeric=True) for h in heads)), tuple(rows))
 
@@ -208,8 +216,8 @@ def _effect_table(findings: Findings, name: str, effects: Sequence[Effect]) -> T
             (
                 Cell(each.quantity),
                 *map(Cell, ends),
-                *(figure_cell(findings, name, v) for v in figures),
-                figure_cell(findings, name, each.swing, is_difference=True),
+                *(_figure_cell(findings, name, v) for v in figures),
+                _figure_cell(findings, name, each.swing, is_difference=True),
             )
         )
     return Table((Column("quantity"), *(Column(h, numeric=True) for h in heads)), tuple(rows))
@@ -268,3 +276,305 @@ def _influence_table(influences: Sequence[Influence | ChoiceInfluence], is_parti
             cells += ["-"] * has_choices
         rows.append((name, *cells, "yes" if i.is_distinct else "not distinct from none"))
     return text_table(["quantity", *heads, "drives it"], rows)
+
+
+# --- Rare failures and sensitivities: how probable, where, what drives them
+
+_VALUES = 3  # single values of a quantity that are shown
+_SEEN = 0.005  # share of failing cases from which on one is
+
+
+def failure_table(findings: Findings) -> Table:
+    """Return the requirements: how probable failure is, by how many cases, and the verdict."""
+    confidence = f"{100.0 * findings.plan.confidence:g} %"
+    heads = ["probability of failure", f"{confidence} interval", "variation", "cases", "admitted"]
+    rows = []
+    for each in findings.judgments:
+        failure, wanted = each.failure, each.demand.probability
+        assert failure is not None
+        assert wanted is not None
+        probable = failure.estimate
+        close = f" ({each.undecided} too close)" if each.undecided else ""
+        rows.append(
+            (
+                Cell(clean(f"{each.demand.figure} {each.demand.text}")),
+                Cell(_value(probable), value=probable.value),
+                Cell(_ends(probable)),
+                Cell(
+                    "-" if np.isnan(probable.variation) else f"{100.0 * probable.variation:.2g} %"
+                ),
+                Cell(f"{failure.runs}{close}", value=failure.runs),
+                Cell(f"{1.0 - wanted:.3g}"),
+                OUTCOMES[each.outcome],
+            )
+        )
+    columns = [Column(head, numeric="interval" not in head) for head in heads]
+    return Table((Column("requirement"), *columns, Column("result")), tuple(rows))
+
+
+def importance_tables(findings: Findings) -> list[TableBlock]:
+    """Return where the failures of each requirement lie, by quantity."""
+    return [
+        TableBlock(
+            _importance_table(findings, each),
+            f"Where {each.demand.figure} fails.",
+            title=f"where {each.demand.figure} fails",
+        )
+        for each in findings.rare
+        if each.importance
+    ]
+
+
+def rare_data(failure: FailureProbability, findings: RareFailure) -> dict[str, Any]:
+    """Return a failure for JSON; margins are in the unit of the key figure."""
+    probable = failure.estimate
+    return {
+        "state": failure.state,
+        "failure": {
+            "probability": probable.value,
+            "variation": probable.variation,
+            "low": probable.low,
+            "high": probable.high,
+        },
+        "cases": failure.runs,
+        "levels": [{"margin": x.margin, "probability": x.probability} for x in failure.levels],
+        "reliability_index": failure.first_order,
+        "failing_case": findings.case,
+        "importance": {
+            i.quantity: {
+                "score": i.score,
+                "factor": i.factor,
+                **({"shares": {str(v): n for v, n in i.shares.items()}} if i.shares else {}),
+            }
+            for i in findings.importance
+        },
+    }
+
+
+def state_texts(findings: Findings) -> list[str]:
+    """Return of each requirement without an estimate why there is none, and what to do."""
+    outcomes = {each.demand: each.outcome for each in findings.judgments}
+    return [
+        f"{each.demand.figure}: {text}"
+        for each in findings.rare
+        if (text := _state_text(each, findings.plan, outcomes[each.demand]))
+    ]
+
+
+def rare_notes(findings: Findings) -> list[str]:
+    """Return what was rounded, what is not judged, and what intervals stand for."""
+    plan = findings.plan
+    design = plan.sought
+    assert design is not None
+    notes = []
+    if design.kind == SUBSET and design.level != design.asked:
+        notes.append(
+            f"{design.level} cases in each level in place of {design.asked}: they come in "
+            "whole chunks"
+        )
+    if unjudged := [str(each) for each in plan.demands if each not in plan.judged_demands]:
+        notes.append(
+            f"not judged, for no probability is wanted of it: {'; '.join(unjudged)}; cases that go "
+            "where failures are say nothing of all cases"
+        )
+    notes += [
+        f"{each.demand.figure}: failure is less probable than a thousandth of what is admitted: it "
+        "was followed no further"
+        for each in findings.rare
+        if each.failure.state == "negligible"
+    ]
+    for each in findings.judgments if len(findings.cases) else ():
+        if each.outcome == "undecided" and each.failure and each.failure.state == "done":
+            more = (
+                "more cases_per_level, in another folder, narrow it"
+                if design.kind == SUBSET
+                else "extend the study"
+            )
+            notes.append(f"{each.demand.figure}: the interval holds what is admitted: {more}")
+    if design.kind == IMPORTANCE:
+        notes.append(
+            "importance-sampling: failures far from the design point may be missed; "
+            "'subset-simulation' looks for them everywhere"
+        )
+    return notes
+
+
+def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
+    failure = each.failure
+    if failure.state == "budget spent":
+        so_far = f"it is no more probable than {failure.estimate.high:.2g}"
+        seen = f"failing cases seen, too few for an estimate: {failure.failed}; "
+        so_far = seen * bool(failure.failed) + so_far
+        where = (
+            "before the last level"
+            if plan.design == SUBSET
+            else "by the search for the design point"
+        )
+        return f"the budget of {plan.cases} cases is spent {where} ({so_far})" + (
+            ": extend the study" if outcome == "undecided" else ""
+        )
+    if failure.state == "level":
+        return "too many cases have the same figure to tell worse ones: take 'monte-carlo'"
+    if failure.state == "no design point":
+        return f"no design point was found, for {failure.why}: take 'subset-simulation'"
+    return ""
+
+
+def _value(probable: Interval) -> str:
+    if np.isnan(probable.value):
+        return f"below {probable.high:.2g}" if probable.high < 1.0 else "not known"
+    return f"{probable.value:.3g}"
+
+
+def _ends(probable: Interval) -> str:
+    return f"{probable.low:.2g} to {probable.high:.2g}"
+
+
+def _importance_table(findings: Findings, each: RareFailure) -> Table:
+    plan = findings.plan
+    varied = {v.name: v for v in plan.varied}
+    rows = [
+        (
+            Cell(clean(i.quantity)),
+            Cell(_place(i, each, varied[i.quantity].unit)),
+            Cell(value_text(varied[i.quantity].nominal, varied[i.quantity].unit or "1")),
+            Cell("-" if math.isnan(i.score) else f"{i.score:+.2f}", value=i.score),
+            Cell(f"{i.factor:.2f}", value=i.factor),
+        )
+        for i in each.importance
+    ]
+    return Table(
+        (
+            Column("quantity"),
+            Column("where failures lie", numeric=True),
+            Column("in the bench", numeric=True),
+            Column("standard deviations", numeric=True),
+            Column("importance", numeric=True),
+        ),
+        tuple(rows),
+    )
+
+
+def _place(importance: Importance, failure: RareFailure, unit: str) -> str:
+    """Return where failures lie in a quantity: its value, or how many have each single value."""
+    if importance.quantity not in failure.point:
+        return "-"
+    if not importance.shares:
+        return _shown(failure.point[importance.quantity], unit)
+    ranked = sorted(importance.shares.items(), key=lambda pair: -pair[1])
+    shown = [f"{_shown(v, unit)} {100.0 * share:.0f} %" for v, share in ranked if share >= _SEEN]
+    return ", ".join(shown[:_VALUES] + ["..."] * (len(shown) > _VALUES))
+
+
+def _shown(value: float | str, unit: str) -> str:
+    return value if isinstance(value, str) else amount(float(value), unit)
+
+
+def search_notes(findings: Findings) -> list[str]:
+    """Return what a search for worst cases stands for, and where it did not come to its end."""
+    plan = findings.plan
+    spent = [
+        demand.figure
+        for demand, each in zip(plan.judged_demands, findings.searches, strict=False)
+        if each.state == "budget spent"
+    ]
+    notes = [f"{plan.design}: a search proves nothing: a worse case may be where it did not look"]
+    if spent:
+        notes.append(
+            f"{', '.join(spent)}: the budget of {plan.cases} cases is spent before the search came "
+            "to its end: extend the study"
+        )
+    return notes
+
+
+# --- Indices of sensitivity
+
+
+def sensitivity_tables(findings: Findings) -> list[TableBlock]:
+    """Return the indices of each key figure of a requirement; of all where nothing is required."""
+    return [
+        TableBlock(
+            _table(findings, name, found), f"What drives {name}.", title=f"what drives {name}"
+        )
+        for name in shown_figures(findings)
+        if (found := findings.sensitivity(name).drivers)
+    ]
+
+
+def drivers_data(findings: Findings, name: str) -> dict[str, Any]:
+    """Return what drives a key figure for JSON: influences, effects, or indices.
+
+    Figures and effects are in the unit of the figure, values of quantities in SI.
+    """
+    if findings.plan.sensitivity is None and not findings.plan.is_sampled:
+        found = findings.effects(name)
+        return {"effects": {e.quantity: _effect_data(e) for e in found}} if found else {}
+    if findings.plan.sensitivity is None:
+        return {
+            "influences": {
+                i.quantity: {"correlation_ratio": i.correlation_ratio, "distinct": i.is_distinct}
+                if isinstance(i, ChoiceInfluence)
+                else {"correlation": i.correlation, "low": i.low, "high": i.high}
+                for i in findings.influences(name)
+            }
+        }
+    if name not in shown_figures(findings):
+        return {}
+    indices = findings.sensitivity(name)
+    drivers = [asdict(each) for each in indices.drivers]
+    data: dict[str, Any] = {"sensitivity": {each.pop("quantity"): each for each in drivers}}
+    return data | ({"sensitivity_missing": indices.missing} if indices.missing else {})
+
+
+def _effect_data(effect: Effect) -> dict[str, Any]:
+    return {
+        "unit": effect.unit or None,
+        "values": list(effect.values),
+        "figures": effect.figures.tolist(),
+        "swing": effect.swing,
+        "undefined": effect.lacking,
+    }
+
+
+def missing_indices(findings: Findings) -> list[str]:
+    """Return in a sentence which key figures have no indices, and why; nothing where all have.
+
+    Nothing, too, of designs that are not made for indices.
+    """
+    if findings.plan.sensitivity is None:
+        return []
+    reasons: dict[str, list[str]] = {}
+    for name in shown_figures(findings):
+        if reason := findings.sensitivity(name).missing:
+            reasons.setdefault(reason, []).append(name)
+    said = [f"of {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+    return [f"no indices {'; '.join(said)}"] if said else []
+
+
+def _table(
+    findings: Findings,
+    name: str,
+    drivers: Sequence[VarianceShares] | Sequence[ElementaryEffects],
+) -> Table:
+    columns, rows = [Column("quantity")], []
+    written = partial(figure_text, findings, name, digits=3, is_difference=True)
+    for each in drivers:
+        if isinstance(each, VarianceShares):
+            heads = ["first order", "interval", "total", "interval"]
+            cells = [*_cells(each.first, _share), *_cells(each.total, _share)]
+        else:
+            heads = ["mu*", "interval", "sigma"]
+            cells = [*_cells(each.mu_star, written), Cell(written(each.sigma))]
+        rows.append((Cell(clean(each.quantity)), *cells))
+    columns += [Column(head, numeric=head != "interval") for head in heads]
+    return Table(tuple(columns), tuple(rows))
+
+
+def _cells(of: Estimate, written: Callable[[float], str]) -> list[Cell]:
+    """Return estimate and interval."""
+    value, low, high = map(written, (of.value, of.low, of.high))
+    return [Cell(value, value=of.value), Cell(f"{low} to {high}")]
+
+
+def _share(value: float) -> str:
+    return f"{round(value, 2) + 0.0:.2f}"  # no -0.00

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 from bywire.api import identification
-from bywire.api.identify import ChosenMethod, choose
+from bywire.api.identification import ChosenMethod, choose
 from bywire.core.blas import on_one_thread
 from bywire.data.file_format import Progress, no_progress
 from bywire.identification import trust as trusted

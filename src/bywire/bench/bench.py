@@ -1,7 +1,8 @@
-"""The bench: what is tested, how, and what is required of it. The same thing as a bench file."""
+"""Bench: a complete virtual test with its requirements, equivalent to a bench file."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -9,22 +10,28 @@ from typing import Any
 
 import numpy as np
 
-from bywire.bench.bench_source import experiment_of, usual_set
+from bywire.bench.changes import OPTION, settled, split_options
 from bywire.bench.effects import are_alike, refuse_without_effect, switches_of
-from bywire.bench.experiment import Case, Cases, Experiment, as_run
-from bywire.bench.extent import check_seed, checked_interval, checked_step
+from bywire.bench.experiment import (
+    Case,
+    Cases,
+    Experiment,
+    as_run,
+    check_seed,
+    checked_interval,
+    checked_step,
+)
 from bywire.bench.faults.fault_section import Injection, injections
 from bywire.bench.faults.injected import checked_sections, with_faults
-from bywire.bench.option_names import OPTION, split_options
-from bywire.bench.relative_changes import settled
+from bywire.bench.generic_experiment import experiment_of, usual_set
 from bywire.bench.requirements import Limit, read_limits
-from bywire.bench.stimuli.registry import Stimulus
-from bywire.bench.stimulus_sections import stimulus_of, stimulus_sections
+from bywire.bench.stimulus import Stimulus, stimulus_of, stimulus_sections
 from bywire.core.catalog import PARAMETER_SETS, outdated_values
 from bywire.core.errors import (
     InputError,
     ModelError,
     ParameterError,
+    not_valid,
     place_of,
     quoted,
     unknown_name,
@@ -35,7 +42,7 @@ from bywire.core.values import parsed
 from bywire.simulation.engine import engine_names
 from bywire.simulation.run import Run
 
-_SHARE = 1e-3  # of a value, by which it is moved to see what follows it
+_SHARE = 1e-3  # of a value: step by which it is moved to find out whether it has an effect
 
 
 @dataclass(frozen=True)
@@ -47,16 +54,17 @@ class Bench:
     experiment
         Name of the experiment.
     parameters
-        Name of a parameter set of the catalog. Where it is empty, the main set of the experiment's
-        brake; an experiment of any brake takes the only set of the brakes loaded by path.
+        Name of a parameter set of the catalog. If empty, the main set of the experiment's brake;
+        an experiment of any brake then takes the only set of the brakes loaded by path.
     overrides, options
-        Other parameters and options of the experiment, by dotted name: SI numbers, or texts with
-        units such as ``"0.35 ohm"``. Durations below may be written so as well. Parameters may also
-        be changed by a share, ``{"seal.T_pr": "+50%"}``, and several by ``{"seal.*": "-10%"}``.
+        Changed parameters and options of the experiment, by dotted name: SI numbers, or texts
+        with units such as ``"0.35 ohm"``. Durations below may also be such texts. A percentage
+        changes a parameter relatively, ``{"seal.T_pr": "+50%"}``, and a pattern several,
+        ``{"seal.*": "-10%"}``.
     stimulus
         ``{"kind": ..., **parameters}`` for experiments that take a stimulus; a table may come
-        from a file, see ``stimulus_sections``. Experiments of any brake also take such a mapping
-        under the name of each further signal of the model's Stimulus.
+        from a file, see `bywire.bench.stimulus.with_nodes`. Experiments of any brake also take
+        such a mapping under the name of each further signal of the model's Stimulus.
     step
         Substep [s].
     record
@@ -66,23 +74,23 @@ class Bench:
     requirements
         KPI name -> limit, such as ``{"overshoot": "<= 15 %"}``.
     name
-        What reports call it.
+        Name in reports.
     faults
-        What fails, and when: tables as those of ``[[faults]]`` in a bench file, see
+        Faults and their times: tables like those of ``[[faults]]`` in a bench file, see
         ``docs/faults.md``.
     assembly
-        Which model of the parameters' brake is tested, where an experiment of any brake leaves
-        the choice; that of the parameter set where empty.
+        Tested model of the parameters' brake, where an experiment of any brake leaves the choice;
+        if empty, that of the parameter set.
     engine
-        What computes its runs: ``auto``, ``compiled``, ``virtual-machine``, a graphics processor,
+        Engine of its runs: ``auto``, ``compiled``, ``virtual-machine``, a graphics processor,
         ``cuda``, or the compiled C of the ECU in the loop, ``sil`` (double precision) or
         ``sil-single``.
 
     Raises
     ------
     InputError
-        At construction, for anything that does not fit: names, values, files, steps. What only
-        a run or this machine's memory shows comes when it is run.
+        At construction, for names, values, files and steps that are not valid. Errors of the
+        simulation itself, and too little memory, are raised by the run.
     """
 
     experiment: str
@@ -102,9 +110,9 @@ class Bench:
     def __post_init__(self) -> None:
         for key in ("experiment", "parameters", "name", "assembly"):
             if not isinstance(getattr(self, key), str):
-                raise ParameterError(f"{key} = {quoted(getattr(self, key))}: a text is wanted")
+                raise not_valid(key, quoted(getattr(self, key)), "a text")
         for key in ("overrides", "options", "stimulus", "requirements"):
-            object.__setattr__(self, key, dict(getattr(self, key)))  # ours alone from now on
+            object.__setattr__(self, key, dict(getattr(self, key)))  # a copy of its own
         object.__setattr__(self, "faults", tuple(checked_sections(self.faults)))
         object.__setattr__(self, "step", checked_step(self.step))
         object.__setattr__(self, "record", checked_interval(self.record))
@@ -118,35 +126,37 @@ class Bench:
         if self.assembly == known.assembly:
             object.__setattr__(self, "assembly", "")
         chosen = self.definition
-        object.__setattr__(self, "experiment", chosen.name)  # not an earlier name of it
+        object.__setattr__(self, "experiment", chosen.name)  # also where an earlier name was given
         if chosen.assembly != self.system:
+            by_name = f"assembly = {self.assembly!r}"
+            by_set = f"parameter set {known.name!r} is for a {known.assembly}"
             raise ParameterError(
                 f"experiment {chosen.name!r} tests a {chosen.assembly}, but "
-                + (
-                    f"assembly = {self.assembly!r}"
-                    if self.assembly
-                    else f"parameter set {known.name!r} is for a {known.assembly}"
-                )
+                f"{by_name if self.assembly else by_set}",
+                name="assembly" if self.assembly else "parameters",
+                value=self.assembly or known.name,
+                valid=chosen.assembly,
             )
         self._check_stimulus(chosen)
         self._check_names()
-        _ = self.limits  # read now, so that what cannot be judged is refused
+        _ = self.limits  # read now, so that requirements that cannot be judged are rejected
         if chosen.preview is None:
             self._require_effects(written, self.cases(), chosen.cases)
         else:
             self._require_effects(written, self._made(chosen.preview), chosen.preview)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy is made of: not what follows from it."""
+        """Return the fields, from which a copy derives the rest."""
         return {name: self.__dict__[name] for name in type(self).__dataclass_fields__}
 
     def _check_stimulus(self, chosen: Experiment) -> None:
-        """Refuse a stimulus that the experiment does not take."""
+        """Reject a stimulus that the experiment does not take."""
         further = [name for name, each in self.stimulus.items() if isinstance(each, Mapping)]
         if len(further) < len(self.stimulus) and chosen.driven_unit is None:
             raise ParameterError(
-                f"experiment {chosen.name!r} brings its own stimulus: leave out [stimulus], or "
-                "use experiment 'open-loop'"
+                f"experiment {chosen.name!r} has its own stimulus: leave out [stimulus], or "
+                "use experiment 'open-loop'",
+                name="stimulus",
             )
         known = {} if chosen.beside is None else chosen.beside(self.chosen_options)
         for name in further:
@@ -154,9 +164,9 @@ class Bench:
                 raise unknown_name(f"stimulus beside {chosen.name}", name, known)
 
     def _require_effects(self, names: Sequence[str], cases: Sequence[Case], make: Cases) -> None:
-        """Refuse parameters that a choice switches off: they would be listed and do nothing.
+        """Reject parameters that a choice switches off: they would be listed without any effect.
 
-        ``names``: those that are written out; a pattern may match some that have no effect.
+        ``names``: names without patterns; a pattern may match parameters that have no effect.
         """
         base = PARAMETER_SETS.find(self.parameters).parameters()
         for name in filter(self.overrides.__contains__, names):
@@ -168,7 +178,7 @@ class Bench:
                 refuse_without_effect(name, value, switches, self.par)
 
     def _is_used(self, name: str, other: Any, cases: Sequence[Case], make: Cases) -> bool:
-        """Return whether the experiment asks for a parameter: with another value, it is another."""
+        """Return whether the experiment depends on a parameter, by setting it to another value."""
         try:
             par, following = self.par.replace({name: other}), self.definition.following
             if following is not None and following(par) != following(self.par):
@@ -180,12 +190,12 @@ class Bench:
         return not are_alike(cases, made)
 
     def require_effect(self, name: str) -> None:
-        """Refuse a parameter that is to vary and that a choice switches off.
+        """Reject a parameter that is to vary although a choice switches it off.
 
         Raises
         ------
         ParameterError
-            With what switches it on.
+            With the choice that switches it on.
         """
         if name not in self.par.leaves():
             return
@@ -197,7 +207,7 @@ class Bench:
             refuse_without_effect(name, value, switches, self.par)
 
     def _check_names(self) -> None:
-        """Refuse options that stand among the parameters, the likeliest mistake of all."""
+        """Reject options among the parameters, the most likely mistake."""
         options = self.definition.defaults.flat().keys()
         parameters = PARAMETER_SETS.find(self.parameters).values.keys()
         for name in self.overrides:
@@ -206,17 +216,17 @@ class Bench:
 
     @cached_property
     def limits(self) -> Mapping[str, Limit]:
-        """The requirements as they are judged, by KPI name."""
+        """Limits of the requirements, by KPI name."""
         return read_limits(self.requirements, self.definition.kpis_with(self.chosen_options))
 
     @cached_property
     def system(self) -> str:
-        """Name of the assembly that is tested."""
+        """Name of the tested assembly."""
         return self.assembly or PARAMETER_SETS.find(self.parameters).assembly
 
     @cached_property
     def definition(self) -> Experiment:
-        """The experiment behind the name."""
+        """Experiment of this name."""
         return experiment_of(self.experiment, self.parameters, self.assembly, self.options)
 
     @cached_property
@@ -227,17 +237,18 @@ class Bench:
 
     @cached_property
     def outdated(self) -> list[str]:
-        """Which derived values of the set no longer match what they were derived from."""
+        """Derived values of the set that no longer match the values they were derived from."""
         cited = PARAMETER_SETS.find(self.parameters).values
         leaves = leaf_fields(type(self.par))
         texts = []
         for each in outdated_values(cited, self.par, self.overrides):
             unit = leaves[each.name].unit.symbol
-            now, then = (shown(value, unit) for value in (each.now, each.formula))
+            now = shown(each.now, unit)
+            then = shown(each.formula, unit) if math.isfinite(each.formula) else "no finite value"
             texts.append(
                 f"{each.name} = {now} is derived ({each.where}) from {', '.join(each.changed)}, "
-                f"which was changed, and no longer matches: its formula gives {then}, so set it "
-                "too or leave it on purpose"
+                f"which was changed: its formula now gives {then}; set it too, or leave it on "
+                "purpose"
             )
         return texts
 
@@ -250,7 +261,7 @@ class Bench:
 
     @cached_property
     def chosen_stimuli(self) -> Mapping[str, Stimulus]:
-        """Validated stimuli by the names of their signals; that of a plain section under ""."""
+        """Validated stimuli by signal; the stimulus of a plain section has the name ""."""
         chosen, sections = self.definition, stimulus_sections(self.stimulus)
         units = {} if chosen.beside is None else dict(chosen.beside(self.chosen_options))
         if chosen.driven_unit is not None:
@@ -259,19 +270,19 @@ class Bench:
 
     @property
     def chosen_stimulus(self) -> Stimulus | None:
-        """Validated stimulus of a plain section; None where none is given."""
+        """Validated stimulus of a plain section; None without one."""
         return self.chosen_stimuli.get("")
 
     def summary(self, varied: Collection[str] = ()) -> str:
-        """Return what its experiment does in one line, with the options that it has.
+        """Return the experiment's summary with the options of this bench.
 
-        ``varied``: quantities that take several values, ``options.NAME`` among them.
+        ``varied``: names of quantities that take several values, also ``options.NAME``.
         """
         _, own = split_options(dict.fromkeys(varied))
         return self.definition.summary_with(self.chosen_options, own)
 
     def cases(self) -> tuple[Case, ...]:
-        """Return the runs that the experiment consists of, with settling times as they are run."""
+        """Return the runs of the experiment, with the settling times of the simulation."""
         return self._cases
 
     @cached_property
@@ -279,14 +290,14 @@ class Bench:
         return self._made(self.definition.cases)
 
     def cases_with(self, par: Any, options: Any, make: Cases | None = None) -> tuple[Case, ...]:
-        """Return the runs as they would be with other parameters and options."""
+        """Return the runs with other parameters and options."""
         has_several = self.definition.beside is not None
         stimuli = self.chosen_stimuli if has_several else self.chosen_stimulus
         cases = (make or self.definition.cases)(par, options, stimuli)
         return with_faults(cases, self.faults) if self.faults else cases
 
     def _made(self, make: Cases) -> tuple[Case, ...]:
-        """Return cases, or refuse overrides without effect and steps that do not divide."""
+        """Return the cases, or reject overrides without effect and steps that do not divide."""
         cases = self.cases_with(self.par, self.chosen_options, make)
         for case in cases:
             _check_driven(case, self.definition)
@@ -296,13 +307,16 @@ class Bench:
             if given and all(value != wanted for value in given):
                 raise ParameterError(
                     f"{name} = {wanted!r} would have no effect: experiment "
-                    f"{self.experiment!r} sets it to {given[0]!r}; leave it out"
+                    f"{self.experiment!r} sets it to {given[0]!r}; leave it out",
+                    name=name,
+                    value=repr(wanted),
+                    valid=repr(given[0]),
                 )
         return tuple(case.aligned(self.step, self.record) for case in cases)
 
     @cached_property
     def injections(self) -> tuple[Injection, ...]:
-        """What fails in the runs: the faults, read for the first of them."""
+        """Faults of the runs, read for the first run."""
         if not self.faults:
             return ()
         has_several = self.definition.beside is not None
@@ -313,7 +327,7 @@ class Bench:
     def runs(self) -> dict[str, Run]:
         """Return the runs by label, for ensembles and sensitivities.
 
-        Their time starts with the experiment's settling, ``Case.settle`` before its zero.
+        Their time starts with the settling, ``Case.settle`` before the recording's zero.
         """
         return {
             case.label: as_run(case, self.step, seed=(self.seed, number))
@@ -323,16 +337,16 @@ class Bench:
     def varied(
         self, overrides: Mapping[str, Any], options: Mapping[str, Any], seed: int | None = None
     ) -> Bench:
-        """Return this bench with other numbers and choices, quicker than a new one is made.
+        """Return this bench with other numbers and choices, faster than a new bench.
 
-        What its names and files are is known to fit; the values are checked as ever.
+        Names and files are known to be valid; only the values are checked.
 
         Parameters
         ----------
         overrides, options
             Parameters, choices and numbers of the options by dotted name [SI].
         seed
-            Seed of the sensors' noise; as it is by default.
+            Seed of the sensors' noise; unchanged by default.
 
         Raises
         ------
@@ -345,7 +359,7 @@ class Bench:
         known["overrides"] = {**self.overrides, **overrides}
         known["options"] = {**self.options, **options}
         if any(isinstance(value, (str, bool)) for value in options.values()):
-            known.pop("chosen_stimuli")  # a choice may say what is driven, and in which unit
+            known.pop("chosen_stimuli")  # a choice may determine the driven signal and its unit
         known["seed"] = self.seed if seed is None else seed
         known["par"] = par = self.par.replace(overrides)
         following = self.definition.following
@@ -356,18 +370,18 @@ class Bench:
 
     @cached_property
     def _shared(self) -> dict[str, Any]:
-        """What a bench has in common with those that it is varied to."""
+        """What this bench shares with the benches that `varied` returns."""
         lasting = ("definition", "system", "chosen_stimuli")
         return {**self.__getstate__(), **{name: getattr(self, name) for name in lasting}}
 
     @cached_property
     def _following(self) -> Mapping[str, Any] | None:
-        """The options that follow the parameters."""
+        """Options that depend on the parameters."""
         following = self.definition.following
         return None if following is None else following(self.par)
 
     def with_overrides(self, overrides: Mapping[str, Any]) -> Bench:
-        """Return this bench with further parameters changed; shares are of what it has."""
+        """Return this bench with further changes; percentages refer to its present values."""
         changes = settled(self.par, overrides)
         matched = changes.keys() - overrides.keys()
         silent = {name for name in matched if switches_of(name, self._previewed)}
@@ -376,17 +390,20 @@ class Bench:
 
     @property
     def _previewed(self) -> tuple[Case, ...]:
-        """The runs, without what has to run before them."""
+        """Runs for checks, without the runs that would have to be computed first."""
         preview = self.definition.preview
         return self.cases() if preview is None else self._made(preview)
 
 
 def _check_driven(case: Case, experiment: Experiment) -> None:
-    """Refuse an experiment that drives what its model has no stimulus for."""
+    """Reject an experiment that drives a signal that is not in its model's Stimulus."""
     known = case.model.Stimulus._fields
     for name in case.stimulus(np.zeros(1)):
         if name not in known:
             error = unknown_name(f"stimulus of {case.model.name}", name, known)
             raise ModelError(
-                f"{place_of(experiment.cases)}: experiment {experiment.name!r}: {error}"
+                f"{place_of(experiment.cases)}: experiment {experiment.name!r}: {error}",
+                name=error.name,
+                value=error.value,
+                valid=error.valid,
             )

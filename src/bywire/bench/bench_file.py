@@ -1,21 +1,21 @@
-"""Bench files: TOML in, Bench out, and back; nothing in them is executed."""
+"""Bench files: TOML read as a `Bench`, and written; nothing in them is executed."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
 from bywire.bench.bench import Bench
-from bywire.bench.bench_source import content_of_experiment, experiment_of, meant_by
-from bywire.bench.faults.course import Course
-from bywire.bench.faults.fault_section import with_units_wanted
+from bywire.bench.changes import is_relative, settled
+from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.faults.fault_section import Course, numbers_as_text
 from bywire.bench.faults.injected import checked_sections
-from bywire.bench.relative_changes import is_relative, settled
-from bywire.bench.stimuli.registry import STIMULI
-from bywire.bench.stimulus_sections import stimulus_sections
+from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, experiment_of, usual_set
+from bywire.bench.stimulus import STIMULI, stimulus_sections
 from bywire.core.arguments import checked
 from bywire.core.callers import option
 from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
@@ -23,11 +23,11 @@ from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.section import Hint, Section, Table, table_of
 from bywire.core.values import parsed, require_unit, require_units
-from bywire.data.file_kinds import BENCH, require_kind
+from bywire.data.file_kinds import BENCH, first_there, near_files, require_kind
 from bywire.data.toml_file import read_toml
 
 PATHS = ("trace", "trace_map", "file")
-"""keys of options and stimuli that name files: written down, they must hold from any folder"""
+"""keys of options and stimuli that name files: bench files contain them as absolute paths"""
 
 
 def bench_text(bench: Bench, comment: str = "") -> str:
@@ -36,9 +36,9 @@ def bench_text(bench: Bench, comment: str = "") -> str:
     Parameters
     ----------
     bench
-        What is written; numbers get their SI units, texts stay as they were typed.
+        Bench to write; numbers get their SI units, texts stay as typed.
     comment
-        First lines.
+        Text of the first lines, as a comment.
 
     Examples
     --------
@@ -86,7 +86,7 @@ def bench_text(bench: Bench, comment: str = "") -> str:
 
 
 def _stimulus(bench: Bench) -> dict[str, tuple[Mapping[str, Any], Mapping[str, str]]]:
-    """Return the sections of the stimulus by title, each with the units of its values."""
+    """Return the sections of the stimuli by title, each with the units of its values."""
     definition, options = bench.definition, bench.chosen_options
     levels = {} if definition.beside is None else dict(definition.beside(options))
     if definition.driven_unit is not None:
@@ -115,7 +115,7 @@ def _text(name: str, value: Any, symbol: str) -> str:
         return str(value).lower()
     if isinstance(value, Sequence):
         return f"[{', '.join(_text(name, node, symbol) for node in value)}]"
-    number = value if isinstance(value, int) else float(value)  # all digits: it runs the same
+    number = value if isinstance(value, int) else float(value)  # all digits: the same run
     return json.dumps(f"{number} {symbol}") if symbol != "1" else f"{number}"
 
 
@@ -126,7 +126,7 @@ _Quoted = Annotated[str, Hint("write it in quotation marks")]
 
 
 class SimulationSection(Section):
-    """The section ``[simulation]``; a `Bench` checks its values."""
+    """Section ``[simulation]``; a `Bench` checks its values."""
 
     step: Any = Bench.step
     record: Any = None
@@ -135,7 +135,7 @@ class SimulationSection(Section):
 
     @classmethod
     def written_out(cls, content: Any) -> Any:
-        """Return the section with a seed that ``--set`` gives as a text as a number."""
+        """Return the section, with a seed from ``--set`` (a text) as a number."""
         seed = content.get("seed") if isinstance(content, Mapping) else None
         if isinstance(seed, str) and seed.isdecimal() and len(seed) < 20:
             return {**content, "seed": int(seed)}
@@ -143,7 +143,7 @@ class SimulationSection(Section):
 
 
 class BenchFile(Section):
-    """A bench file."""
+    """Keys and sections of a bench file."""
 
     experiment: Annotated[str, Hint(f'write experiment = "..." in quotation marks {_LIST}')]
     parameters: Annotated[str, Hint(f'write parameters = "..." in quotation marks {_LIST}')]
@@ -159,7 +159,7 @@ class BenchFile(Section):
 
 _FAULTS = "faults"
 SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
-"""what a bench file has beside single keys and faults"""
+"""sections of a bench file, without ``[[faults]]``"""
 _TOO_LARGE = "; measured traces go into a file of their own (options.trace)"
 
 
@@ -170,21 +170,21 @@ def load(path: str | Path) -> Bench:
     Parameters
     ----------
     path
-        TOML file with ``experiment`` and ``parameters``, and the sections ``[options]``,
-        ``[stimulus]``, ``[set]``, ``[simulation]``, ``[requirements]`` and ``[[faults]]`` as
-        wanted.
+        TOML file with ``experiment`` and ``parameters``. The sections ``[options]``,
+        ``[stimulus]``, ``[set]``, ``[simulation]``, ``[requirements]`` and ``[[faults]]`` are
+        optional.
 
     Returns
     -------
     Bench
-        What the file says, SI units inside; nothing is run.
+        Bench of the file, in SI units; nothing is run.
 
     Raises
     ------
     FileError
-        When the file cannot be read or is no TOML.
+        When the file cannot be read or is not valid TOML.
     InputError
-        For anything in it that does not fit, with the file's name in front.
+        For anything in it that is not valid, with the file's name in front.
     """
     return read(path, {})
 
@@ -195,12 +195,12 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
     Parameters
     ----------
     path
-        Bench file; or the bare name of an experiment, which is then run with its defaults and
-        the main parameter set of its brake.
+        Bench file; or the bare name of an experiment, for its defaults and the main parameter set
+        of its brake.
     changes
         ``options.NAME``, ``stimulus.NAME``, ``simulation.NAME``, ``requirements.NAME``,
-        ``experiment``, ``parameters``, or the dotted name of a parameter, which may be a pattern;
-        a share, ``+50%``, is of what the file gives.
+        ``experiment``, ``parameters``, or the dotted name of a parameter, which may be a pattern.
+        A percentage, ``+50%``, refers to the file's value.
     """
     file = Path(path)
     content = content_of_experiment(file, changes) or read_toml(
@@ -240,13 +240,13 @@ def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
         requirements=file.requirements,
         name=file.name,
         assembly=file.assembly,
-        faults=[with_units_wanted(each) for each in checked_sections(file.faults)],
+        faults=[numbers_as_text(each) for each in checked_sections(file.faults)],
         **file.simulation.given,
     )
 
 
 def _located(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Return values whose paths start at a folder, unless they are absolute."""
+    """Return values with relative paths resolved against a folder."""
     return {
         key: str(folder / value) if key in PATHS and value and isinstance(value, str) else value
         for key, value in values.items()
@@ -259,7 +259,7 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        For a name that is written in two ways, ``motor.R_m`` and ``"motor.R_m"``.
+        For a name that occurs as ``motor.R_m`` and as ``"motor.R_m"``.
     """
     flat: dict[str, Any] = {}
     for key, value in tree.items():
@@ -270,19 +270,20 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
             if each in flat:
                 raise ParameterError(
                     f'{each} has two values, by {each} and by "{each}" in quotation marks: leave '
-                    "one of both out"
+                    "one of them out",
+                    name=each,
                 )
             flat[each] = leaf
     return flat
 
 
 def _printable(name: str) -> str:
-    """Return the name of a file without the bytes that are no text."""
+    """Return the name of a file without bytes that are not valid text."""
     return name.encode("utf-8", "replace").decode("utf-8")
 
 
 def _require_units(file: BenchFile, options: Table, overrides: Table) -> None:
-    """Refuse plain numbers where a unit is wanted: 37 is not 37 bar, and hardly 37 Pa."""
+    """Reject plain numbers for quantities with a unit: 37 may mean 37 bar or 37 Pa."""
     definition = experiment_of(file.experiment, file.parameters, file.assembly, options)
     require_units(definition.options, options)
     base = PARAMETER_SETS.find(file.parameters).parameters()
@@ -321,11 +322,12 @@ def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str
         elif near and key:
             raise unknown_name("section", section, SECTIONS)
         elif name in SECTIONS:
-            raise ParameterError(f"{name} is a section: write {name}.NAME=VALUE")
+            raise ParameterError(f"{name} is a section: write {name}.NAME=VALUE", name=name)
         elif section == _FAULTS:
             raise ParameterError(
                 f"faults are put in by {option('faults')} NAME=VALUE@ONSET, not by "
-                f"{option('overrides')}"
+                f"{option('overrides')}",
+                name=name,
             )
         elif name in BenchFile.model_fields:
             changed[name] = value
@@ -334,3 +336,63 @@ def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str
             overrides[name] = value
             changed["set"] = overrides
     return changed
+
+
+# --- A name in place of a file
+
+_NAME = re.compile(r"[a-z][a-z0-9-]*")
+
+
+_FOLDER = "benches"  # usual folder of bench files
+_NEAR, _NEAR_EXPERIMENT = 0.5, 0.7  # least similarity of a suggested name
+
+
+def names_experiment(source: str | Path) -> bool:
+    """Return whether a text is the bare name of an experiment."""
+    name = str(source)
+    if not _NAME.fullmatch(name):
+        return False
+    return EXPERIMENTS.get(name) is not None or name in GENERIC_EXPERIMENTS.all()
+
+
+def content_of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, str]:
+    """Return the shortest bench file of an experiment; nothing if the name is that of a file.
+
+    Raises
+    ------
+    ParameterError
+        For an experiment of any brake, if ``changes`` do not name a parameter set.
+    """
+    name = str(file)
+    if file.is_file() or not names_experiment(name):
+        return {}
+    chosen = {} if "parameters" in changes else {"parameters": usual_set(name)}
+    return {"experiment": name, **chosen}
+
+
+def meant_by(file: Path) -> str:
+    """Return advice on a bench file that does not exist.
+
+    It names the most similar bench file of the same folder, or experiment. A file of the same name
+    in a folder of benches takes precedence.
+    """
+    folders = (file.parent / _FOLDER, file.parent / ".." / _FOLDER)
+    there = first_there(folder / file.name for folder in folders)
+    if there is not None:
+        return f"did you mean {there}?"
+    near = max(_near(file), default=None)
+    if near is not None:
+        return f"did you mean {near[1]}?"
+    return "check the path, or name an experiment of 'bywire list'"
+
+
+def _near(file: Path) -> Iterator[tuple[float, str]]:
+    """Yield bench files and experiments with names similar to that of a file, with similarity."""
+    kinds = ("", BENCH)
+    files = near_files(file, kinds, [file.parent], _NEAR, with_ending=True)
+    yield from ((likeness, str(path)) for likeness, path in files)
+    if _NAME.fullmatch(file.name):
+        for name in {**EXPERIMENTS.all(), **GENERIC_EXPERIMENTS.all()}:
+            likeness = SequenceMatcher(None, name, file.name).ratio()
+            if likeness >= _NEAR_EXPERIMENT:
+                yield likeness, name

@@ -1,4 +1,4 @@
-"""What a bench computes, and not how its source is written: by it studies tell what they hold."""
+"""Digests of what a bench computes, by which kept studies are recognized."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from bywire.bench.bench import Bench
-from bywire.bench.kpis.registry import FAMILIES, Family
-from bywire.bench.option_names import split_options
-from bywire.bench.stimuli.registry import STIMULI
+from bywire.bench.changes import split_options
+from bywire.bench.kpis.families import FAMILIES, Family
+from bywire.bench.stimulus import STIMULI
 from bywire.core.brake import brakes
 from bywire.core.definitions import definitions_digest
 from bywire.core.errors import InputError
@@ -20,6 +20,7 @@ _ROOMS = (
     "bywire.bench.generic_experiment",
     "bywire.bench.kpis",
     "bywire.bench.stimuli",
+    "bywire.bench.stimulus",
     "bywire.control",
     "bywire.plant",
     "bywire.vehicle",
@@ -29,18 +30,18 @@ _ROOMS = (
 def computation(
     bench: Bench, choices: Iterable[Mapping[str, Any]] = (), beside: Iterable[Any] = ()
 ) -> dict[str, Any]:
-    """Digests of the equations of a bench, and of what surrounds them: runs and key figures.
+    """Digests of the equations of a bench, and of its runs and key figures.
 
     Names of files, comments, docstrings and the place of a definition do not matter.
 
     Parameters
     ----------
     bench
-        What is tested.
+        Tested bench.
     choices
-        Parameters and options by dotted name that cases choose in place of the bench's own.
+        Parameters and options by dotted name that cases change.
     beside
-        Functions, and objects that hold some, that judge its runs too.
+        Further functions that judge its runs, and objects that contain such functions.
     """
     return {
         "equations": sorted({each for b in (bench, *_chosen(bench, choices)) for each in _of(b)}),
@@ -49,16 +50,16 @@ def computation(
 
 
 def functions_digest(roots: Iterable[Any], *rooms: str, with_equations: bool = False) -> str:
-    """Digest of functions with all that they reach in brakes and in what brakes are made of.
+    """Digest of functions and of all definitions that they reach in brakes and their elements.
 
     Parameters
     ----------
     roots
-        Functions, and objects that hold some.
+        Functions, and objects that contain functions.
     rooms
         Further packages whose definitions count by their text.
     with_equations
-        Whether those of models count too.
+        Whether the equations of models count, too.
     """
     reached = (*_ROOMS, *rooms, *(brake.module for brake in brakes().values()))
     return definitions_digest(roots, reached, _family, with_equations)
@@ -68,12 +69,12 @@ def _chosen(bench: Bench, choices: Iterable[Mapping[str, Any]]) -> Iterator[Benc
     for each in choices:
         try:
             yield bench.varied(*split_options(each))
-        except InputError:  # a choice that needs another one beside it: its case says so
+        except InputError:  # a choice that needs another one: its case raises the error
             continue
 
 
 def _of(bench: Bench) -> Iterator[str]:
-    """Yield what tells the equations of each run of a bench, and when its controllers run."""
+    """Yield the digest of each run's equations, with the periods of its controllers."""
     for case in bench.cases():
         tasks = [f"{task.name} {task.period:.12g} s" for task in case.model.tasks(case.par)]
         yield ", ".join([prepare(case.model, case.par).digest, *tasks])
@@ -89,7 +90,7 @@ def _functions(bench: Bench) -> Iterator[Any]:
 
 
 def _family(text: str) -> Iterator[Any]:
-    """Yield what a family of key figures computes, where a text is the name of one."""
+    """Yield what a family of key figures computes, if a text is the name of a family."""
     family = FAMILIES.guess(text) if text.isidentifier() and text.islower() else None
     if isinstance(family, Family):
         yield family.setting_class

@@ -1,4 +1,4 @@
-"""Parameters that a choice switches off: changing them would change nothing."""
+"""Parameters without effect: those that a structural choice switches off."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from bywire.core.traced import Traced
 from bywire.core.units import shown
 from bywire.simulation.engine import structure_of
 
-_TIMES = 101  # at which stimuli are compared
+_TIMES = 101  # number of times at which stimuli are compared
 _KNOWN: dict[tuple[object, ...], frozenset[str] | None] = {}
 
 
@@ -28,7 +28,7 @@ class Switch:
     Parameters
     ----------
     name, value
-        The choice, and what it is.
+        The choice and its value.
     others
         Values with which the parameter would have an effect.
     """
@@ -39,21 +39,21 @@ class Switch:
 
     @property
     def hint(self) -> str:
-        """What switches the parameter on."""
+        """Advice on how to switch the parameter on."""
         return f"set {self.name} = {' or '.join(map(repr, self.others))}"
 
 
 def switches_of(name: str, cases: Sequence[Case]) -> list[Switch]:
     """Return the choices that switch a parameter off in all runs of an experiment.
 
-    Only equations are looked at: whether the equations of some run read the parameter, and whether
-    they would with another value of a choice that stands beside the parameter or above it. Where
-    equations cannot be traced, nothing is said.
+    The equations decide: whether those of any run read the parameter, and whether they would with
+    another value of a choice in the parameter's group or in a group above it. If the equations
+    cannot be traced, the list is empty.
 
     Parameters
     ----------
     name
-        Number or table of the parameters.
+        Name of a number or table among the parameters.
     cases
         Runs of the experiment.
     """
@@ -86,12 +86,14 @@ def refuse_without_effect(
     off = " and ".join(f"{each.name} = {each.value!r}" for each in switches)
     on = ", or ".join(each.hint for each in switches)
     raise ParameterError(
-        f"{name} = {text} would have no effect, as {off}: {on} too, or leave {name} out"
+        f"{name} = {text} would have no effect because {off}: {on} too, or leave {name} out",
+        name=name,
+        value=text,
     )
 
 
 def are_alike(cases: Sequence[Case], others: Sequence[Case]) -> bool:
-    """Return whether runs begin, are driven and last alike."""
+    """Return whether runs have the same start, stimuli and times."""
     return len(cases) == len(others) and all(map(_is_alike, cases, others))
 
 
@@ -110,7 +112,7 @@ def _is_alike(case: Case, other: Case) -> bool:
 
 
 def _parameters(case: Case) -> Iterator[ParameterSet]:
-    """Yield the parameters of a run, and those that its faults leave."""
+    """Yield the parameters of a run, and those after each change by its faults."""
     yield case.par
     if isinstance(case, FaultyCase):
         yield from (par for _, par in case.changes)
@@ -119,12 +121,12 @@ def _parameters(case: Case) -> Iterator[ParameterSet]:
 def _is_read_with(name: str, model: Model, par: ParameterSet, choice: str, value: Any) -> bool:
     try:
         return _is_read(name, model, par.replace({choice: value}), False)
-    except BywireError:  # the others do not fit this value
+    except BywireError:  # the other parameters contradict this value
         return False
 
 
 def _is_read(name: str, model: Model, par: ParameterSet, unless_known: bool = True) -> bool:
-    """Return whether equations read a parameter; ``unless_known``: what holds where none can be."""
+    """Return whether equations read a parameter; ``unless_known``: where they cannot be traced."""
     read = parameters_read(model, par)
     if read is None:
         return unless_known
@@ -132,16 +134,16 @@ def _is_read(name: str, model: Model, par: ParameterSet, unless_known: bool = Tr
 
 
 def parameters_read(model: Model, par: ParameterSet) -> frozenset[str] | None:
-    """Return the numbers that the equations and controllers of a model read with some choices.
+    """Return the names of the numbers that a model's equations and controllers read.
 
-    Tables are spread, ``name.0``. None where the equations cannot be traced.
+    Tables have one name per node, ``name.0``. None where the equations cannot be traced.
     """
     key = structure_of(model, par)
     if key not in _KNOWN:
         try:
             _KNOWN[key] = _traced(model, par)
         except (TypeError, ValueError, AttributeError, ArithmeticError, RecursionError):
-            _KNOWN[key] = None  # they ask what a number is, or hand it to what cannot be traced
+            _KNOWN[key] = None  # they branch on a value, or pass it to untraceable code
     return _KNOWN[key]
 
 
@@ -162,7 +164,7 @@ def _traced(model: Any, par: ParameterSet) -> frozenset[str]:
     zeros = _Zeros()
     mass, balance = model.mass(xe, here), model.balance(x, xe, m, here, contact)
     results: tuple[Any, ...] = (
-        # What nothing drives stands still, whatever its mass.
+        # A state without any force stays at rest, whatever its mass.
         tuple(
             each
             for each, force, name in zip(mass, balance, model.State._fields, strict=True)
@@ -181,10 +183,10 @@ def _traced(model: Any, par: ParameterSet) -> frozenset[str]:
 
 
 class _Zeros:
-    """Which numbers are zero whatever they are computed from; kernels leave these out, too."""
+    """Numbers that are zero whatever their inputs; kernels leave these out, too."""
 
     def __init__(self) -> None:
-        self._known: dict[int, tuple[bool, Any]] = {}  # with the number, whose identity it keeps
+        self._known: dict[int, tuple[bool, Any]] = {}  # kept alive: ids stay unique
 
     def has(self, value: Any) -> bool:
         """Return whether a number is zero."""
@@ -204,7 +206,7 @@ class _Zeros:
 
 
 def _names_that_count(values: Any, zeros: _Zeros) -> Iterator[Any]:
-    """Yield the names that values are computed from, but for those of zeros."""
+    """Yield the names from which values are computed, without those of zeros."""
     waiting, seen = [values], set()
     while waiting:
         each = waiting.pop()

@@ -1,13 +1,13 @@
-"""Where the energy of a run came from and where it went, from its recording.
+"""Energy balance of a run, from its recording: sources, sinks, closing error and warnings.
 
-What an energy is in the books its signal says (``core.signals.Role``); recordings carry it in the
-attributes of their variables. Where nothing is said, ``E_source`` is given, ``E_stored`` and every
-other ``E_...`` is taken.
+The role of an energy in the balance is declared by its signal (``core.signals.Role``); recordings
+contain it in the attributes of their variables. Without a declared role, ``E_source`` is a source,
+and ``E_stored`` and every other ``E_...`` are sinks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any
@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from bywire.core.signals import Role
+from bywire.core.signals import Role, signals_of
+from bywire.simulation.run import Run
 
 _PREFIX = "energy_"
 _ROLE = tuple(each.name for each in fields(Role))
@@ -23,15 +24,15 @@ _ROLE = tuple(each.name for each in fields(Role))
 
 @dataclass(frozen=True)
 class Posting:
-    """What one place gave or took.
+    """Energy of one source or sink.
 
     Parameters
     ----------
     name, label
-        Variable, and what people read.
+        Variable, and its label.
     energy
-        In J, signed: a source that takes energy back and a loss below zero are negative. Of the
-        rows of several runs an array of shape (runs,), as everything that follows from it.
+        Energy in J, signed: a source that takes energy back and a loss below zero are negative.
+        For the rows of several runs an array of shape (runs,), like everything derived from it.
     """
 
     name: str
@@ -48,13 +49,13 @@ class Ledger:
 
     @property
     def turnover(self) -> float:
-        """Energy that was given by all that gave [J]."""
+        """Energy delivered by all sources, and by sinks that deliver energy [J]."""
         given: float = sum(_positive(posting.energy) for posting in self.sources)
         return given + sum(_positive(-posting.energy) for posting in self.sinks)
 
     @property
     def closing_error(self) -> float:
-        """What the sources gave less what the sinks took [J]: the error of the books."""
+        """Energy of the sources minus energy of the sinks [J]: the error of the balance."""
         given = sum(posting.energy for posting in self.sources)
         return given - sum(posting.energy for posting in self.sinks)
 
@@ -64,13 +65,13 @@ def _positive(energy: float) -> float:
 
 
 def _plain(energy: Any) -> float:
-    """Return the energy of one run as a float, those of several as they are."""
+    """Return the energy of one run as a float, and those of several runs as an array."""
     several: Any = energy
     return float(energy) if np.ndim(energy) == 0 else several
 
 
 def role_attributes(role: Role | None) -> dict[str, str]:
-    """Return a role as attributes of a variable; none where there is no role."""
+    """Return a role as attributes of a variable; no attributes without a role."""
     if role is None:
         return {}
     values = {each.name: getattr(role, each.name) for each in fields(Role)}
@@ -79,17 +80,16 @@ def role_attributes(role: Role | None) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Delivery:
-    """What a loss gave, which cannot give energy.
+    """Energy that a loss returned, although a loss cannot deliver energy.
 
     Parameters
     ----------
     name, label, book
-        Variable, what people read, and the book in which it stands, empty for the actuator's own.
+        Variable, its label, and its balance, empty for the actuator's own.
     energy
-        In J, >= 0: the most that it gave back of what it had taken, or beyond that. Of the rows of
-        several runs an array of shape (runs,).
+        Largest returned energy in J, >= 0. For the rows of several runs an array of shape (runs,).
     turnover
-        Energy that was turned over in the book, in J.
+        Energy turnover of the balance in J.
     """
 
     name: str
@@ -100,10 +100,10 @@ class Delivery:
 
 
 def deliveries(recording: xr.Dataset, among: Collection[str] | None = None) -> list[Delivery]:
-    """Return what every loss of a recording gave back, in all books.
+    """Return the energy that every loss of a recording returned, in all balances.
 
-    Work, ``W_...``, is no loss and has either sign. Recordings of the ends alone tell what was
-    given back in all. ``among``: names of the losses that count; all by default.
+    Work, ``W_...``, is not a loss and may have either sign. Recordings of both ends alone determine
+    the total. ``among``: names of the losses to check; all by default.
     """
     roles = _roles(recording, _energies(recording))
     losses = {
@@ -118,32 +118,34 @@ def deliveries(recording: xr.Dataset, among: Collection[str] | None = None) -> l
         book: _ledger(recording, book, is_split=False).turnover
         for book in dict.fromkeys(role.book for role in losses.values())
     }
-    made = []
+    returned = []
     for name, role in losses.items():
         values = recording.variables[name].values
-        # What may return a while counts at the end, of which rows of ends alone tell the same.
+        # A loss that may return energy for a while counts at the end only.
         fallen = -values[..., -1:] if role.returns else np.maximum.accumulate(values, -1) - values
         most = _plain(np.max(fallen, axis=-1))
-        made.append(Delivery(name, role.label, role.book, _positive(most), turnovers[role.book]))
-    return made
+        returned.append(
+            Delivery(name, role.label, role.book, _positive(most), turnovers[role.book])
+        )
+    return returned
 
 
 def actuator_ledger(recording: xr.Dataset, is_split: bool = True) -> Ledger:
-    """Return the books of an actuator or rig, between the ends of a recording.
+    """Return the energy balance of an actuator or rig, between the ends of a recording.
 
-    ``recording``: recording with energies [J]. Where all of these stand in further books, as those
-    of a vehicle without actuators do, it is the first of them. ``is_split``: whether sinks that are
-    booked in two parts, moving and holding, are; that takes all rows of them.
+    ``recording``: recording with energies [J]. If all energies are in further balances, as those of
+    a vehicle without actuators are, it is the first of them. ``is_split``: whether to split sinks
+    into moving and holding where declared, which takes all rows.
     """
     return _ledger(recording, _main_book(recording), is_split)
 
 
 def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
-    """Return the books beyond the actuator's own that its signals name, by name.
+    """Return the energy balances beyond the actuator's own, by name.
 
-    A book in which a source stands in the place of one of the actuator's holds the actuator's
-    postings too, and what that source gives more is taken by a sink: of a disc that is braked, the
-    heat of the pads. Others stand by themselves. Books in which nothing was posted, of what is
+    A balance in which a source replaces one of the actuator's sources includes the actuator's
+    energies, too. The additional energy of that source goes to a sink: for a braked disc, the heat
+    of the pads. Other balances are separate. Balances without any energy, because their part is
     switched off, are left out.
     """
     main = _main_book(recording)
@@ -157,7 +159,7 @@ def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
 
 
 def _main_book(recording: xr.Dataset) -> str:
-    """Return the book that stands first: that of the actuator where it takes anything."""
+    """Return the name of the first balance: the actuator's, if it has a sink."""
     books = _books(recording, ("sink",))
     return "" if "" in books else next(iter(books), "")
 
@@ -165,21 +167,21 @@ def _main_book(recording: xr.Dataset) -> str:
 def _books(
     recording: xr.Dataset, sides: tuple[str, ...] = ("source", "sink", "standstill")
 ) -> dict[str, None]:
-    """Return the names of all books with postings on some sides, in the recording's order."""
+    """Return the names of all balances with energies on some sides, in the recording's order."""
     roles = _roles(recording, _energies(recording)).values()
     return dict.fromkeys(role.book for role in roles if role.side in sides)
 
 
 def ledger(recording: xr.Dataset, sources: Mapping[str, str], sinks: Mapping[str, str]) -> Ledger:
-    """Return the books of some variables.
+    """Return the energy balance of some variables.
 
     Parameters
     ----------
     recording
-        Recording with energies [J]; of each the difference between end and start counts.
+        Recording with energies [J]; the difference between end and start of each counts.
     sources, sinks
-        Label by variable. What a recording lacks is left out, and a sink whose parts, moving and
-        holding, are named too.
+        Label by variable. Variables that the recording does not have are left out, and sinks whose
+        parts, moving and holding, are both named.
     """
     changes = _changes(recording) | _split(recording)
     given, taken = (
@@ -220,9 +222,9 @@ def _ledger(recording: xr.Dataset, book: str, is_split: bool = True) -> Ledger:
 
 
 def _roles(recording: xr.Dataset, names: Collection[str]) -> dict[str, Role]:
-    """Return what every energy is in the books: what is declared first, then what names say."""
-    said = {name: _role_of(recording.variables[name]) for name in names}
-    roles = {name: role for name, role in said.items() if role is not None}
+    """Return the role of every energy: as declared, else as its name implies."""
+    declared = {name: _role_of(recording.variables[name]) for name in names}
+    roles = {name: role for name, role in declared.items() if role is not None}
     if "E_source" in names and not any(role.side == "source" for role in roles.values()):
         roles["E_source"] = Role("source", "source")
     for name in sorted(names, key=lambda name: name != "E_stored"):
@@ -234,19 +236,19 @@ def _roles(recording: xr.Dataset, names: Collection[str]) -> dict[str, Role]:
 
 
 def _role_of(variable: xr.Variable) -> Role | None:
-    said = variable.attrs
-    named = (name for name in _ROLE if _PREFIX + name in said)
-    return _role(tuple((name, str(said[_PREFIX + name])) for name in named))
+    attributes = variable.attrs
+    named = (name for name in _ROLE if _PREFIX + name in attributes)
+    return _role(tuple((name, str(attributes[_PREFIX + name])) for name in named))
 
 
 @cache
 def _role(attributes: tuple[tuple[str, str], ...]) -> Role | None:
-    said: dict[str, Any] = dict(attributes)
-    return Role(**{**said, "split": bool(said.get("split"))}) if "side" in said else None
+    values: dict[str, Any] = dict(attributes)
+    return Role(**{**values, "split": bool(values.get("split"))}) if "side" in values else None
 
 
 def _changes(recording: xr.Dataset) -> dict[str, float]:
-    """Return what every energy grew by [J]."""
+    """Return the increase of every energy [J]."""
     changes = {}
     for name in _energies(recording):
         values = recording.variables[name].values
@@ -257,14 +259,15 @@ def _changes(recording: xr.Dataset) -> dict[str, float]:
 def _energies(recording: xr.Dataset) -> list[str]:
     """Return the names of all energies."""
     named = (str(key) for key in recording.data_vars if str(key).startswith(("E_", "W_")))
-    # Its variables: to give an array its coordinates costs more than all the books.
+    # Variables, as arrays with coordinates would cost more than all balances.
     return [name for name in named if recording.variables[name].ndim == 1]
 
 
 def _split(recording: xr.Dataset) -> dict[str, float]:
-    """Return what the sinks that are booked in two parts took, moving and holding [J].
+    """Return the energies of sinks that are split into moving and holding [J].
 
-    Holding is what an energy grew by while all stood still: evenly within each recorded interval.
+    Holding is the increase of an energy at standstill, taken as even within each recorded
+    interval.
     """
     every = {str(key): _role_of(recording.variables[key]) for key in recording.data_vars}
     still = next((name for name, role in every.items() if role and role.side == "standstill"), "")
@@ -278,3 +281,107 @@ def _split(recording: xr.Dataset) -> dict[str, float]:
         changes[f"{name}_moving"] = _plain(whole - holding)
         changes[f"{name}_holding"] = _plain(holding)
     return changes
+
+
+_OPEN = 1e-5  # of the turnover: largest closing error, and largest energy that a loss may return
+_NOTHING = 1e-9  # J: rounding of the stored energy while nothing moves
+
+
+def energy_doubts(recording: xr.Dataset, runs: Sequence[Run] = ()) -> list[str]:
+    """Return warnings on impossible energies in a recording.
+
+    These are an energy balance whose closing error is larger than the step can explain, and a loss
+    that delivers energy. The scheme closes the balance to a few parts in 1e8, the remainder of
+    nonlinear elements, and a loss grows in every substep. Both fail where extreme parameters make
+    numbers cancel, or where an element's equations leave their range.
+
+    ``runs``: the run of the recording, if known.
+    """
+    return energy_doubts_of_cases(recording, 1, runs)[0]
+
+
+def energy_doubts_of_cases(
+    recording: xr.Dataset, cases: int, runs: Sequence[Run] = ()
+) -> list[list[str]]:
+    """Return the `energy_doubts` of each of several runs, from the rows of all."""
+    doubts: list[list[str]] = [[] for _ in range(cases)]
+    for each in deliveries(recording, _losses(runs)):
+        if not np.any(_is_delivered(each)):
+            continue
+        where = f" of the balance {each.book!r}" if each.book else ""
+        energies, totals = (np.broadcast_to(e, cases) for e in (each.energy, each.turnover))
+        is_wrong = np.broadcast_to(_is_delivered(each), cases)
+        for k in np.flatnonzero(is_wrong).tolist():
+            doubts[k].append(
+                f"the loss {each.label!r}{where} ({each.name}) delivers {energies[k]:.3g} J of a "
+                f"turnover of {totals[k]:.3g} J, which is impossible: do not trust this run, take "
+                "a smaller step, and look for an extreme parameter"
+            )
+    if _are_surely_closed(recording):
+        return doubts
+    books = actuator_ledger(recording)
+    error, turned = (np.broadcast_to(each, cases) for each in (books.closing_error, books.turnover))
+    for k, (left, total) in enumerate(zip(error.tolist(), turned.tolist(), strict=True)):
+        if abs(left) > _OPEN * total + _NOTHING:
+            doubts[k].append(
+                f"the energy balance is open by {abs(left):.3g} J of a turnover of {total:.3g} J: "
+                "do not trust this run, take a smaller step, and look for an extreme parameter"
+            )
+    return doubts
+
+
+def _losses(runs: Sequence[Run]) -> Collection[str] | None:
+    """Return the losses that must grow in every substep; None for all.
+
+    The loss of a contact includes the energy of a change of its parameters, see
+    `bywire.simulation.advance`.
+    """
+    return runs[0].model.Flow._fields if any(run.changes for run in runs) else None
+
+
+def _is_delivered(delivery: Delivery) -> Any:
+    """Return whether a loss returned more than rounding explains, for each of several runs."""
+    return np.greater(delivery.energy, _OPEN * delivery.turnover + _NOTHING)
+
+
+def are_surely_sound(recording: xr.Dataset, runs: Sequence[Run] = ()) -> bool:
+    """Return whether the ends of a recording, or of several runs, exclude `energy_doubts`."""
+    given = deliveries(recording, _losses(runs))
+    is_quiet = not any(np.any(_is_delivered(each)) for each in given)
+    return is_quiet and _are_surely_closed(recording)
+
+
+def _are_surely_closed(recording: xr.Dataset) -> bool:
+    """Return whether the ends of a recording, or of several runs, exclude a closing error."""
+    books = actuator_ledger(recording, is_split=False)
+    if not (books.sources and books.sinks):
+        return True
+    # Splitting a sink cannot reduce the turnover: if the whole is far from the bound, so are parts.
+    return bool(np.all(2.0 * np.abs(books.closing_error) <= _OPEN * books.turnover + _NOTHING))
+
+
+def energy_signals(run: Run) -> tuple[str, ...]:
+    """Return the outputs of a run's model that are part of an energy balance."""
+    return tuple(
+        name
+        for name, signal in signals_of(run.model.Output).items()
+        if name.startswith(("E_", "W_")) or signal.role is not None
+    )
+
+
+def energy_residual(recording: xr.Dataset) -> xr.DataArray:
+    """Return the energy input minus losses minus the change of stored energy [J].
+
+    It is zero except for the numerical error. It covers the actuator's own balance only.
+    """
+    losses = sum(
+        values
+        for name, values in recording.items()
+        if str(name).startswith("E_")
+        and name not in ("E_source", "E_stored")
+        and "energy_book" not in values.attrs
+    )
+    balance = recording["E_source"] - losses - recording["E_stored"]
+    residual: xr.DataArray = balance - float(balance.values[0])
+    residual.attrs = {"units": "J", "long_name": "residual of the energy balance"}
+    return residual

@@ -1,22 +1,36 @@
-"""One bench for many values of its parameters and options, side by side, each one judged."""
+"""Many benches of one experiment, side by side where they differ in numbers alone."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any, NamedTuple, overload
+from functools import lru_cache, partial
+from typing import Any, NamedTuple, cast, overload
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.bench.option_names import OPTION, split_options
-from bywire.bench.result import Result
-from bywire.bench.running import Progress, judged, recording_of, static_recordings
-from bywire.bench.side_by_side import rounds
+from bywire.bench.changes import OPTION, split_options
+from bywire.bench.energy_ledger import are_surely_sound, energy_doubts_of_cases, energy_signals
+from bywire.bench.experiment import Case, check_memory
+from bywire.bench.kpis.families import FamilyJudge, of_cases
+from bywire.bench.kpis.kpi import Kpi, KpiOfCases
+from bywire.bench.recording import ends_of_group, rows_of_group, watch_cases
+from bywire.bench.rows import Rows
+from bywire.bench.running import (
+    Progress,
+    Result,
+    inputs_recorded,
+    judged,
+    recording_of,
+    rows_of_case,
+    rows_recorded,
+    run_of,
+    static_recordings,
+)
 from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, abandoned, steps_of, unestimated
 from bywire.core.arguments import checked
 from bywire.core.errors import InputError, ParameterError, unknown_name
@@ -24,24 +38,25 @@ from bywire.core.leaf import Leaf
 from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
 from bywire.core.typing import Array
 from bywire.simulation import ensemble
-from bywire.simulation.ensemble import Ensemble, Variations
-from bywire.simulation.run import Run
+from bywire.simulation.engine import CUDA
+from bywire.simulation.ensemble import Ensemble, RunGroup, Variations, fit_lanes, simulate_group
+from bywire.simulation.run import Run, Trajectory, simulate
 
 
 def varied_choices(bench: Bench) -> Mapping[str, tuple[Any, ...]]:
-    """Return what every choice of a bench that may vary can be, by its name.
+    """Return the possible values of every choice of a bench that may vary, by name.
 
-    Structural choices of the brake, and of the options ``options.NAME`` those that are listed
-    or true or false: a text of another kind names a signal, or a file.
+    These are the structural choices of the brake, and those options ``options.NAME`` that have
+    listed values or are true or false. Other texts name a signal or a file.
     """
     return choices_that_vary(type(bench.par), type(bench.chosen_options))
 
 
-@lru_cache(maxsize=64)  # the cases of a study ask for the same ones
+@lru_cache(maxsize=64)  # the same for all cases of a study
 def choices_that_vary(
     of: type[ParameterSet], chosen: type[ParameterSet]
 ) -> Mapping[str, tuple[Any, ...]]:
-    """Return the same by the classes of a bench's parameters and options."""
+    """Return `varied_choices` by the classes of a bench's parameters and options."""
     options = {f"{OPTION}{name}": choices_of(chosen, name) for name in choice_fields(chosen)}
     parameters = {name: choices_of(of, name) for name in choice_fields(of)}
     return parameters | {name: admitted for name, admitted in options.items() if admitted}
@@ -52,21 +67,21 @@ def choices_that_vary(
 
 @dataclass(frozen=True)
 class BenchEnsemble:
-    """What a bench gave for many values.
+    """Results of a bench for many values of its parameters and options.
 
     Parameters
     ----------
     variations
         Parameter, or ``options.NAME``, by name -> its value [SI] in each case, shape (cases,).
     results
-        What each case gave, judged by the bench's requirements.
+        Result of each case, judged by the bench's requirements.
     """
 
     variations: Mapping[str, Array]
     results: tuple[Result, ...]
 
     def kpi(self, name: str) -> Array:
-        """Return a key figure of every case, shape (cases,); NaN where it is not defined."""
+        """Return a key figure of every case, shape (cases,); NaN where undefined."""
         return np.array([result.kpi(name).value for result in self.results])
 
     @property
@@ -80,9 +95,9 @@ class BenchEnsemble:
         Raises
         ------
         UnknownNameError
-            When there is no such signal.
+            When the signal is unknown.
         ParameterError
-            When the experiment makes several runs: take ``results[k].recordings``.
+            When the experiment makes several runs: use ``results[k].recordings``.
         """
         each = [result.recording for result in self.results]
         if signal not in each[0]:
@@ -125,43 +140,49 @@ def simulate_ensemble(
     ----------
     run
         A run: model, parameters, initial values, stimulus, steps; see
-        `bywire.simulation.ensemble.simulate_ensemble`. Or a bench: every case then starts where
-        the experiment starts it with these parameters, and has its key figures and verdicts.
+        `bywire.simulation.ensemble.simulate_ensemble`. Or a bench: every case then has the initial
+        values that the experiment computes from its parameters, with key figures and verdicts.
     variations
-        Dotted name of a parameter, or of a bench ``options.NAME`` -> its value [SI] in each case,
-        shape (cases,). What is not named keeps its value.
+        Dotted name of a parameter, or ``options.NAME`` of a bench -> its value [SI] in each case,
+        shape (cases,). Other parameters keep their values.
     signals
-        Outputs of a run to record. A bench records all that its key figures need.
+        Outputs of a run to record. A bench records all signals that its key figures need.
     threads
         Threads to use, >= 1; all cores by default.
     engine
-        What computes: ``auto``, the bench's own or lanes of this machine's processor;
-        ``compiled``, ``virtual-machine``, or ``cuda``, a graphics processor (``docs/studies.md``).
+        ``auto``, the engine of the bench or lanes of this machine's processor; ``compiled``;
+        ``virtual-machine``; or ``cuda``, a graphics processor (``docs/studies.md``).
 
     Returns
     -------
     Ensemble
-        Of a run: its signals, shape (cases, rows) each.
+        For a run: its signals, shape (cases, rows) each.
     BenchEnsemble
-        Of a bench: recordings, key figures and verdicts of every case.
+        For a bench: recordings, key figures and verdicts of every case.
 
     Raises
     ------
     InputError
-        For names that are unknown, values out of range, and variations of several lengths.
+        For unknown names, values out of range, and variations of different lengths.
     RunError
-        When a trajectory leaves the numbers.
+        When a trajectory becomes infinite or not a number.
     """
     if isinstance(run, Run):
         if signals is None:
-            raise ParameterError("signals are missing: name the outputs of the run to record")
+            raise ParameterError(
+                "signals are missing: name the outputs of the run to record", name="signals"
+            )
         return ensemble.simulate_ensemble(run, variations, signals, threads, engine)
     if signals is not None:
-        raise ParameterError("a bench records all signals: leave signals out")
+        raise ParameterError("a bench records all signals: leave signals out", name="signals")
     arrays = {name: np.atleast_1d(np.asarray(v, dtype=float)) for name, v in variations.items()}
     lengths = {name: array.size for name, array in arrays.items()}
     if not arrays or len(set(lengths.values())) != 1 or 0 in lengths.values():
-        raise ParameterError(f"variations must have one length >= 1 each, got {lengths}")
+        raise ParameterError(
+            f"variations must all have the same length >= 1, got {lengths}",
+            name="variations",
+            value=str(lengths),
+        )
     benches = [
         changed(run, {name: float(array[k]) for name, array in arrays.items()})
         for k in range(next(iter(lengths.values())))
@@ -170,12 +191,12 @@ def simulate_ensemble(
 
 
 def varied_leaf(bench: Bench, name: str) -> Leaf:
-    """Return the description of a parameter, or of an option ``options.NAME``, that may vary.
+    """Return the description of a number of the parameters or options that may vary.
 
     Raises
     ------
     UnknownNameError
-        With the nearest numbers of the bench.
+        With the most similar names of the bench.
     """
     return _varied_leaf(type(bench.par), type(bench.chosen_options), name)
 
@@ -191,20 +212,20 @@ def _varied_leaf(of: type[ParameterSet], chosen: type[ParameterSet], name: str) 
 
 
 class _Names(NamedTuple):
-    """Names of what is changed of a bench."""
+    """Names of changed parameters and options of a bench."""
 
     parameters: tuple[str, ...]
     options: tuple[tuple[str, str], ...]
-    """each with its name among the options"""
+    """each name with the name among the options"""
     switches: frozenset[str]
-    """those that are true or false"""
+    """names of choices that are true or false"""
 
 
-@lru_cache(maxsize=64)  # the cases of a study all change the same
+@lru_cache(maxsize=64)  # the same for all cases of a study
 def _names_within(
     of: type[ParameterSet], chosen: type[ParameterSet], names: tuple[str, ...]
 ) -> _Names:
-    """Return which names are of parameters and which of options, or refuse one that is of none."""
+    """Sort names into parameters and options, or reject an unknown one."""
     choices = choices_that_vary(of, chosen)
     for name in names:
         if name not in choices:
@@ -215,14 +236,15 @@ def _names_within(
 
 
 def changed(bench: Bench, values: Mapping[str, float | str], seed: int | None = None) -> Bench:
-    """Return a bench with other parameters, choices and options [SI], and noise of another seed.
+    """Return a bench with other parameters, choices and options [SI], and another seed.
 
-    What is true or false is a text, ``"true"`` or ``"false"``, as other choices are.
+    Switches are texts, ``"true"`` or ``"false"``, like other choices.
 
     Raises
     ------
     InputError
-        When one is unknown or out of range, or contradicts another; the values are named.
+        When a name is unknown, or a value out of range or in contradiction to another; the message
+        lists the values.
     """
     names = _names_within(type(bench.par), type(bench.chosen_options), tuple(values))
     plain: Mapping[str, Any] = values
@@ -233,11 +255,11 @@ def changed(bench: Bench, values: Mapping[str, float | str], seed: int | None = 
     try:
         return bench.varied(overrides, options, seed)
     except InputError as error:
-        said = ", ".join(
+        changes = ", ".join(
             f"{name} = {value}" if isinstance(value, str) else f"{name} = {value:g}"
             for name, value in values.items()
         )
-        raise error.reworded(f"{said} (in SI): {error}") from None
+        raise error.reworded(f"{changes} (in SI): {error}") from None
 
 
 def run_benches(
@@ -250,7 +272,7 @@ def run_benches(
     """Make all runs of several benches of one experiment, and judge each bench.
 
     Cases that differ in numbers alone (parameters, initial values, stimuli) run side by side in
-    lanes; others, and all without a compiler, one after the other.
+    lanes. Other cases, and all cases without a compiler, run one after the other.
 
     Parameters
     ----------
@@ -263,12 +285,12 @@ def run_benches(
     threads
         Threads to use, >= 1; all cores by default.
     estimate_error
-        Whether all runs are made again in other steps; see `bywire.bench.running.run`.
+        Whether to repeat all runs in other steps; see `bywire.bench.running.run`.
 
     Raises
     ------
     StepError
-        When the runs do not fit into this machine together, or steps do not divide each other.
+        When the runs together need too much memory, or steps do not divide each other.
     RunError
         When a run fails.
     KeyboardInterrupt
@@ -287,7 +309,7 @@ def run_benches(
                 each[factor] = further
             continue
         for bench, each, failed, most in zip(benches, others, failures, limits, strict=True):
-            try:  # a single case may be what keeps them from running side by side
+            try:  # a single case may prevent a joint run
                 other = replace(bench, step=factor * bench.step)
                 (each[factor],) = _recordings([other], progress, engine, threads, limits=[most])
             except NO_ESTIMATE as error:
@@ -311,7 +333,7 @@ def _recordings(
     work: Sequence[dict[str, float]] = (),
     limits: Sequence[Mapping[str, float]] = (),
 ) -> list[dict[str, xr.Dataset]]:
-    """Return the recordings of each bench by label, and note what work they took."""
+    """Return the recordings of each bench by label, and add the work of its runs."""
     recordings = [static_recordings(bench) for bench in benches]
     for made in rounds(benches, progress, engine, threads, limits=limits):
         given = zip(made.places, made.cases, made.runs, made.trajectories, strict=True)
@@ -320,3 +342,243 @@ def _recordings(
             if work:
                 work[k][case.label] = trajectory.work
     return recordings
+
+
+# --- Runs side by side
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Outputs to record of runs side by side.
+
+    Parameters
+    ----------
+    signals
+        Outputs in all rows.
+    ends
+        Outputs in the first and last rows alone. Runs with changes, and graphics processors, record
+        them in all rows.
+    """
+
+    signals: tuple[str, ...]
+    ends: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Round:
+    """One run of each of several benches.
+
+    Parameters
+    ----------
+    places
+        Indices of the benches that make this run.
+    cases, runs, trajectories
+        Case of each bench, its run for the engine, and the trajectory.
+    """
+
+    places: Sequence[int]
+    cases: Sequence[Case]
+    runs: Sequence[Run]
+    trajectories: Sequence[Trajectory]
+
+
+def rounds(
+    benches: Sequence[Bench],
+    progress: Progress | None = None,
+    engine: str = "auto",
+    threads: int | None = None,
+    signals: Callable[[Run], Wanted | None] = lambda _: None,
+    limits: Sequence[Mapping[str, float]] = (),
+) -> Iterator[Round]:
+    """Yield the first run of all benches, the second one, and so on.
+
+    Runs that fit into lanes are a `RunGroup`, which records only rows that a recording keeps. Other
+    runs, and all runs without a compiler, are computed one after the other.
+
+    Parameters
+    ----------
+    benches
+        Benches of one experiment.
+    progress, engine, threads
+        As in `run_benches`.
+    signals
+        ``signals(run)``: outputs to record of runs side by side; None for all.
+    limits
+        For each bench the largest work of its runs, by label; unlimited by default.
+
+    Raises
+    ------
+    StepError
+        When the runs together need too much memory.
+    RunError
+        When a run fails.
+    KeyboardInterrupt
+        When interrupted.
+    """
+    every = [bench.cases() for bench in benches]
+    for number in range(max(len(each) for each in every)):
+        places = [k for k, each in enumerate(every) if number < len(each)]
+        cases = [every[k][number] for k in places]
+        runs = [run_of(benches[k], case, number) for k, case in zip(places, cases, strict=True)]
+        if limits:
+            runs = [
+                replace(run, most_work=limits[k][case.label])
+                for k, case, run in zip(places, cases, runs, strict=True)
+            ]
+        wanted = signals(runs[0])
+        outputs = runs[0].model.Output._fields if wanted is None else wanted.signals
+        ends = () if wanted is None else wanted.ends
+        kinds = [benches[k].engine if engine == "auto" else engine for k in places]
+        if ends and (kinds[0] == CUDA or any(run.changes for run in runs)):
+            both, ends = {*outputs, *ends}, ()
+            outputs = tuple(name for name in runs[0].model.Output._fields if name in both)
+        check_memory(runs[0], len(runs) * len(outputs))
+        report = None if progress is None else partial(progress, cases[0].label)
+        kept = {(case.settle, case.keep) for case in cases}
+        computing = {"auto" if kind == "compiled" else kind for kind in kinds}
+        is_alike = len(computing) == 1 and len(kept) == 1
+        if is_alike and len(runs) > 1 and fit_lanes(runs, kinds[0]):
+            times = runs[0].schedule().record_times - cases[0].settle
+            first = int(np.searchsorted(times, -cases[0].keep - 1e-9))
+            group = simulate_group(runs, outputs, threads, report, first, kinds[0], ends)
+            yield Round(places, cases, runs, group)
+        else:
+            yield Round(places, cases, runs, _one_by_one(runs, report, kinds))
+
+
+def _one_by_one(runs: Sequence[Run], report: Any, kinds: Sequence[str]) -> list[Trajectory]:
+    computed = []
+    for k, (run, engine) in enumerate(zip(runs, kinds, strict=True)):
+        share = None if report is None else partial(_share, report, k, len(runs))
+        trajectory = simulate(run, engine=engine, progress=share)
+        if trajectory.status == "interrupted":
+            raise KeyboardInterrupt
+        computed.append(trajectory)
+    return computed
+
+
+def _share(report: Any, k: int, count: int, share: float) -> None:
+    report((k + share) / count)
+
+
+# --- Key figures and warnings without recordings
+
+
+@dataclass(frozen=True)
+class KeyFigures:
+    """Key figures and warnings of benches of one experiment, without recordings.
+
+    Parameters
+    ----------
+    figures
+        Key figures, each for all benches.
+    warnings
+        Warnings of the runs of each bench.
+    """
+
+    figures: tuple[KpiOfCases, ...]
+    warnings: tuple[tuple[str, ...], ...]
+
+    def kpis(self, k: int) -> tuple[Kpi, ...]:
+        """Return the key figures of one bench."""
+        return tuple(figure.case(k) for figure in self.figures)
+
+
+def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyFigures:
+    """Return the key figures of several benches of one experiment, equal to `run_benches`.
+
+    Parameters
+    ----------
+    benches
+        Benches of one experiment and the same choices.
+    threads
+        Threads to use, >= 1; all cores by default.
+
+    Raises
+    ------
+    StepError
+        When the runs need too much memory.
+    RunError
+        When a run fails.
+    KeyboardInterrupt
+        When interrupted.
+    """
+    judge, options = benches[0].definition.judge, [bench.chosen_options for bench in benches]
+    families = judge if isinstance(judge, FamilyJudge) and _is_plain(benches[0]) else None
+    recordings: list[dict[str, Any]] = [static_recordings(bench) for bench in benches]
+    warnings: list[list[str]] = [[] for _ in benches]
+    wanted = set() if families is None else families.signals(options)
+    signals = partial(needed, wanted) if families is not None else lambda _: None
+    figures: tuple[KpiOfCases, ...] | None = None
+    for made in rounds(benches, threads=threads, signals=signals):
+        group = made.trajectories
+        if not isinstance(group, RunGroup):
+            _recorded(benches, made, recordings, warnings)
+            continue
+        rows = rows_of_group(group, made.cases[0].settle)
+        texts = watch_cases(
+            rows, group.runs, group.unsettled.tolist(), _books(made, group, rows, threads)
+        )
+        for k, case, each in zip(made.places, made.cases, texts, strict=True):
+            warnings[k] += _labeled(benches[k], case, each)
+        if families is not None:
+            if benches[0].definition.beside is not None:
+                rows = inputs_recorded(rows, made.cases, wanted)
+            figures = families.of_cases(rows, options, [run.par for run in group.runs])
+            continue
+        for j, (k, case) in enumerate(zip(made.places, made.cases, strict=True)):
+            recordings[k][case.label] = rows_of_case(benches[k], case, rows, group, j)
+    if figures is None:
+        figures = tuple(of_cases(list(map(judge, recordings, options))))
+    return KeyFigures(figures, tuple(map(tuple, warnings)))
+
+
+def _is_plain(bench: Bench) -> bool:
+    """Return whether an experiment makes one run and adds nothing to its recording."""
+    definition = bench.definition
+    return definition.static is None and definition.finish is None and len(bench.cases()) == 1
+
+
+def needed(wanted: set[str], run: Run) -> Wanted | None:
+    """Return the outputs that key figures, warnings and energy balances read; None for all."""
+    watched, names = run.model.watched(run.par), run.model.Output._fields
+    if watched is None:
+        return None
+    rows, booked = {*wanted, *watched}, set(energy_signals(run))
+    return Wanted(
+        tuple(name for name in names if name in rows),
+        tuple(name for name in names if name in booked - rows),
+    )
+
+
+def _books(made: Round, group: RunGroup, rows: Rows, threads: int | None) -> list[list[str]]:
+    """Return the warnings of every run on impossible energies.
+
+    For most runs the two ends exclude such warnings. Otherwise all rows are computed.
+    """
+    if group.end_names:
+        if are_surely_sound(cast(xr.Dataset, ends_of_group(group)), made.runs):
+            return [[] for _ in made.runs]
+        every, first = energy_signals(made.runs[0]), group.runs[0].schedule().rows
+        group = simulate_group(made.runs, every, threads, first=first - group.time.size)
+        rows = rows_of_group(group, made.cases[0].settle)
+    return energy_doubts_of_cases(cast(xr.Dataset, rows), len(made.runs), made.runs)
+
+
+def _recorded(
+    benches: Sequence[Bench],
+    made: Round,
+    recordings: list[dict[str, Any]],
+    warnings: list[list[str]],
+) -> None:
+    """Add the recordings and warnings of runs that were computed one after the other."""
+    for k, case, run, trajectory in zip(
+        made.places, made.cases, made.runs, made.trajectories, strict=True
+    ):
+        recordings[k][case.label], texts = rows_recorded(benches[k], case, run, trajectory)
+        warnings[k] += _labeled(benches[k], case, texts)
+
+
+def _labeled(bench: Bench, case: Case, texts: Sequence[str]) -> list[str]:
+    """Return warnings, with the run's label if there are several runs."""
+    return [f"{case.label}: {t}" for t in texts] if len(bench.cases()) > 1 else list(texts)

@@ -1,10 +1,11 @@
-"""What an experiment is: the runs that it makes of a brake, and how their recordings are judged."""
+"""An experiment: the runs that it makes of a brake, and how their recordings are judged."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from decimal import Decimal
 from functools import lru_cache
 from string import Formatter
 from typing import Any, Self
@@ -15,8 +16,10 @@ from numpy.typing import NDArray
 
 from bywire.bench.kpis import hysteresis, sine_sweep, step_response, tracking
 from bywire.bench.kpis.kpi import Kpi
+from bywire.core import units
 from bywire.core.arguments import checked
-from bywire.core.errors import ModelError, StepError, quoted
+from bywire.core.errors import ModelError, StepError, not_valid, quoted
+from bywire.core.machine_memory import machine_memory as _memory
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.quantities import display_unit
@@ -33,15 +36,15 @@ _POOL = 4  # words of a seed, at least, before what tells its children apart
 def put_noise(samples: NDArray[np.float64], seed: Sequence[int], child: int) -> None:
     """Fill samples with standard normal noise, shape (samples,).
 
-    They are those of ``SeedSequence(seed, spawn_key=(child,))``, which takes a third of the time
-    where it is given its words.
+    The samples equal those of ``SeedSequence(seed, spawn_key=(child,))``. Passing the words of the
+    seed directly takes a third of the time.
 
     Parameters
     ----------
     seed
         Integers >= 0.
     child
-        Which of the generators of this seed, >= 0.
+        Number of the generator among those of this seed, >= 0.
     """
     words = [word for number in seed for word in _words(number)]
     words += [0] * (_POOL - len(words))
@@ -54,24 +57,24 @@ def put_noise(samples: NDArray[np.float64], seed: Sequence[int], child: int) -> 
 
 
 def _words(number: int) -> Iterator[int]:
-    """Yield the words of an integer, the lowest first; one of zero."""
+    """Yield the 32-bit words of an integer, the lowest first; one word for zero."""
     yield number & 0xFFFFFFFF
     while number := number >> _WORD:
         yield number & 0xFFFFFFFF
 
 
-# --- The line on an experiment, with the values of its options in it
+# --- Summaries: one line on an experiment, with the values of its options
 
 
 class Summary(str):
-    """A line on an experiment that remembers where options stand in it.
+    """Summary of an experiment, with the template from which it was made.
 
     Parameters
     ----------
     text
         The line.
     template
-        The same with names of options in braces.
+        The same line with names of options in braces.
     """
 
     template: str
@@ -83,38 +86,40 @@ class Summary(str):
         return made
 
     def __getnewargs__(self) -> tuple[str, str]:  # type: ignore[override]
-        """Return what a copy is made of."""
+        """Return the arguments of `__new__`, for copies."""
         return str(self), self.template
 
 
 def summary_of(template: str, options: ParameterSet, varied: Collection[str] = ()) -> Summary:
-    """Return a summary with the values of options in place of their names.
+    """Return a summary in which the values of options replace their names.
 
     Parameters
     ----------
     template
-        A line with names of options in braces, if need be with the unit that reads best after a
-        colon: ``"stop from {v_0:km/h} on {surface}"``. Of a table of values the ends are told.
+        Line with names of options in braces. A unit may follow a colon:
+        ``"stop from {v_0:km/h} on {surface}"``. For a table of values, the line shows both ends.
     options
         The options.
     varied
-        Names of those that take several values: what is told is marked.
+        Names of options that take several values; the line marks them.
 
     Raises
     ------
     ModelError
-        For names in braces that are no options, and braces that do not match.
+        For names in braces that are not options, and for unmatched braces.
     """
     known, pieces = options.flat(), []
     try:
         for text, name, unit, _ in Formatter().parse(template):
             pieces.append(text)
             if name is not None:
-                told = _told(known[name], _symbol(options, name), unit or "")
-                pieces.append(f"{told} (varied)" if name in varied else told)
+                value = _value_text(known[name], _symbol(options, name), unit or "")
+                pieces.append(f"{value} (varied)" if name in varied else value)
     except (KeyError, TypeError, ValueError) as error:
         raise ModelError(
-            f"summary {quoted(template)}: names of options are wanted in braces ({error})"
+            f"summary {quoted(template)}: braces must contain names of options ({error})",
+            name="summary",
+            value=template,
         ) from None
     return Summary("".join(pieces), template)
 
@@ -125,8 +130,8 @@ def _symbol(options: ParameterSet, name: str) -> str:
     return "1" if leaf is None else leaf.unit.symbol
 
 
-def _told(value: Any, symbol: str, unit: str) -> str:
-    """Return a value as a sentence has it: with its unit, words for a choice."""
+def _value_text(value: Any, symbol: str, unit: str) -> str:
+    """Return a value as part of a sentence: with its unit, or in words for a choice."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
@@ -141,7 +146,7 @@ def _told(value: Any, symbol: str, unit: str) -> str:
 # --- Experiments
 
 Recordings = Mapping[str, xr.Dataset]
-_LENGTHENED = 100.0  # times a run, that settling may take until all sample times come out even
+_LENGTHENED = 100.0  # longest settling until all sample times coincide, over the run's length
 
 
 @dataclass(frozen=True)
@@ -151,14 +156,14 @@ class Case:
     Parameters
     ----------
     label
-        What distinguishes the runs of one experiment, for instance ``"with-dither"``.
+        Name of the run within its experiment, for instance ``"with-dither"``.
     model, par
         The system and its parameters, drive mode included.
     state, memory
         Initial values.
     stimulus
         ``stimulus(t) -> dict``: signals of the model's Stimulus at the times t [s] of the
-        recording's axis, each of shape (len(t),); what is left out is zero.
+        recording's axis, each of shape (len(t),); missing signals are zero.
     duration
         Length of the recording after time zero [s].
     settle
@@ -169,8 +174,8 @@ class Case:
         Recording interval [s].
     start
         ``start(par) -> (state, memory)``: the same initial values for other parameters of this
-        structure, written with ``core.ops`` alone, so that what is exported begins at rest with
-        changed parameters too; None where these are not known.
+        structure, written with ``core.ops`` alone, so that exported models also begin at rest
+        with changed parameters; None where these are not known.
     """
 
     label: str
@@ -188,8 +193,8 @@ class Case:
     def aligned(self, step: float, interval: float | None = None) -> Case:
         """Return the case with a settling time after which all ticks and a row fall on zero.
 
-        It is rounded up to a common multiple of the sample times and the recording interval, so
-        that what happens at zero happens on a tick and is recorded there.
+        The settling time is rounded up to a common multiple of the sample times and the recording
+        interval. An event at zero then falls on a tick and on a recorded row.
 
         Parameters
         ----------
@@ -225,24 +230,26 @@ def _settling(
     settled = float(f"{math.ceil(settle / common - 1e-9) * common:.12g}")
     if settled > _LENGTHENED * (settle + duration):
         raise StepError(
-            f"a run of {settle + duration:g} s would settle for {settled:g} s, in "
-            "which all sample times and recording intervals come out even: choose sample times "
-            "that are shorter and multiples of each other "
-            f"({', '.join(f'{name} {T:g} s' for name, T in periods)})"
+            f"a run of {settle + duration:g} s would settle for {settled:g} s, until all sample "
+            "times and recording intervals coincide: choose shorter sample times that are "
+            f"multiples of each other ({', '.join(f'{name} {T:g} s' for name, T in periods)})",
+            name="settle",
+            value=f"{settled:g} s",
+            valid=f"<= {_LENGTHENED * (settle + duration):g} s",
         )
     return settled
 
 
 @dataclass(frozen=True)
 class FaultyCase(Case):
-    """One run of an experiment in which something fails.
+    """One run of an experiment with faults.
 
     Parameters
     ----------
     changes
-        Times [s] with the parameters that hold from then on, in order; on the recording's axis.
+        Times [s] on the recording's axis, in order, each with the parameters from then on.
     falsified
-        ``falsified(t) -> dict``: further signals of the model's Stimulus, those of its taps.
+        ``falsified(t) -> dict``: signals of the model's taps, which are part of its Stimulus.
     """
 
     changes: tuple[tuple[float, ParameterSet], ...] = ()
@@ -260,13 +267,13 @@ class Experiment:
     Parameters
     ----------
     name
-        What bench files and the command line call it.
+        Name in bench files and on the command line.
     assembly
-        Name of the assembly that it tests.
+        Name of the tested assembly.
     summary
-        One line for listings and below the titles of reports. What it says of options has to be
-        true with others too: names of options in braces, if need be with a unit,
-        ``"stop from {v_0:km/h}"``, become their values, see `summary_with`.
+        One line for listings and below the titles of reports. Names of options in braces, with a
+        unit after a colon where useful, become their values: ``"stop from {v_0:km/h}"``, see
+        `summary_with`.
     options
         Class of its options, each with unit and range.
     defaults
@@ -279,40 +286,40 @@ class Experiment:
     judge
         ``judge(recordings, options)``: its KPIs.
     kpis
-        Unit of each of these by name, so that requirements are checked before anything runs.
+        Unit of each KPI by name, so that requirements are checked before anything runs.
     figures
-        Kinds of figures that show it, names of the report layer.
+        Kinds of figures that show the experiment, by their names in the report layer.
     finish
-        ``finish(recording, options)``: adds derived signals to a recording, in place of it.
+        ``finish(recording, options)``: returns a recording with derived signals added.
     step
-        ``step(options)``: what a step response is judged by, for KPIs and figures.
+        ``step(options)``: setting of the step response, for KPIs and figures.
     loop, followed, sweep
-        The same of a hysteresis loop, of a signal that follows another, and of sines.
+        The same for a hysteresis loop, a signal that follows another, and sines.
     static
         ``static(par, options)``: recordings of a static characteristic, without any run.
     driven_unit
-        ``driven_unit(options)``: SI unit of what a ``[stimulus]`` section drives; None where
-        the experiment brings its own stimulus.
+        ``driven_unit(options)``: SI unit of the signal that a ``[stimulus]`` section drives; None
+        where the experiment has its own stimulus.
     beside
         ``beside(options)``: SI unit of every stimulus that a section ``[stimulus.NAME]`` may
-        drive, by its name; such an experiment records what it drives. None where it drives all
-        by itself.
+        drive, by its name; such an experiment records its stimuli. None where the experiment
+        drives all signals itself.
     following
-        ``following(par)``: options that follow the parameters unless they are given.
+        ``following(par)``: defaults of options that depend on the parameters.
     preview
-        ``cases`` with any start, for checks alone; where those have to compute runs first.
+        ``cases`` with any start, for checks alone, where ``cases`` has to compute runs first.
     without
-        ``without(options)``: key figures that some options leave out.
+        ``without(options)``: key figures that the options leave out.
     begins_at
-        Recorded signal by the option whose start it shows: a replay begins where it was measured.
+        Recorded signal by the option that sets its initial value, for replays.
     compared
-        What its overlaid traces compare of several runs: what an ordinate says, by signal.
+        Label of the ordinate by signal, where traces of several runs are overlaid.
     named
         ``named(options)``: unit of every key figure by name, where a table among the options
-        decides which there are; ``kpis`` then holds those of the defaults.
+        determines the key figures; ``kpis`` then holds those of the defaults.
     formerly
-        An earlier name, which is that of an experiment of any brake now. Bench files that have it
-        still work where their options tell both apart.
+        Earlier name, which an experiment of any brake has now. Bench files with that name still
+        work where their options distinguish the two.
     """
 
     name: str
@@ -345,12 +352,12 @@ class Experiment:
         object.__setattr__(self, "summary", summary_of(template, self.defaults))
 
     def summary_with(self, options: Any, varied: Collection[str] = ()) -> str:
-        """Return the summary with the values of options; ``varied``: those that have several."""
+        """Return the summary with values of options; ``varied``: options with several values."""
         assert isinstance(self.summary, Summary)
         return summary_of(self.summary.template, options, varied)
 
     def kpis_with(self, options: Any) -> dict[str, str]:
-        """Return the unit of every key figure by name, those that the options leave out apart."""
+        """Return the unit of every key figure by name, without those that the options leave out."""
         left_out = () if self.without is None else self.without(options)
         kpis = self.kpis if self.named is None else self.named(options)
         return {name: unit for name, unit in kpis.items() if name not in left_out}
@@ -358,7 +365,7 @@ class Experiment:
 
 @dataclass(frozen=True)
 class _Driven:
-    """The stimulus of a run of a case, whose noise a seed draws."""
+    """Stimulus of a case's run, with noise from a seed."""
 
     case: Case
     seed: tuple[int, ...]
@@ -369,7 +376,7 @@ class _Driven:
         return rows
 
     def put_into(self, rows: NDArray[np.float64], t: NDArray[np.float64]) -> None:
-        """Put it into rows of zeros; see `bywire.simulation.run.put_into`."""
+        """Write the stimulus into rows of zeros; see `bywire.simulation.run.put_into`."""
         given, drawn = driven_at(self.case, t - self.case.settle), 0
         for k, name in enumerate(self.case.model.Stimulus._fields):
             if name.startswith("noise_"):
@@ -385,9 +392,9 @@ def as_run(
 ) -> Run:
     """Return the engine's description of a case.
 
-    The run begins at -settle on the recording's axis, the settling time rounded up as
-    `Case.aligned` says. Signals of the stimulus named ``noise_*`` are standard normal, each
-    drawn from a generator of its own, so that a longer run begins with the same samples.
+    The run begins at -settle on the recording's axis, with the settling time rounded up by
+    `Case.aligned`. Signals of the stimulus named ``noise_*`` are standard normal. Each has its own
+    generator, so that a longer run begins with the same samples.
     """
     begun = case.aligned(step, interval)
     return Run(
@@ -404,13 +411,13 @@ def as_run(
 
 
 def driven_at(case: Case, t: NDArray[np.float64]) -> Mapping[str, NDArray[np.float64]]:
-    """Return the signals that a case drives at times of its recording [s], faults among them."""
+    """Return the signals that a case drives at times of its recording [s], with faults."""
     given = case.stimulus(t)
     return {**given, **case.falsified(t)} if isinstance(case, FaultyCase) else given
 
 
 def changes_of(case: Case, zero: float) -> tuple[Change, ...]:
-    """Return the changes of a run of a case; ``zero``: time of the run at its recording's zero."""
+    """Return the changes of a case's run; ``zero``: time of the run at the recording's zero."""
     changes = case.changes if isinstance(case, FaultyCase) else ()
     return tuple(Change(zero + t, par) for t, par in changes)
 
@@ -421,4 +428,111 @@ def fixed(**levels: float) -> Callable[[NDArray[np.float64]], Mapping[str, NDArr
 
 
 EXPERIMENTS = Kind("experiment", ("experiments",), instances(Experiment))
-"""every experiment of a brake; those of any brake are `GENERIC_EXPERIMENTS`"""
+"""every experiment of a single brake; `GENERIC_EXPERIMENTS` are those of any brake"""
+
+
+# --- Steps, seeds and memory, checked before a run
+
+SHORTEST_STEP = 1e-9
+"""shortest substep [s]: below it, a single tick of an ECU would take seconds to compute"""
+LARGEST_SEED = 2**63 - 1
+"""largest seed that a recording's file can hold"""
+
+_COPIES = 3  # of the recorded rows in memory, while they become a dataset and a file
+_GIGA = 1e9
+
+
+def checked_step(value: Any) -> float:
+    """Return a substep [s], or raise a StepError."""
+    step = units.parse(value, "s", "simulation.step")
+    if step < SHORTEST_STEP:
+        limit = f">= {SHORTEST_STEP:g} s"
+        raise not_valid("simulation.step", f"{step:g} s", limit, "usually 20 us", StepError)
+    return step
+
+
+def checked_interval(value: Any) -> float | None:
+    """Return a recording interval [s], None for the experiment's own, or raise a StepError."""
+    if value is None:
+        return None
+    interval = units.parse(value, "s", "simulation.record")
+    if interval <= 0:
+        raise not_valid("simulation.record", f"{interval:g} s", "> 0 s", "usually 1 ms", StepError)
+    return interval
+
+
+def check_seed(value: Any) -> None:
+    """Raise a ParameterError unless the value is a seed."""
+    whole = isinstance(value, int) and not isinstance(value, bool)
+    if not whole or not 0 <= value <= LARGEST_SEED:
+        limits = f"a whole number, >= 0 and <= {LARGEST_SEED}"
+        raise not_valid("simulation.seed", quoted(value), limits)
+
+
+def check_extent(case: Case, run: Run) -> None:
+    """Reject a run that records nothing, or more than the memory of this machine holds.
+
+    ``case``: the run as the experiment describes it; ``run``: the same run for the engine.
+
+    Raises
+    ------
+    StepError
+        When steps do not divide each other, or with the memory that the run would need.
+    """
+    if not run.record <= case.duration:
+        raise StepError(
+            f"a recording of {case.duration:g} s cannot have rows every {run.record:g} s: "
+            "run longer, or record more often (simulation.record)",
+            name="simulation.record",
+            value=f"{run.record:g} s",
+            valid=f"<= {case.duration:g} s",
+        )
+    check_memory(run, len(run.model.Output._fields))
+
+
+def check_recordings(runs: Sequence[Run], held: float) -> None:
+    """Reject runs that are kept in memory together and need more than this machine has.
+
+    ``held``: bytes of other recordings in memory.
+
+    Raises
+    ------
+    StepError
+        With the memory that they would need.
+    """
+    each = [8 * run.schedule().rows * len(run.model.Output._fields) for run in runs]
+    needed, memory = held + sum(each) + (_COPIES - 1) * max(each, default=0), _memory()
+    if needed > memory:
+        longest = max(runs, key=lambda run: run.schedule().rows)
+        raise StepError(
+            f"{len(runs)} runs of up to {longest.duration:g} s, recorded every "
+            f"{longest.record:g} s and kept together, need about {needed / _GIGA:.3g} GB of "
+            f"memory, but this machine has {memory / _GIGA:.3g} GB: run shorter, or record less "
+            "often (simulation.record)",
+            name="simulation.record",
+            value=f"{longest.record:g} s",
+        )
+
+
+def check_memory(run: Run, signals: int) -> None:
+    """Reject a run whose rows do not fit into the memory of this machine.
+
+    ``signals``: number of recorded signals.
+
+    Raises
+    ------
+    StepError
+        When steps do not divide each other, or with the memory that the run would need.
+    """
+    schedule = run.schedule()
+    numbers = schedule.rows * signals * _COPIES
+    numbers += schedule.stimulus_rows * len(run.model.Stimulus._fields)
+    needed, memory = 8 * numbers, _memory()  # integers: a float cannot hold every size
+    if needed > memory:
+        raise StepError(
+            f"a run of {run.duration:g} s, recorded every {run.record:g} s, needs about "
+            f"{Decimal(needed) / 10**9:.3g} GB of memory, but this machine has "
+            f"{memory / _GIGA:.3g} GB: run shorter, or record less often (simulation.record)",
+            name="simulation.record",
+            value=f"{run.record:g} s",
+        )

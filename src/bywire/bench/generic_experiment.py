@@ -1,7 +1,7 @@
-"""Experiments that any brake gets without writing one, given by the names of its signals.
+"""Experiments of any brake, defined by the names of its signals.
 
-A `GenericExperiment` is bound to a model: its levels then have the units of the signals that its
-options name, and everything else is as for an `Experiment` of one brake.
+A `GenericExperiment` is bound to a model. Its levels then have the units of the signals that its
+options name; everything else is as for an `Experiment` of one brake.
 """
 
 from __future__ import annotations
@@ -16,16 +16,17 @@ from typing import Annotated, Any
 from pydantic import Field, create_model
 from pydantic.fields import FieldInfo
 
-from bywire.bench.experiment import Case, Experiment
+from bywire.bench.experiment import EXPERIMENTS, Case, Experiment
 from bywire.bench.kpis import effort, occupation
-from bywire.bench.kpis.cases import FamilyJudge
-from bywire.bench.kpis.registry import recorded, units_of
-from bywire.bench.stimuli.registry import Stimulus
-from bywire.core.errors import ModelError, ParameterError, quoted, unknown_name
-from bywire.core.model import Model
+from bywire.bench.kpis.families import FamilyJudge, recorded, units_of
+from bywire.bench.stimulus import Stimulus
+from bywire.core.callers import option
+from bywire.core.catalog import PARAMETER_SETS, main_set, sets_of_loaded
+from bywire.core.errors import ModelError, ParameterError, not_valid, quoted, unknown_name
+from bywire.core.model import ASSEMBLIES, Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.quantities import Unit
-from bywire.core.registry import Kind, instances
+from bywire.core.registry import Kind, instances, pick
 from bywire.core.signals import Signal, signals_of, without_noise, zeros
 from bywire.core.typing import Array
 
@@ -40,21 +41,21 @@ _TOTALS = {"effort": effort.Setting(), "occupation": occupation.Setting()}
 
 
 @dataclass(frozen=True)
-class Subject:
-    """What a generic experiment is bound to.
+class TestedModel:
+    """Model to which a generic experiment is bound, with its signals.
 
     Parameters
     ----------
     generic
-        The experiment as any system gets it.
+        The experiment, unbound.
     model
-        The system under test.
+        Model under test.
     names
         Signal by the option that names it.
     units
-        SI unit of each of these, by the option.
+        SI unit of each signal, by option.
     options, defaults
-        Class of the options with these units, and what they are unless given.
+        Class of the options with these units, and its default values.
     """
 
     generic: GenericExperiment
@@ -66,17 +67,17 @@ class Subject:
 
     @property
     def input(self) -> str:
-        """Stimulus that is driven."""
+        """Name of the driven stimulus."""
         return self.names["input"]
 
     @property
     def output(self) -> str:
-        """Recorded signal that answers."""
+        """Name of the recorded signal that responds."""
         return self.names["output"]
 
     @property
     def is_set_point(self) -> bool:
-        """Whether the input is of the output's unit: a set point that the output follows."""
+        """Whether the input has the output's unit, so that it is a set point of the output."""
         return self.units["input"] == self.units["output"]
 
     def experiment(
@@ -88,20 +89,20 @@ class Subject:
         resolved: Mapping[str, str] = MappingProxyType({}),
         **more: Any,
     ) -> Experiment:
-        """Return an experiment of one run that starts at rest, with the input on a course.
+        """Return an experiment with one run that starts at rest.
 
         Parameters
         ----------
         course
-            ``course(options, stimuli)``: a function that gives the input [SI] at times [s].
+            ``course(options, stimuli)``: function that returns the input [SI] at times [s].
         judged
             Families of key figures with ``setting(options)``; effort and occupation follow them.
         figures
-            Kinds of figures beside time traces and energy balance.
+            Kinds of figures in addition to time traces and energy balance.
         duration
             ``duration(options)`` of the run [s].
         resolved
-            SI unit of every placeholder of the families beside ``level``, the output's.
+            SI units of the placeholders of the families, except ``level``, the output's unit.
         more
             Further fields of the `Experiment`.
         """
@@ -112,8 +113,8 @@ class Subject:
             driven = course(options, given)
 
             def stimulus(t: Array) -> dict[str, Array]:
-                beside = {name: each.sample(t) for name, each in given.items() if name}
-                return {**beside, self.input: driven(t)}
+                further = {name: each.sample(t) for name, each in given.items() if name}
+                return {**further, self.input: driven(t)}
 
             case = Case(
                 "run",
@@ -147,7 +148,7 @@ class Subject:
         )
 
     def totals(self) -> dict[str, str]:
-        """Return units of the key figures of effort and occupation that the model can show."""
+        """Return units of the key figures of effort and occupation whose signals are recorded."""
         signals = self.model.Output._fields
         return {
             name: unit
@@ -156,32 +157,32 @@ class Subject:
         }
 
     def figures(self, *kinds: str) -> tuple[str, ...]:
-        """Return kinds of figures, and the energy balance where the model records energies."""
-        books = any(name.startswith(("E_", "W_")) for name in self.model.Output._fields)
-        return (*kinds, "time-traces", *(("energy-balance",) if books else ()))
+        """Return kinds of figures, with the energy balance if the model records energies."""
+        has_energy = any(name.startswith(("E_", "W_")) for name in self.model.Output._fields)
+        return (*kinds, "time-traces", *(("energy-balance",) if has_energy else ()))
 
 
 @dataclass(frozen=True)
 class GenericExperiment:
-    """A virtual test of any system.
+    """Virtual test of any model.
 
     Parameters
     ----------
     name
-        What bench files and the command line call it. No experiment of a brake may have it.
+        Name in bench files and on the command line. No experiment of a brake may have it.
     summary
         One line for listings.
     options
-        Class of its options; ``input`` and the like stand for the unit of the signal that the
-        option of that name names.
+        Class of its options; the unit ``input`` is that of the signal that the option ``input``
+        names, and so on.
     signals
-        What each option that names a signal names: a ``stimulus``, a ``recording``, one of both
-        (``input or recording``), a ``friction`` or a ``state``. ``input or recording``
-        and ``state`` are what the first option names, unless given.
+        Kind of signal by the option that names it: a ``stimulus``, a ``recording``, one of both
+        (``input or recording``), a ``friction`` or a ``state``. The default of ``input or
+        recording`` and ``state`` is the signal of the first option.
     defaults
-        Options unless given; a level is a multiple of its signal's nominal magnitude.
+        Default options; a level is a multiple of its signal's nominal magnitude.
     build
-        ``build(subject)``: the experiment of a model. Its cases get the stimuli by name.
+        ``build(tested)``: the experiment of a model. Its cases get the stimuli by name.
     """
 
     name: str
@@ -189,7 +190,7 @@ class GenericExperiment:
     options: type[ParameterSet]
     signals: Mapping[str, str]
     defaults: Mapping[str, Any]
-    build: Callable[[Subject], Experiment]
+    build: Callable[[TestedModel], Experiment]
 
     def bound(self, model: Model, given: Mapping[str, Any]) -> Experiment:
         """Return the experiment of a model.
@@ -197,24 +198,24 @@ class GenericExperiment:
         Parameters
         ----------
         given
-            Options as the user gave them, by name.
+            The user's options, by name.
 
         Raises
         ------
         UnknownNameError
-            When the model has no signal that an option names.
+            When an option names a signal that the model does not have.
         ParameterError
-            When a name is missing and the model leaves a choice.
+            When an option that has to name a signal is missing.
         """
         known: dict[str, tuple[str, Signal]] = {}
-        for option, place in self.signals.items():
-            known[option] = _signal(model, self.name, option, place, given.get(option), known)
-        places = tuple((option, s.unit, s.nominal) for option, (_, s) in known.items())
+        for key, place in self.signals.items():
+            known[key] = _signal(model, self.name, key, place, given.get(key), known)
+        places = tuple((key, s.unit, s.nominal) for key, (_, s) in known.items())
         options = with_units(self.options, places)
-        names = {option: name for option, (name, _) in known.items()}
+        names = {key: name for key, (name, _) in known.items()}
         defaults = options.create({**self._levels(options), **names})
-        units = {option: signal.unit for option, (_, signal) in known.items()}
-        return self.build(Subject(self, model, names, units, options, defaults))
+        units = {key: signal.unit for key, (_, signal) in known.items()}
+        return self.build(TestedModel(self, model, names, units, options, defaults))
 
     def _levels(self, options: type[ParameterSet]) -> dict[str, Any]:
         """Return the defaults, levels in SI."""
@@ -231,20 +232,21 @@ class GenericExperiment:
 GENERIC_EXPERIMENTS = Kind(
     "experiment", ("generic_experiments",), instances(GenericExperiment), "bywire.bench.experiments"
 )
-"""every experiment that is not of one brake"""
+"""every experiment of any brake"""
 
 
 @cache
 def with_units(
     template: type[ParameterSet], places: tuple[tuple[str, str, float], ...]
 ) -> type[ParameterSet]:
-    """Return a class of options whose levels have the units of the signals that they belong to.
+    """Return a class of options whose levels have the units of their signals.
 
     Parameters
     ----------
+    template
+        Class of options in which the names of options stand for units.
     places
-        Option that names the signal, which its levels have as unit; SI unit and nominal
-        magnitude of the signal.
+        Option that names a signal; SI unit and nominal magnitude of that signal.
     """
     fields: dict[str, Any] = {}
     for name, info in template.model_fields.items():
@@ -276,10 +278,10 @@ def _signal(
     wanted: Any,
     chosen: Mapping[str, tuple[str, Signal]],
 ) -> tuple[str, Signal]:
-    """Return the signal that an option names, or the one that there is no choice about."""
+    """Return the signal that an option names, or the default signal."""
     known = _known(model, place)
     if wanted is not None and not isinstance(wanted, str):
-        raise ParameterError(f"options.{option} = {quoted(wanted)}: name a {place} of {model.name}")
+        raise not_valid(f"options.{option}", quoted(wanted), f"a {place} of {model.name}")
     if wanted:
         if wanted not in known:
             raise unknown_name(f"{place} of {model.name} in options.{option}", wanted, known)
@@ -287,7 +289,10 @@ def _signal(
     if place in ("state", "input or recording"):
         return next(iter(chosen.values()))
     if not known:
-        raise ParameterError(f"experiment {experiment!r} needs a {place}: {model.name} has none")
+        raise ParameterError(
+            f"experiment {experiment!r} needs a {place}: {model.name} has none",
+            name=f"options.{option}",
+        )
     if place == "recording":
         driven, signal = chosen["input"]
         alike = [n for n, each in known.items() if each.unit == signal.unit and n != driven]
@@ -297,7 +302,9 @@ def _signal(
     else:
         raise ParameterError(
             f"options.{option} is missing: name the {place} of {model.name} that experiment "
-            f"{experiment!r} drives: {', '.join(known)}"
+            f"{experiment!r} drives: {', '.join(known)}",
+            name=f"options.{option}",
+            valid=", ".join(known),
         )
     return name, known[name]
 
@@ -317,14 +324,14 @@ def _known(model: Model, place: str) -> dict[str, Signal]:
 
 
 def at_rest(model: Model, par: Any) -> tuple[Any, Any]:
-    """Return state and memory in which a model rests without any stimulus.
+    """Return state and memory of a model at rest without any stimulus.
 
-    What ``rest(par)`` of the model gives; zeros where it has none.
+    These are the result of the model's ``rest(par)``, or zeros if it has no such function.
 
     Raises
     ------
     ModelError
-        When it gives something else than the model's State and Memory.
+        When the result is not a State and a Memory.
     """
     rest = getattr(model, "rest", None)
     if rest is None:
@@ -332,6 +339,126 @@ def at_rest(model: Model, par: Any) -> tuple[Any, Any]:
     start = rest(par)
     if not (isinstance(start, tuple) and len(start) == 2):
         raise ModelError(
-            f"{model.name}: rest(par) must return (State, Memory), got {quoted(start)}"
+            f"{model.name}: rest(par) must return (State, Memory), got {quoted(start)}",
+            name="rest",
+            value=quoted(start),
+            valid="(State, Memory)",
         )
     return start
+
+
+# --- Experiments by name, of a brake or of any
+
+
+def experiment_of(
+    name: str, parameters: str, assembly: str = "", options: Mapping[str, Any] | None = None
+) -> Experiment:
+    """Return the experiment of a name for a parameter set.
+
+    Parameters
+    ----------
+    name
+        Name of the experiment.
+    parameters
+        Name of the parameter set.
+    assembly
+        Model of the set's brake; if empty, that of the set.
+    options
+        The user's options, which may name signals.
+
+    Raises
+    ------
+    InputError
+        When there is no such experiment, when its options name signals that the model does not
+        have, and when an earlier name of a brake's experiment is ambiguous.
+    """
+    cited = PARAMETER_SETS.find(parameters)
+    system = assembly or cited.assembly
+    likely = EXPERIMENTS.guess(name)
+    if likely is not None and likely.assembly == system:
+        return likely
+    brake = PARAMETER_SETS.owner(parameters)
+    its_own = EXPERIMENTS.own(brake, name)
+    if its_own is not None and its_own.assembly == system:
+        return its_own
+    known = GENERIC_EXPERIMENTS.all()
+    if name in known:
+        former = _former(name, brake, system, options or {}, known[name])
+        if former is not None:
+            return former
+        models = ASSEMBLIES.of(brake)
+        return known[name].bound(pick(models, system, "assembly")(), options or {})
+    every = EXPERIMENTS.all()
+    if name not in every:
+        raise unknown_name("experiment", name, {*every, *known}, first=EXPERIMENTS.of(brake))
+    return every[name]
+
+
+def former_names(name: str) -> dict[str, str]:
+    """Return the experiments that formerly had a name, each with its assembly."""
+    every = EXPERIMENTS.all().values()
+    return {each.name: each.assembly for each in every if each.formerly == name}
+
+
+def _former(
+    name: str, brake: str, system: str, options: Mapping[str, Any], generic: GenericExperiment
+) -> Experiment | None:
+    """Return a brake's experiment that formerly had this name, if the options are its options.
+
+    Raises
+    ------
+    ParameterError
+        When the options are those of neither.
+    """
+    each = (e for e in EXPERIMENTS.of(brake).values() if e.formerly == name)
+    former = next((e for e in each if e.assembly == system), None)
+    if former is None:
+        return None
+    given = set(options)
+    own, others = set(former.options.model_fields), set(generic.options.model_fields)
+    if given & (others - own):
+        return None
+    if given & (own - others):
+        return former
+    example = next(iter(generic.signals))
+    raise ParameterError(
+        f"experiment {name!r} is for any brake, and that of the {system} is now called "
+        f"{former.name!r}: write {former.name}, or name the signal for {name}, for instance "
+        f"{option('overrides', {f'options.{example}': 'NAME'})}",
+        name="experiment",
+        value=name,
+        valid=former.name,
+    )
+
+
+def usual_set(name: str) -> str:
+    """Return the default parameter set of an experiment.
+
+    It is the main set of the experiment's brake. An experiment of any brake takes the only set of
+    the brakes loaded by path.
+
+    Raises
+    ------
+    UnknownNameError
+        When the experiment is unknown.
+    ParameterError
+        For an experiment of any brake if there are several sets.
+    """
+    definition, sets = EXPERIMENTS.get(name), sets_of_loaded()
+    if len(sets) == 1 and name in GENERIC_EXPERIMENTS.all():
+        return sets[0]
+    if definition is not None:
+        return main_set(definition.assembly, beside=type(definition.defaults))
+    if name not in GENERIC_EXPERIMENTS.all():
+        raise EXPERIMENTS.unknown(name, GENERIC_EXPERIMENTS)
+    known = ", ".join(sets or PARAMETER_SETS.all())
+    former = "".join(
+        f"; that of the {assembly} is now called {now!r}"
+        for now, assembly in former_names(name).items()
+    )
+    raise ParameterError(
+        f"experiment {name!r} is for any brake: name its parameter set with "
+        f"{option('overrides', {'parameters': 'NAME'})} ({known}){former}",
+        name="parameters",
+        valid=known,
+    )

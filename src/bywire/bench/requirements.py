@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core import units
-from bywire.core.errors import ParameterError, UnitError, quoted, unknown_name
+from bywire.core.errors import UnitError, not_valid, quoted, unknown_name
 from bywire.core.undefined import EqualWhereUndefined
 from bywire.core.values import number
 
@@ -25,26 +25,26 @@ COMPARE: Mapping[str, Callable[[Any, Any], Any]] = {
     "<": operator.lt,
     ">": operator.gt,
 }
-"""how a value is compared with a bound; what is not defined meets none"""
+"""comparisons of a value with a bound; an undefined value (NaN) meets none"""
 _SIGN = re.compile("<=|>=|<|>")
 
 
 @dataclass(frozen=True)
 class Limit:
-    """A limit of a figure, read once where a file or an option states it.
+    """Limit of a figure, read from a file or an option.
 
     Parameters
     ----------
     figure
-        What is limited.
+        Name of the limited figure.
     compare, bound, unit
-        The comparison, and the bound in the figure's unit: SI, ``"%"`` or what the figure has.
+        The comparison, and the bound in the figure's unit: SI, ``"%"`` or another one.
     text
-        As the user wrote it, for instance ``"<= 15 %"``.
+        The user's text, for instance ``"<= 15 %"``.
     probability
-        Least probability that it is met; None where every case has to meet it.
+        Least probability of meeting the limit; None if every case has to meet it.
     of_magnitude
-        Whether it bounds the figure both ways.
+        Whether the limit bounds the figure's magnitude.
     """
 
     figure: str
@@ -61,15 +61,15 @@ class Limit:
 
     @property
     def is_upper(self) -> bool:
-        """Whether it bounds from above."""
+        """Whether it is an upper limit."""
         return self.compare in ("<=", "<")
 
     def is_met(self, values: Any) -> NDArray[np.bool_]:
-        """Return whether each value meets it; what is not defined does not."""
+        """Return whether each value meets the limit; undefined values do not."""
         return np.asarray(COMPARE[self.compare](self._bounded(values), self.bound))
 
     def is_near(self, values: Any, error: float) -> NDArray[np.bool_]:
-        """Return whether each value is no further from the bound than it may be off."""
+        """Return whether each value is within its error of the bound."""
         return np.asarray(np.abs(self._bounded(values) - self.bound) <= error)
 
     def _bounded(self, values: Any) -> Any:
@@ -78,23 +78,22 @@ class Limit:
 
 @dataclass(frozen=True, eq=False)
 class Verdict(EqualWhereUndefined):
-    """A requirement beside what was found.
+    """Requirement with the value of its KPI.
 
     Parameters
     ----------
     required
         The requirement.
     value
-        What was found, in its unit; NaN where the KPI is not defined.
+        Value of the KPI in its unit; NaN where it is not defined.
     met
-        Whether the value meets the requirement for certain; an undefined KPI meets none.
+        Whether the value certainly meets the requirement; an undefined KPI does not.
     note
-        Why the KPI is not defined.
+        Reason why the KPI is not defined.
     error
-        How far the value may be off, in its unit; NaN where that was not estimated.
+        Numerical error of the value, in its unit; NaN where it was not estimated.
     is_decided
-        Whether the recording shows what the value is, and this is further from the limit than it
-        may be wrong.
+        Whether the recording determines the value, and its distance to the limit exceeds its error.
     """
 
     required: Limit
@@ -111,7 +110,7 @@ class Verdict(EqualWhereUndefined):
 
     @property
     def limit(self) -> str:
-        """The limit as the user wrote it."""
+        """Text of the limit."""
         return self.required.text
 
     @property
@@ -128,15 +127,15 @@ class Verdict(EqualWhereUndefined):
 def judge(limits: Iterable[Limit], kpis: Iterable[Kpi]) -> tuple[Verdict, ...]:
     """Compare KPIs with their limits.
 
-    Undecided is what lies no further from its limit than its error, and what the recording leaves
-    open; a KPI without an error estimate is taken as it is.
+    A verdict is undecided if the KPI is within its error of the limit, or if the recording leaves
+    the KPI open. A KPI without an error estimate is taken as exact.
     """
     by_name = {kpi.name: kpi for kpi in kpis}
     return tuple(verdict_of(limit, by_name[limit.figure]) for limit in limits)
 
 
 def verdict_of(limit: Limit, kpi: Kpi) -> Verdict:
-    """Return what a KPI is worth beside its limit; see `judge`."""
+    """Return the verdict on a KPI by its limit; see `judge`."""
     is_close = bool(limit.is_near(kpi.value, kpi.bound)) or math.isinf(kpi.bound)
     is_decided = not (is_close or kpi.is_open)
     met = is_decided and bool(limit.is_met(kpi.value))
@@ -144,7 +143,7 @@ def verdict_of(limit: Limit, kpi: Kpi) -> Verdict:
 
 
 class Judged(Protocol):
-    """A requirement that was judged: a `Verdict`, or one over many cases."""
+    """Judged requirement: a `Verdict`, or a requirement over many cases."""
 
     @property
     def outcome(self) -> str:
@@ -153,7 +152,7 @@ class Judged(Protocol):
 
 
 def status_of(verdicts: Sequence[Judged]) -> str:
-    """Return ``done`` where nothing is required, else ``failed``, ``undecided`` or ``passed``."""
+    """Return ``done`` without requirements, else ``failed``, ``undecided`` or ``passed``."""
     if not verdicts:
         return "done"
     outcomes = {verdict.outcome for verdict in verdicts}
@@ -170,11 +169,11 @@ def read_limits(requirements: Mapping[str, Any], units: Mapping[str, str]) -> di
     Raises
     ------
     UnknownNameError
-        When a requirement names no KPI of the experiment.
+        When a requirement names an unknown KPI.
     ParameterError
         When a limit cannot be read.
     UnitError
-        When a limit's unit measures something else than the KPI.
+        When a limit's unit has another dimension than the KPI.
     """
     for name in requirements:
         if name not in units:
@@ -185,33 +184,29 @@ def read_limits(requirements: Mapping[str, Any], units: Mapping[str, str]) -> di
 def read_limit(figure: str, text: Any, unit: str, what: str = "requirement") -> Limit:
     """Return the limit of a figure in its unit.
 
-    ``what``: what errors call it.
+    ``what``: noun for errors.
 
     Raises
     ------
     ParameterError
-        When the text is no limit.
+        When the text is not a limit.
     UnitError
-        When its unit measures something else than the figure.
+        When its unit has another dimension than the figure.
     """
     example = "<= 15 %" if unit == "%" else f"<= {units.example(unit)}"
     before, compare, bound = parted(text) if isinstance(text, str) else ("", None, "")
     if compare is None or before:
-        raise ParameterError(
-            f"{what} {figure} = {quoted(text)} cannot be read: write for instance {example!r}"
-        )
+        raise not_valid(f"{what} {figure}", quoted(text), f"a limit such as {example!r}")
     if unit != "%":
         return Limit(figure, compare, number(bound, unit, f"{what} {figure}"), unit, text)
-    if not bound.endswith("%"):  # 15 would be a share of 1500 %, which nobody means
-        raise UnitError(
-            f"{what} {figure} = {quoted(text)} is no limit in percent: "
-            f"write for instance {example!r}"
-        )
+    if not bound.endswith("%"):  # a plain 15 would be 1500 %
+        limit = f"a limit in percent such as {example!r}"
+        raise not_valid(f"{what} {figure}", quoted(text), limit, kind=UnitError)
     return Limit(figure, compare, 100.0 * units.parse(bound, "1", f"{what} {figure}"), unit, text)
 
 
 def parted(text: str) -> tuple[str, Comparison | None, str]:
-    """Return what stands before the first comparison of a text, the comparison, and what follows.
+    """Split a text at its first comparison: the part before, the comparison, and the rest.
 
     Examples
     --------

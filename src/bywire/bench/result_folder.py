@@ -1,4 +1,4 @@
-"""What ``bywire run --out`` left in a folder, read back: recordings, key figures, verdicts."""
+"""Folder of ``bywire run --out``, read back: recordings, key figures, verdicts."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from bywire.core.scratch import require_finished
 from bywire.data.netcdf import read_recording
 
 RECORD = "result.json"
-"""file of a result folder that says what it holds"""
+"""file of a result folder that describes its content"""
 
 
 @dataclass(frozen=True)
 class FolderResult:
-    """What a folder holds of a bench that was run.
+    """Result of a bench, read from a folder.
 
     Parameters
     ----------
     name
-        What the bench was called.
+        Name of the bench.
     recordings
         One dataset per run of the experiment, by label.
     kpis, verdicts
-        Key figures, and the requirements beside them.
+        Key figures, and verdicts on the requirements.
     status
         ``passed`` or ``failed``.
     warnings
-        What its run warned of.
+        Warnings of the run.
     changes
-        What was changed, by name: its value, what it is instead of, and of what.
+        Changes by name: the value, the original value, and where that came from.
     """
 
     name: str
@@ -52,7 +52,7 @@ class FolderResult:
 
 
 def is_result_folder(path: Path) -> bool:
-    """Return whether a path is a folder that says what bench left it."""
+    """Return whether a path is a folder with the record of a result."""
     return (path / RECORD).is_file()
 
 
@@ -62,16 +62,18 @@ def read_result(folder: Path) -> FolderResult:
     Raises
     ------
     FileError
-        When it is no result folder, is not finished, or something in it is damaged or missing.
+        When it is not a result folder, is not finished, or a file is damaged or missing.
     """
     record = record_of(folder)
     try:
         status = str(record["status"])
         if status == "interrupted":
-            raise FileError(f"{folder} is not finished: its run was interrupted; {_again()}")
+            raise FileError(
+                f"{folder} is not finished: its run was interrupted; {_again()}", name=str(folder)
+            )
         kpis = tuple(_kpi(name, each) for name, each in record["kpis"].items())
         verdicts = tuple(_verdict(each) for each in record["requirements"])
-        # Names alone, within the folder: it may have moved since.
+        # File names without their folder: the folder may have moved since.
         files = [folder / Path(str(text)).name for text in record["files"]]
         name = str(record["bench"])
         warned = tuple(map(str, record.get("warnings", ())))
@@ -81,16 +83,19 @@ def read_result(folder: Path) -> FolderResult:
         }
     except (AttributeError, InputError, KeyError, TypeError, ValueError) as error:
         raise FileError(
-            f"{folder / RECORD} is damaged ({type(error).__name__}: {error}); {_again()}"
+            f"{folder / RECORD} is damaged ({type(error).__name__}: {error}); {_again()}",
+            name=str(folder / RECORD),
         ) from None
     recordings = {path.stem: _recording(path) for path in files if path.suffix == ".nc"}
     if not recordings:
-        raise FileError(f"{folder / RECORD} names no recording; {_again()}")
+        raise FileError(
+            f"{folder / RECORD} names no recording; {_again()}", name=str(folder / RECORD)
+        )
     return FolderResult(name, recordings, kpis, verdicts, status, warned, changes)
 
 
 def kpi_record(kpi: Kpi) -> dict[str, Any]:
-    """Return what JSON says of a key figure, which has null for infinite and unknown errors."""
+    """Return a key figure for JSON, in which infinite and unknown errors become null."""
     return {
         "value": kpi.value,
         "unit": kpi.unit,
@@ -103,7 +108,7 @@ def kpi_record(kpi: Kpi) -> dict[str, Any]:
 
 
 def verdict_record(verdict: Verdict) -> dict[str, Any]:
-    """Return what a JSON object says of a requirement."""
+    """Return a verdict for JSON."""
     return {
         "kpi": verdict.kpi,
         "limit": verdict.limit,
@@ -116,33 +121,38 @@ def verdict_record(verdict: Verdict) -> dict[str, Any]:
 
 
 def record_of(folder: Path) -> dict[str, Any]:
-    """Return what a result folder says it holds, without its recordings.
+    """Return the record of a result folder, without its recordings.
 
     Raises
     ------
     FileError
-        When it is no result folder, is not finished, or its record is damaged.
+        When it is not a result folder, is not finished, or its record is damaged.
     """
     path = folder / RECORD
     if not folder.is_dir():
-        raise FileError(f"{folder} is no folder: check the path")
+        raise FileError(f"{folder} is not a folder: check the path", name=str(folder))
     require_finished(folder)
     if not path.is_file():
         raise FileError(
-            f"{folder} is no finished result of bywire run: it has no {RECORD}; {_again()}"
+            f"{folder} is not a finished result of bywire run: {RECORD} is missing; {_again()}",
+            name=str(folder),
         )
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise FileError(f"{path} cannot be read ({error}); {_again()}") from None
+        raise FileError(f"{path} cannot be read ({error}); {_again()}", name=str(path)) from None
     if not isinstance(record, dict):
-        raise FileError(f"{path} is damaged: it holds no JSON object; {_again()}")
+        raise FileError(
+            f"{path} is damaged: it does not contain a JSON object; {_again()}", name=str(path)
+        )
     return record
 
 
 def _recording(path: Path) -> xr.Dataset:
     if not path.is_file():
-        raise FileError(f"{path.parent} is damaged: {path.name} is missing; {_again()}")
+        raise FileError(
+            f"{path.parent} is damaged: {path.name} is missing; {_again()}", name=str(path)
+        )
     return read_recording(path)
 
 
@@ -175,7 +185,7 @@ def _verdict(record: Mapping[str, Any]) -> Verdict:
 
 
 def _number(value: Any) -> float:
-    """Return a number of a JSON object, in which null stands for what is not defined."""
+    """Return a number of a JSON object; NaN for null."""
     return math.nan if value is None else float(value)
 
 

@@ -1,9 +1,9 @@
-"""The rows of a run as plain arrays, in place of a recording: for many runs that nobody looks at.
+"""Rows of a run as plain arrays, in place of a recording, for many runs without plots.
 
-To make a Dataset of thirty signals takes longer than to simulate them. Key figures, warnings and
-books of energy ask a recording for little: signals, windows of time, sums and products of signals,
-their extremes and means. Whatever else a brake's own code asks for, the Dataset, or the DataArray
-of a signal, is made and answers.
+Building a Dataset of thirty signals takes longer than simulating them. Key figures, warnings and
+energy balances need only signals, windows of time, sums and products of signals, and their extremes
+and means. For any other operation in a brake's code, the Dataset, or the DataArray of a signal, is
+built on demand.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ TIME = "time"
 
 
 class Row(NDArrayOperatorsMixin):
-    """A signal of `Rows`, or their time.
+    """Signal of `Rows`, or their time.
 
     Parameters
     ----------
     rows
-        What it belongs to.
+        Rows to which it belongs.
     name
-        Its name there.
+        Name in these rows.
     values
-        Shape (time,).
+        Values, shape (time,).
     attrs
-        Unit, label and role, as a recording has them.
+        Unit, label and role, as in a recording.
     """
 
     dims = (TIME,)
@@ -48,7 +48,7 @@ class Row(NDArrayOperatorsMixin):
 
     @property
     def size(self) -> int:
-        """How many rows there are."""
+        """Number of rows."""
         return self.values.size
 
     def __len__(self) -> int:
@@ -71,15 +71,15 @@ class Row(NDArrayOperatorsMixin):
         return isinstance(other, Number)
 
     def max(self, *asked: Any, **given: Any) -> Any:
-        """Return the largest value, as a DataArray does."""
+        """Return the largest value, like a DataArray."""
         return self._reduced("max", *asked, **given)
 
     def min(self, *asked: Any, **given: Any) -> Any:
-        """Return the smallest value, as a DataArray does."""
+        """Return the smallest value, like a DataArray."""
         return self._reduced("min", *asked, **given)
 
     def mean(self, *asked: Any, **given: Any) -> Any:
-        """Return the mean, as a DataArray does."""
+        """Return the mean, like a DataArray."""
         return self._reduced("mean", *asked, **given)
 
     def _reduced(self, how: str, *asked: Any, **given: Any) -> Any:
@@ -88,7 +88,7 @@ class Row(NDArrayOperatorsMixin):
         return getattr(self._array, how)(*asked, **given) if np.isnan(value) else value
 
     def sel(self, *asked: Any, **given: Any) -> Any:
-        """Return the rows within a window of time, ``time=slice(begin, end)``, as a DataArray."""
+        """Return the rows in a window of time, ``time=slice(begin, end)``, like a DataArray."""
         window = _window(self._time, asked, given)
         if window is None:
             return self._array.sel(*asked, **given)
@@ -116,7 +116,7 @@ class Row(NDArrayOperatorsMixin):
 
 
 def _window(time: Array, asked: tuple[Any, ...], given: Mapping[str, Any]) -> slice | None:
-    """Return the places of rows within a window of time that `sel` asks for; None for others."""
+    """Return the slice of rows for a window of time as in `sel`; None for other arguments."""
     wanted = given.get(TIME)
     if asked or len(given) != 1 or not isinstance(wanted, slice) or wanted.step is not None:
         return None
@@ -126,22 +126,23 @@ def _window(time: Array, asked: tuple[Any, ...], given: Mapping[str, Any]) -> sl
 
 
 class Rows:
-    """What a run recorded, or several side by side.
+    """Recorded rows of a run, or of several runs side by side.
 
-    Those of several runs answer families of key figures and books alone: take a `case` for others.
+    Rows of several runs serve families of key figures and energy balances only; use `case` for
+    others.
 
     Parameters
     ----------
     time
         Times [s], shape (time,).
     signals
-        Values by name, shape (time,) each; of several runs (runs, time).
+        Values by name, shape (time,) each; for several runs (runs, time).
     attributes
-        Unit, label and role of each signal, as a recording has them.
+        Unit, label and role of each signal, as in a recording.
     notes
-        ``notes()``: the attributes of the whole recording, of which few are ever asked for.
+        ``notes()``: attributes of the whole recording, computed on demand.
     par
-        Parameters of the run, where they are known.
+        Parameters of the run, if known.
     """
 
     def __init__(
@@ -156,14 +157,14 @@ class Rows:
         self._values = {**signals, TIME: time}
         self._attributes = {**attributes, TIME: {"units": "s", "long_name": "time"}}
         self._signals = tuple(signals)
-        self.silent: frozenset[str] = frozenset()  # parts of the model that have nothing to say
+        self.silent: frozenset[str] = frozenset()  # parts of the model without warnings
         self.sizes = {TIME: time.size}
 
     @classmethod
     def of(cls, recording: xr.Dataset) -> xr.Dataset:
-        """Return what answers for a recording, quicker where little is asked; itself if it cannot.
+        """Return rows in place of a recording, which are faster, or the recording itself.
 
-        A static characteristic, for instance, has no rows of time.
+        A static characteristic, for instance, has no rows over time.
         """
         if set(recording.dims) != {TIME} or set(recording.coords) != {TIME}:
             return recording
@@ -174,8 +175,8 @@ class Rows:
             {name: one.attrs for name, one in each.items()},
             lambda: recording.attrs,
         )
-        rows.__dict__["dataset"] = recording  # what is asked for besides need not be made
-        return cast(xr.Dataset, rows)  # it answers as one
+        rows.__dict__["dataset"] = recording  # available already
+        return cast(xr.Dataset, rows)  # it has the same interface
 
     def case(
         self,
@@ -190,12 +191,12 @@ class Rows:
         return rows
 
     def sel(self, *asked: Any, **given: Any) -> Any:
-        """Return the rows within a window of time, ``time=slice(begin, end)``, as a Dataset."""
+        """Return the rows in a window of time, ``time=slice(begin, end)``, like a Dataset."""
         window = _window(self._values[TIME], asked, given)
         return self.dataset.sel(*asked, **given) if window is None else self._within(window)
 
     def isel(self, *asked: Any, **given: Any) -> Any:
-        """Return the rows of some places, ``time=slice(begin, end)``, as a Dataset."""
+        """Return the rows of an index range, ``time=slice(begin, end)``, like a Dataset."""
         window = given.get(TIME)
         if asked or len(given) != 1 or not isinstance(window, slice):
             return self.dataset.isel(*asked, **given)
@@ -218,7 +219,7 @@ class Rows:
         return rows
 
     def assign(self, signals: Mapping[str, Any] | None = None, **named: Any) -> Any:
-        """Return the rows with further signals, or others, as a Dataset."""
+        """Return the rows with added or replaced signals, like a Dataset."""
         given = {**(signals or {}), **named}
         plain = {name: _plain(each, self._values[TIME]) for name, each in given.items()}
         if any(each is None for each in plain.values()):
@@ -254,7 +255,7 @@ class Rows:
         return _Named(self, tuple(self._values))
 
     def items(self) -> ItemsView[str, Row]:
-        """Return the signals with their names, as a Dataset does."""
+        """Return the signals with their names, like a Dataset."""
         return self.data_vars.items()
 
     def __iter__(self) -> Iterator[str]:
@@ -266,7 +267,7 @@ class Rows:
     def __getitem__(self, name: Any) -> Any:
         if not isinstance(name, str):
             return self.dataset[name]
-        # None is kept: arrays of rows that held it in turn would wait for a search for garbage.
+        # No cache: rows and their signals would form a cycle, which delays freeing their memory.
         return Row(self, name, self._values[name], self._attributes[name])
 
     def __getattr__(self, name: str) -> Any:
@@ -281,7 +282,7 @@ class Rows:
 
     @cached_property
     def dataset(self) -> xr.Dataset:
-        """The same as a Dataset."""
+        """Rows as a Dataset."""
         each = {
             name: (TIME, values, dict(self._attributes[name]))
             for name, values in self._values.items()
@@ -291,7 +292,7 @@ class Rows:
 
 
 def _plain(given: Any, time: Array) -> tuple[Array, Mapping[str, Any]] | None:
-    """Return the values and attributes of a signal that `Rows.assign` takes; None if it cannot."""
+    """Return values and attributes of a signal for `Rows.assign`; None for other arguments."""
     if isinstance(given, Row):
         return (given.values, given.attrs) if given._time is time else None
     if isinstance(given, tuple) and given[0] == TIME and np.shape(given[1]) == time.shape:

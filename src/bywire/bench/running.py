@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any, cast
@@ -13,12 +13,10 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.experiment import Case, as_run
-from bywire.bench.extent import check_extent
+from bywire.bench.experiment import Case, as_run, check_extent, check_recordings
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.recording import record, rows_of, run_notes, watch
-from bywire.bench.requirements import judge, status_of
-from bywire.bench.result import Result
+from bywire.bench.requirements import Verdict, judge, status_of
 from bywire.bench.rows import Rows
 from bywire.bench.step_error import (
     MOST_WORK,
@@ -29,11 +27,72 @@ from bywire.bench.step_error import (
     unestimated,
     with_step_errors,
 )
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.stimulus import Stimulus
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.interrupts import interrupt_heard, interrupts_deferred
 from bywire.core.signals import signals_of
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, Trajectory, simulate
+
+
+@dataclass(frozen=True)
+class Result:
+    """Result of a bench: recordings, key figures and verdicts.
+
+    Parameters
+    ----------
+    recordings
+        One dataset per run of the experiment, by label.
+    status
+        ``done`` (no requirements), ``passed``, ``failed`` (a requirement was not met),
+        ``undecided`` (a figure is within its numerical error of its limit) or ``interrupted``.
+    unestimated
+        Reason why a requested error estimate is missing; empty otherwise.
+    """
+
+    bench: Bench
+    recordings: Mapping[str, xr.Dataset]
+    kpis: tuple[Kpi, ...]
+    verdicts: tuple[Verdict, ...]
+    status: str
+    unestimated: str = ""
+
+    @property
+    def recording(self) -> xr.Dataset:
+        """The recording of an experiment that makes one run."""
+        if len(self.recordings) != 1:
+            labels = ", ".join(self.recordings)
+            raise ParameterError(
+                f"this experiment made several recordings: take one of {labels}", valid=labels
+            )
+        return next(iter(self.recordings.values()))
+
+    def kpi(self, name: str) -> Kpi:
+        """Return one KPI by name.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest known names.
+        """
+        by_name = {kpi.name: kpi for kpi in self.kpis}
+        if name not in by_name:
+            raise unknown_name("KPI", name, by_name)
+        return by_name[name]
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings of all runs."""
+        warnings = [
+            f"{label}: {text}" if len(self.recordings) > 1 else text
+            for label, recording in self.recordings.items()
+            for text in str(recording.attrs.get("warnings", "")).split("; ")
+            if text
+        ]
+        return warnings + ([self.unestimated] if self.unestimated else [])
+
+
+# --- Runs
 
 Progress = Callable[[str, float], None]
 
@@ -49,23 +108,22 @@ def run(
     Parameters
     ----------
     bench
-        What is tested; `bywire.load` makes one of a bench file.
+        Bench to run; `bywire.load` reads a bench file.
     progress
         Called with the run's label and its finished share, 0 to 1.
     engine
-        As of `Bench`; ``auto`` is what the bench says.
+        As in `Bench`; ``auto`` is the engine of the bench.
     estimate_error
-        Whether all runs are made again in half steps, in slightly shorter ones, and in double ones
-        where these divide the sample times: key figures and recorded signals then say how large
-        their error from the step is, and a requirement closer to its limit than they may be off is
-        undecided. It takes 3.6 times as many substeps more. Steps in which a run fails are left
-        out; where none is left, or one takes five times the work of the run, the result warns of
-        it.
+        Whether to repeat all runs with half the step, a slightly shorter step, and double the step
+        where it divides the sample times. Key figures and recorded signals then have an estimate
+        of their numerical error. A figure within its error of a limit is undecided. The repeated
+        runs take 3.6 times as many substeps as the run. Steps in which a run fails are left out.
+        If none remains, or one takes five times the work of the run, the result has a warning.
 
     Raises
     ------
     InputError
-        When the experiment cannot be set up.
+        When the runs cannot be set up.
     RunError
         When a run fails.
     """
@@ -81,11 +139,13 @@ def run(
             try:
                 other = replace(bench, step=factor * bench.step)
                 made: dict[str, xr.Dataset] = {}
-                _make_runs(other, made, progress, engine, {}, f", {factor:g} of the step", work)
+                held = _bytes_of(recordings, *others.values())
+                remark = f", {factor:g} of the step"
+                _make_runs(other, made, progress, engine, {}, remark, work, held)
                 others[factor] = made
             except NO_ESTIMATE as error:
                 failures[factor] = error
-    except KeyboardInterrupt:  # also from outside the engine, which keeps what it has
+    except KeyboardInterrupt:  # also outside the engine, which keeps its recordings
         interrupt_heard()
         kpis = judged(bench, recordings).kpis if is_complete else ()
         return Result(bench, recordings, kpis, (), "interrupted")
@@ -102,15 +162,18 @@ def _make_runs(
     work: dict[str, float],
     remark: str = "",
     compared: Mapping[str, float] | None = None,
+    held: float = 0.0,
 ) -> None:
-    """Make all recordings of a bench, each kept as soon as it is there, and what work they took.
+    """Add all recordings of a bench, each as soon as it is finished, and the work of its runs.
 
-    ``compared``: the work of the same runs in the bench's own step, of which these may take some.
+    ``compared``: work of the runs in the bench's own step, which limits that of these runs;
+    ``held``: bytes of the recordings that are in memory already.
     """
     engine = bench.engine if engine == "auto" else engine
     recordings |= static_recordings(bench)
-    for number, case in enumerate(bench.cases()):
-        computed = run_of(bench, case, number)
+    runs = [(case, run_of(bench, case, k)) for k, case in enumerate(bench.cases())]
+    check_recordings([computed for _, computed in runs], held)
+    for case, computed in runs:
         if compared is not None:
             computed = replace(computed, most_work=MOST_WORK * compared[case.label])
         report = None if progress is None else partial(progress, case.label + remark)
@@ -126,8 +189,12 @@ def _make_runs(
             raise KeyboardInterrupt
 
 
+def _bytes_of(*made: Mapping[str, xr.Dataset]) -> float:
+    return float(sum(each.nbytes for recordings in made for each in recordings.values()))
+
+
 def static_recordings(bench: Bench) -> dict[str, xr.Dataset]:
-    """Return what an experiment computes without any run, by label."""
+    """Return the recordings of an experiment without runs, by label."""
     static = bench.definition.static
     if static is None:
         return {}
@@ -142,7 +209,7 @@ def run_of(bench: Bench, case: Case, number: int) -> Run:
     Raises
     ------
     StepError
-        When it records nothing, or more than fits into this machine.
+        When it records nothing, or more than the memory of this machine holds.
     """
     computed = as_run(case, bench.step, seed=(bench.seed, number))
     check_extent(case, computed)
@@ -150,14 +217,14 @@ def run_of(bench: Bench, case: Case, number: int) -> Run:
 
 
 def recording_of(bench: Bench, case: Case, computed: Run, trajectory: Trajectory) -> xr.Dataset:
-    """Return the recording of one of a bench's cases, with what its experiment adds."""
+    """Return the recording of a case, with the signals that its experiment adds."""
     notes = _case_notes(bench, case)
     recording = record(computed, trajectory, case.settle, case.keep, notes)
     return _finished(bench, case, recording)
 
 
 def _finished(bench: Bench, case: Case, recording: xr.Dataset) -> xr.Dataset:
-    """Return a recording with what its experiment adds."""
+    """Return a recording with the signals that its experiment adds."""
     definition = bench.definition
     if definition.beside is not None:
         recording = _with_inputs(recording, case)
@@ -168,7 +235,7 @@ def _finished(bench: Bench, case: Case, recording: xr.Dataset) -> xr.Dataset:
 
 
 def _with_faults(recording: xr.Dataset, bench: Bench) -> xr.Dataset:
-    """Return a recording with the number of faults that are there."""
+    """Return a recording with the number of active faults."""
     time = recording["time"].values
     there = sum((fault.course.is_there(time) for fault in bench.injections), np.zeros(time.size))
     attributes = {"units": "1", "long_name": "faults that are there"}
@@ -182,9 +249,9 @@ def _case_notes(bench: Bench, case: Case) -> dict[str, Any]:
 def rows_recorded(
     bench: Bench, case: Case, computed: Run, trajectory: Trajectory
 ) -> tuple[xr.Dataset, list[str]]:
-    """Return what `recording_of` would hold, as plain arrays, and what the run warns of."""
+    """Return the content of `recording_of` as plain arrays, and the warnings of the run."""
     rows = rows_of(computed, trajectory, case.settle, case.keep, partial(_case_notes, bench, case))
-    recording = cast(xr.Dataset, rows)  # it answers as one
+    recording = cast(xr.Dataset, rows)  # it has the same interface
     warnings = watch(recording, computed, trajectory)
     return _finished(bench, case, recording), warnings
 
@@ -192,7 +259,7 @@ def rows_recorded(
 def rows_of_case(
     bench: Bench, case: Case, rows: Rows, group: Sequence[Trajectory], k: int
 ) -> xr.Dataset:
-    """Return what `recording_of` would hold of one of several runs, of the rows of all."""
+    """Return the content of `recording_of` for one of several runs, from the rows of all."""
 
     def notes() -> dict[str, Any]:
         return {**run_notes(group[k].run, group[k]), **_case_notes(bench, case)}
@@ -205,13 +272,13 @@ def judged(
     recordings: Mapping[str, xr.Dataset],
     others: Mapping[float, Mapping[str, xr.Dataset]] = MappingProxyType({}),
 ) -> Result:
-    """Return recordings with their key figures, and whether these meet the requirements.
+    """Return the result of recordings: key figures, and verdicts on the requirements.
 
     Parameters
     ----------
     others
-        The same runs in other steps, by their length over the bench's; figures and signals then
-        get their error.
+        The same runs in other steps, by the ratio of their step to the bench's. Figures and
+        signals then have an error.
     """
 
     def figures(made: Mapping[str, xr.Dataset]) -> tuple[Kpi, ...]:
@@ -228,7 +295,7 @@ def judged(
 
 
 def _bench_notes(bench: Bench) -> dict[str, str]:
-    """Return the attributes of a recording that say which bench it is of."""
+    """Return the attributes of a recording that describe its bench."""
     return {
         "model": bench.system,
         "experiment": bench.experiment,
@@ -240,7 +307,7 @@ def _bench_notes(bench: Bench) -> dict[str, str]:
 
 
 def _with_inputs(recording: xr.Dataset, case: Case) -> xr.Dataset:
-    """Return a recording with what drove the model, where the model does not record that."""
+    """Return a recording with the stimuli that the model does not record."""
     time = recording["time"].values
     given = {name: y for name, y in case.stimulus(time).items() if name not in recording}
     attributes = _stimulus_attributes(case)
@@ -248,7 +315,7 @@ def _with_inputs(recording: xr.Dataset, case: Case) -> xr.Dataset:
 
 
 def inputs_recorded(rows: Rows, cases: Sequence[Case], wanted: Collection[str]) -> Rows:
-    """Return the rows of several runs with what drove them of the wanted signals they lack."""
+    """Return the rows of several runs with those wanted stimuli that they lack."""
     each = [case.stimulus(rows["time"].values) for case in cases]
     lacking = [name for name in each[0] if name in wanted and name not in rows]
     given = {name: np.array([stimuli[name] for stimuli in each]) for name in lacking}
@@ -261,9 +328,9 @@ def _stimulus_attributes(case: Case) -> dict[str, dict[str, str]]:
 
 
 def _described(stimuli: Mapping[str, Stimulus]) -> dict[str, Any]:
-    """Return stimuli as ``[stimulus]`` sections in SI; empty where none is given."""
-    found = {
+    """Return stimuli as ``[stimulus]`` sections in SI; empty without stimuli."""
+    sections = {
         name: {"kind": each.kind, **each.parameters.model_dump(mode="json")}
         for name, each in stimuli.items()
     }
-    return {**found.pop("", {}), **found}
+    return {**sections.pop("", {}), **sections}

@@ -1,4 +1,4 @@
-"""What a source states for an experiment: levels and ranges under our curves, key figures."""
+"""Statements of a source on an experiment: levels and ranges of signals, and key figures."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from bywire.core.registry import Kind, instances
 @checked
 @dataclass(frozen=True)
 class StatedLevel:
-    """A level of a signal that a source states in its text or by the end of a figure's axis.
+    """Level of a signal that a source states, in its text or by the end of a figure's axis.
 
     Parameters
     ----------
     name
-        Of the statement, unlike any other.
+        Unique name of the statement.
     experiment
         Name of the experiment that the source describes.
     signal
@@ -28,14 +28,13 @@ class StatedLevel:
     value
         The level in the signal's SI unit.
     label
-        What a legend says of it, short.
+        Short text for a legend.
     where
-        Place in the source, with how it was read; of a tolerance that is ours, why so much.
+        Place in the source, and how the value was read; the reason for a tolerance of our own.
     options
-        Names of the experiment's options that must be its defaults for the statement to hold.
+        Names of options that must have their default values for the statement to hold.
     tolerance
-        How far a curve may be off and still be what is stated, in the signal's SI unit; 0 where
-        nobody says.
+        Tolerance of the statement in the signal's SI unit; 0 if none is stated.
     """
 
     name: str
@@ -49,31 +48,31 @@ class StatedLevel:
 
     @property
     def low(self) -> float:
-        """Lower end of what counts as stated, in the signal's SI unit."""
+        """Lower end of the tolerance, in the signal's SI unit."""
         return self.value - self.tolerance
 
     @property
     def high(self) -> float:
-        """Upper end of what counts as stated, in the signal's SI unit."""
+        """Upper end of the tolerance, in the signal's SI unit."""
         return self.value + self.tolerance
 
     @property
     def levels(self) -> tuple[float, ...]:
-        """What is drawn as a line: the value."""
+        """Levels to draw: the value."""
         return (self.value,)
 
 
 @checked
 @dataclass(frozen=True)
 class StatedRange:
-    """A range within which a source states a signal to be, for instance between a figure's axes.
+    """Range of a signal that a source states, for instance by the axes of a figure.
 
     Parameters
     ----------
     name, experiment, signal, label, where, options
-        As of a `StatedLevel`.
+        As in `StatedLevel`.
     low, high
-        Its ends in the signal's SI unit.
+        Ends of the range in the signal's SI unit.
     """
 
     name: str
@@ -87,28 +86,27 @@ class StatedRange:
 
     @property
     def levels(self) -> tuple[float, ...]:
-        """What is drawn as lines: both ends."""
+        """Levels to draw: both ends."""
         return self.low, self.high
 
 
 @checked
 @dataclass(frozen=True)
 class StatedFigure:
-    """A key figure that a source states, shown beside ours.
+    """Key figure that a source states, shown with the computed one.
 
     Parameters
     ----------
     name, experiment, where, options
-        As of a `StatedLevel`.
+        As in `StatedLevel`.
     figure
         Name of the key figure.
     value
-        What is stated, in the figure's unit.
+        Stated value in the figure's unit.
     bound
-        ``"<="`` or ``">="`` where the statement is a bound on the figure.
+        ``"<="`` or ``">="`` if the statement is a bound on the figure.
     tolerance
-        How far the figure may be off and still be what is stated, in its unit; 0 where nobody
-        says.
+        Tolerance of the statement in the figure's unit; 0 if none is stated.
     """
 
     name: str
@@ -136,21 +134,21 @@ def _levels(module: ModuleType) -> list[StatedLevel | StatedRange]:
 
 
 STATED = Kind("stated level", ("stated",), _levels, declared="a StatedLevel or a StatedRange")
-"""every level and range that a source states for an experiment of its brake"""
+"""every stated level and range of an experiment"""
 
 STATED_FIGURES = Kind(
     "stated key figure", ("stated",), instances(StatedFigure), declared="a StatedFigure"
 )
-"""every key figure that a source states for an experiment of its brake"""
+"""every stated key figure of an experiment"""
 
 
 def stated_for(bench: Bench) -> list[StatedLevel | StatedRange]:
-    """Return what sources state for a bench's signals, as far as its options are theirs."""
+    """Return the statements on a bench's signals that hold for its options."""
     return _holding(bench, STATED.beside(type(bench.par)).values())
 
 
 def stated_figures(bench: Bench) -> dict[str, StatedFigure]:
-    """Return what sources state for a bench's key figures, by figure, likewise."""
+    """Return the statements on a bench's key figures that hold for its options, by figure."""
     statements = STATED_FIGURES.beside(type(bench.par)).values()
     return {each.figure: each for each in _holding(bench, statements)}
 

@@ -1,14 +1,14 @@
-"""How far a run's results are from those of ever shorter steps: the same runs in other steps.
+"""Numerical error of a run from its step, estimated from the same run in other steps.
 
-The scheme is of second order: a figure of steps h is off by c h^2, and differs from that of steps
-f h by c h^2 |1 - f^2|. Half and double steps show whether a figure does converge so: both
-differences then have the same sign, and one is four times the other. Then each tells the error, and
-the larger estimate counts.
+The scheme is of second order: a figure with step h has an error of c h^2. It differs from the
+figure with step f h by c h^2 |1 - f^2|. Half and double steps show whether a figure converges in
+this way: both differences then have the same sign, and one is four times the other. Each then gives
+an estimate of the error, and the larger one counts.
 
-Where friction, contacts and chaos decide, the differences show no order, and any of them may be
-small by chance. The figures of all steps are then draws of one scatter: about as far as they are
-apart, the run is off. So that chance needs more draws to deceive, the bench also runs in a step
-close to its own. The error is the scale of which 95 % of the true errors are within three.
+If friction, contacts or chaos dominate, the differences show no order, and any of them may be small
+by chance. The figures of all steps are then samples of one distribution, and their spread measures
+the error. A further step close to the bench's own makes a small spread by chance less likely. The
+error is a scale: 95 % of the true errors are within three times it.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ from bywire.core.typing import Array
 from bywire.simulation.run import Run
 
 OTHER_STEPS = (0.5, 2.0)
-"""other steps over that of the run, which show an order"""
+"""ratios of other steps to the run's step, which show the order"""
 MOST_WORK = 5.0
-"""work of a run in other steps, over that of the run, at which its estimate is abandoned"""
+"""ratio to the work of the run at which a run in another step is abandoned"""
 NO_ESTIMATE = (StepError, RunError)
-"""what runs in other steps may end with: no divisor of a sample time, or too coarse"""
+"""errors that runs in other steps may raise: no divisor of a sample time, or too coarse"""
 ROUNDING = 1e-11
-"""rounding of many steps, over the largest value of a signal"""
+"""rounding error of many steps, relative to the largest value of a signal"""
 _STEPS = {0.5: "half the step", 2.0: "twice the step"}
-_ORDER, _OFF = 2.0, 0.3  # of the scheme; what an observed order may differ by
+_ORDER, _OFF = 2.0, 0.3  # order of the scheme, and largest deviation of an observed order
 SPREAD = {3: 1.72, 4: 1.29}
-"""draws -> a third of the 0.95 quantile of |x_1 - x| / s, of equal normal draws x_1 ... x_n with
-standard deviation s, and one more, x"""
-_SAME = 1e-10  # s, between a time and that of the row where it was read
+"""number of samples n -> a third of the 0.95 quantile of |x_1 - x| / s, where x_1 ... x_n and x are
+independent samples of one normal distribution, and s is the standard deviation of x_1 ... x_n"""
+_SAME = 1e-10  # s, largest difference between a time and that of its row
 
 
 def of_difference(factor: float, order: int = 2) -> float:
-    """Return the error of steps h over the difference to steps ``factor`` h.
+    """Return the ratio of the error with step h to the difference to step ``factor`` h.
 
     Examples
     --------
@@ -53,16 +53,16 @@ def of_difference(factor: float, order: int = 2) -> float:
 
 
 def unestimated(failures: Mapping[float, Exception]) -> str:
-    """Return the warning that no other step ran, by why each, over that of the run, did not."""
-    because = "; ".join(f"{factor:g} of the step: {e}" for factor, e in failures.items())
+    """Return the warning that no other step could run, with the reason for each ratio."""
+    reasons = "; ".join(f"{factor:g} of the step: {e}" for factor, e in failures.items())
     return (
-        "how far the figures are off by the step is not known: the bench runs in neither half nor "
-        f"double steps ({because})"
+        "the numerical error of the figures is unknown: the bench runs in neither half nor double "
+        f"steps ({reasons})"
     )
 
 
 def abandoned(failures: Mapping[float, Exception]) -> str:
-    """Return the note that the run in some other step was given up; empty where none was."""
+    """Return the note that runs in other steps were abandoned; empty if none was."""
     steps = [
         _STEPS.get(factor, f"{factor:.3g} of the step")
         for factor, error in failures.items()
@@ -77,10 +77,10 @@ def abandoned(failures: Mapping[float, Exception]) -> str:
 
 
 def are_distinct(values: Sequence[float], errors: Sequence[float]) -> bool:
-    """Return whether values differ by more than they may be off: any two of them are enough.
+    """Return whether any two values differ by more than their errors.
 
-    Errors that were not estimated (NaN) count as none. What is not defined (NaN) differs from what
-    is, unless an error is infinite.
+    Errors that were not estimated (NaN) count as zero. An undefined value (NaN) differs from a
+    defined one, unless an error is infinite.
 
     Examples
     --------
@@ -99,22 +99,22 @@ def with_step_errors(
     others: Mapping[float, Sequence[Kpi]],
     recordings: Mapping[str, xr.Dataset],
 ) -> tuple[Kpi, ...]:
-    """Return key figures with the error that they have from the step.
+    """Return key figures with their numerical error.
 
     Parameters
     ----------
     kpis
         Figures of the runs.
     others
-        The same figures in other steps, by their length over that of the runs.
+        The same figures in other steps, by the ratio of the steps.
     recordings
-        The runs: a difference of large forces, all but zero, is no better than their rounding, and
-        a time that is one of a row was read there, at most an interval away from its event.
+        Recordings of the runs. They give the rounding error of figures that are small differences
+        of large values, and the error of times that were read at a row.
 
     Returns
     -------
     tuple of Kpi
-        With ``error`` in the unit of each; infinite where not every step defines a figure.
+        Figures with ``error`` in their unit; infinite where a step leaves a figure undefined.
     """
     intervals = _intervals(recordings)
     rounding = {unit: ROUNDING * peak for unit, peak in _peaks(recordings).items()}
@@ -131,10 +131,10 @@ def with_step_errors(
 
 
 def steps_of(runs: Iterable[Run]) -> tuple[float, ...]:
-    """Return other steps over that of some runs: those that show an order, and one close to it.
+    """Return the ratios of other steps to that of some runs: `OTHER_STEPS`, and one close to 1.
 
-    The latter has one substep more in the longest interval that divides all sample times; there is
-    none where that interval has a single substep.
+    The latter has one substep more in the longest interval that divides all sample times. There is
+    none if that interval has a single substep.
     """
     count = math.gcd(*(run.schedule().substeps for run in runs))
     return (*OTHER_STEPS, count / (count + 1)) if count > 1 else OTHER_STEPS
@@ -143,19 +143,19 @@ def steps_of(runs: Iterable[Run]) -> tuple[float, ...]:
 def note_step_errors(
     recordings: Mapping[str, xr.Dataset], others: Mapping[float, Mapping[str, xr.Dataset]]
 ) -> None:
-    """Write into each recorded signal how large its error from the step is.
+    """Write the numerical error of each recorded signal into its attributes.
 
-    The attributes ``step_error_rms`` and ``step_error_max`` [the signal's unit] are over all rows
-    of the recording. A signal that jumps, such as a duty cycle, may be far off for a row where
-    the jump falls into another one, and right on average.
+    The attributes ``step_error_rms`` and ``step_error_max`` [the signal's unit] cover all rows of
+    the recording. A signal that jumps, such as a duty cycle, may have a large error in a single
+    row, because the jump falls into another one, and be correct on average.
 
     Parameters
     ----------
     recordings
-        The runs, by label; their signals' attributes are set.
+        Recordings by label; the attributes of their signals are set.
     others
-        The same in other steps, by their length over that of the runs; those close to one tell
-        too little.
+        The same recordings in other steps, by the ratio of the steps; ratios close to 1 are not
+        used.
     """
     for label, recording in recordings.items():
         for name, signal in recording.items():
@@ -174,8 +174,8 @@ def note_step_errors(
 def _estimate(value: float, others: Mapping[float, float], rounding: float) -> tuple[float, bool]:
     """Return the error of a figure, and whether it converges.
 
-    ``others``: the figure in other steps, by their length over that of ``value``; ``rounding``:
-    differences that mean nothing.
+    ``others``: the figure in other steps, by the ratio of the steps; ``rounding``: largest
+    difference that is rounding only.
     """
     apart = {factor: _apart(value, other) for factor, other in others.items()}
     if any(not math.isfinite(each) for each in apart.values()):
@@ -190,7 +190,7 @@ def _estimate(value: float, others: Mapping[float, float], rounding: float) -> t
 
 
 def _shows_order(value: float, others: Mapping[float, float]) -> bool:
-    """Return whether differences to half and double steps are those of the scheme's order."""
+    """Return whether the differences to half and double steps have the scheme's order."""
     if not all(factor in others for factor in OTHER_STEPS):
         return False
     fine, coarse = others[0.5] - value, value - others[2.0]
@@ -202,7 +202,7 @@ def _rms(error: Array) -> float:
 
 
 def _peaks(recordings: Mapping[str, xr.Dataset]) -> dict[str, float]:
-    """Return the largest magnitude of all signals of each unit but the pure number's."""
+    """Return the largest magnitude of all signals of each unit, without pure numbers."""
     peaks: dict[str, float] = {}
     for recording in recordings.values():
         for signal in recording.values():
@@ -213,14 +213,14 @@ def _peaks(recordings: Mapping[str, xr.Dataset]) -> dict[str, float]:
 
 
 def _intervals(recordings: Mapping[str, xr.Dataset]) -> set[float]:
-    """Return the intervals of the rows [s]."""
+    """Return the recording intervals [s]."""
     times = [r["time"].values for r in recordings.values() if r.sizes.get("time", 0) > 1]
     return {float(t[-1] - t[0]) / (t.size - 1) for t in times}
 
 
 def _reading(time: float, intervals: Iterable[float]) -> float:
-    """Return how far an event may be from its time [s]: zero unless that is one of a row."""
-    if not math.isfinite(time) or abs(time) < _SAME:  # what begins with the run is exact
+    """Return the error of a time that was read at a row [s]: the interval, or zero for others."""
+    if not math.isfinite(time) or abs(time) < _SAME:  # the start of the run is exact
         return 0.0
     at_rows = (each for each in intervals if abs(math.remainder(time, each)) < _SAME)
     return max(at_rows, default=0.0)

@@ -15,7 +15,6 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.bench.faults.fault_section import require_admissible
 from bywire.bench.faults.modes import Mode, modes_of
-from bywire.campaigns.declared import CAMPAIGNS
 from bywire.campaigns.judging import require_small
 from bywire.campaigns.plan import (
     CampaignPlan,
@@ -26,7 +25,7 @@ from bywire.campaigns.plan import (
     evenly,
     touch_alike,
 )
-from bywire.campaigns.residual import Residual, residuals_of
+from bywire.campaigns.residual import CAMPAIGNS, Residual, residuals_of
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.quantities import TimeConstant, Unit
 from bywire.core.section import Name, Names, Section, Table

@@ -17,8 +17,8 @@ from bywire.campaigns.plan import CampaignPlan, Failing, touch_alike
 from bywire.campaigns.residual import NEVER, detected, threshold
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
+from bywire.simulation.ensemble import fit_lanes, simulate_group
 from bywire.simulation.run import Run, Trajectory, simulate
-from bywire.simulation.run_group import fit_lanes, simulate_group
 from bywire.simulation.tapped import rests
 
 LANES = 64

@@ -10,13 +10,12 @@ from typing import Any, Literal
 import numpy as np
 
 from bywire.bench.bench import Bench
+from bywire.bench.changes import split_options
 from bywire.bench.computation import computation
 from bywire.bench.experiment import Case
-from bywire.bench.faults.course import AT_ZERO
-from bywire.bench.faults.fault_section import Injection
+from bywire.bench.faults.fault_section import AT_ZERO, Injection
 from bywire.bench.faults.injected import taps_of, touched
 from bywire.bench.faults.modes import Mode
-from bywire.bench.option_names import split_options
 from bywire.campaigns.residual import Residual, first_time, least_of_the_last, missed_ticks
 from bywire.cases.identity import as_json, digest_of
 from bywire.core.errors import ParameterError, unknown_name

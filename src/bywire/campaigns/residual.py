@@ -1,4 +1,4 @@
-"""Residuals: what a controller can compute to see that something has failed."""
+"""Residuals, by which a controller can detect a fault; the campaigns that a brake declares."""
 
 from __future__ import annotations
 
@@ -175,3 +175,29 @@ def detected(lasted: Array, limit: float, time: Array, since: Array) -> Array:
         return np.full(len(lasted), np.nan)
     margin = 1e-9 * max(abs(limit), 1e-12)  # rounding is no failure
     return first_time(np.where(lasted > limit + margin, 1.0, 0.0), time, since)
+
+
+# --- Declared campaigns
+
+
+@dataclass(frozen=True)
+class DeclaredCampaign:
+    """A campaign that comes with a brake.
+
+    Parameters
+    ----------
+    name
+        What the command line calls it.
+    summary
+        One line for listings.
+    content
+        What a campaign file holds; its ``bench`` names an experiment.
+    """
+
+    name: str
+    summary: str
+    content: Mapping[str, Any]
+
+
+CAMPAIGNS = Kind("campaign", ("campaigns",), instances(DeclaredCampaign))
+"""the campaigns of every brake"""

@@ -1,19 +1,285 @@
-"""A campaign, run: what is missing is computed, fault by fault, and kept in a folder."""
+"""A campaign, run: judged fault by fault, kept in a folder, with the coverage of its residuals."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from functools import cached_property
+from typing import Any, ClassVar, Literal
+
+import numpy as np
 
 from bywire.bench.running import Progress
-from bywire.campaigns.findings import CampaignFindings, finding
-from bywire.campaigns.judging import healthy_traces, judge_fault, judge_healthy
-from bywire.campaigns.plan import CampaignPlan
+from bywire.campaigns.judging import FACTORS, Healthy, healthy_traces, judge_fault, judge_healthy
+from bywire.campaigns.plan import CampaignPlan, Failing
 from bywire.cases.runner import complete
 from bywire.cases.store import PieceFolder, json_object
 from bywire.core.callers import option
+from bywire.core.typing import Array
+from bywire.studies.statistics import Share, share
+
+CONFIDENCE = 0.95
+_AT = FACTORS.index(1.0)
+_SAME = 1e-9  # s, between two times of rows
+Class = Literal["covered", "too late", "undetected", "harmless, seen", "latent"]
+
+
+@dataclass(frozen=True)
+class FaultFinding:
+    """What all runs with a fault did.
+
+    Parameters
+    ----------
+    failing
+        What failed.
+    reached
+        Time from onset until each criterion is violated [s], by name; NaN where it is not.
+    detected
+        Time from onset until each residual sees it [s], by name; shape (factors, cases).
+    extremes
+        By signal: how far it comes off the healthy run, least, largest and at the end.
+    reacted
+        What is reached with the reaction, by criterion, of the runs in which it could be taken.
+    answered
+        Which runs these are.
+    delay
+        From detection until the reaction takes effect [s]; 0 where there is none.
+    """
+
+    failing: Failing
+    reached: Mapping[str, Array]
+    detected: Mapping[str, Array]
+    extremes: Mapping[str, Sequence[Array]]
+    reacted: Mapping[str, Array]
+    answered: Sequence[int] = ()
+    delay: float = 0.0
+
+    @property
+    def cases(self) -> int:
+        """How many runs."""
+        return len(next(iter(self.reached.values())))
+
+    @cached_property
+    def violated(self) -> Array:
+        """Time until the first criterion is violated [s], NaN where none is; shape (cases,)."""
+        return _first([*self.reached.values()])
+
+    @cached_property
+    def seen(self) -> Array:
+        """Time until the first residual sees it [s], NaN where none does; shape (cases,)."""
+        never = np.full(self.cases, math.nan)
+        return _first([never, *(each[_AT] for each in self.detected.values())])
+
+    @property
+    def dangerous(self) -> int:
+        """Runs in which a criterion is violated."""
+        return int(np.sum(~np.isnan(self.violated)))
+
+    @property
+    def tolerance(self) -> float:
+        """Fault tolerant time: that of its worst run [s]; NaN where nothing is violated."""
+        return float(np.nanmin(self.violated)) if self.dangerous else math.nan
+
+    @property
+    def in_time(self) -> int:
+        """Dangerous runs in which it is seen, and answered, before the tolerant time is over."""
+        there = ~np.isnan(self.violated)
+        if not self.dangerous:
+            return 0
+        return int(np.sum(self.seen[there] + self.delay < self.tolerance))
+
+    @property
+    def criteria(self) -> dict[str, int]:
+        """How many runs violate each criterion, of those that any does."""
+        counts = {name: int(np.sum(~np.isnan(times))) for name, times in self.reached.items()}
+        return {name: count for name, count in counts.items() if count}
+
+    @cached_property
+    def only_with_reaction(self) -> dict[str, int]:
+        """How many runs violate each criterion because of the reaction alone."""
+        counts = {
+            name: int(np.sum(np.isnan(self._unanswered(name)) & ~np.isnan(times)))
+            for name, times in self.reacted.items()
+        }
+        return {name: count for name, count in counts.items() if count}
+
+    @cached_property
+    def sooner_with_reaction(self) -> dict[str, int]:
+        """How many runs violate each criterion in any case, and sooner with the reaction."""
+        counts = {
+            name: int(np.sum(times < self._unanswered(name) - _SAME))
+            for name, times in self.reacted.items()
+        }
+        return {name: count for name, count in counts.items() if count}
+
+    @cached_property
+    def prevented_by_reaction(self) -> dict[str, int]:
+        """How many runs violate each criterion without the reaction, and not with it."""
+        counts = {
+            name: int(np.sum(~np.isnan(self._unanswered(name)) & np.isnan(times)))
+            for name, times in self.reacted.items()
+        }
+        return {name: count for name, count in counts.items() if count}
+
+    @property
+    def is_relieved(self) -> bool:
+        """Whether the reaction keeps every dangerous run from violating anything."""
+        dangerous = set(np.flatnonzero(~np.isnan(self.violated)).tolist())
+        if not dangerous or not dangerous <= set(self.answered):
+            return False
+        return all(np.isnan(times).all() for times in self.reacted.values())
+
+    def _unanswered(self, criterion: str) -> Array:
+        """Return when the runs that are answered violate a criterion without the reaction [s]."""
+        return np.asarray(self.reached[criterion])[list(self.answered)]
+
+    @property
+    def first_seen_by(self) -> str:
+        """Residual that sees it first in most runs; empty where none does."""
+        names = [*self.detected]
+        times = np.array([self.detected[name][_AT] for name in names])
+        if not times.size:
+            return ""
+        ranked = np.where(np.isnan(times), np.inf, times)
+        firsts = [
+            names[k]
+            for k, least in zip(ranked.argmin(0), ranked.min(0), strict=True)
+            if np.isfinite(least)
+        ]
+        return Counter(firsts).most_common(1)[0][0] if firsts else ""
+
+    @property
+    def kind(self) -> Class:
+        """What becomes of it, by its worst run."""
+        if self.dangerous:
+            if self.in_time == self.dangerous:
+                return "covered"
+            missed = np.isnan(self.seen[~np.isnan(self.violated)])
+            return "undetected" if missed.any() else "too late"
+        return "latent" if np.isnan(self.seen).any() else "harmless, seen"
+
+    def severity(self, plan: CampaignPlan) -> str:
+        """Return the worst class of the criteria that are violated, in alphabetical order."""
+        return max((c.severity for c in plan.criteria if c.name in self.criteria), default="")
+
+
+@dataclass(frozen=True)
+class CampaignFindings:
+    """What a campaign found, as far as it is computed."""
+
+    plan: CampaignPlan
+    healthy: Healthy
+    faults: tuple[FaultFinding, ...]
+
+    @property
+    def is_weighted(self) -> bool:
+        """Whether failure rates weigh the faults."""
+        return bool(self.plan.rates)
+
+    @property
+    def coverage(self) -> float:
+        """Share of dangerous runs that are seen in time, by the rates; NaN without any."""
+        rows = [(self.plan.rate(f.failing) / f.cases, f.in_time, f.dangerous) for f in self.faults]
+        total = sum(weight * dangerous for weight, _, dangerous in rows)
+        return sum(weight * seen for weight, seen, _ in rows) / total if total else math.nan
+
+    @property
+    def coverage_of_cases(self) -> Share:
+        """The same of plain runs, with its interval."""
+        seen = sum(each.in_time for each in self.faults)
+        return share(seen, sum(each.dangerous for each in self.faults), CONFIDENCE)
+
+    @property
+    def false_alarms(self) -> Share:
+        """Healthy runs, unseen by thresholds, in which any residual exceeds its own."""
+        plan = self.plan
+        return share(self.healthy.any_alarm, plan.healthy - plan.tuning, CONFIDENCE)
+
+    def kinds(self) -> Counter[Class]:
+        """Return how many faults are of each class."""
+        return Counter(each.kind for each in self.faults)
+
+    def harm_of_reaction(self) -> tuple[str, ...]:
+        """Return what the reaction makes worse, a sentence each; none where it harms no fault."""
+        if self.plan.reaction is None:
+            return ()
+        groups = {
+            "harmless, seen": [each for each in self.faults if each.kind == "harmless, seen"],
+            "latent": [each for each in self.faults if each.kind == "latent"],
+            "dangerous": [each for each in self.faults if each.dangerous],
+        }
+        caused = _harm({k: [f.only_with_reaction for f in each] for k, each in groups.items()})
+        sooner = _harm({k: [f.sooner_with_reaction for f in each] for k, each in groups.items()})
+        named = f"the reaction, {self.plan.reaction.failing.name},"
+        worse = f"{named} makes things worse: it alone causes {'; '.join(caused)}"
+        return (
+            *([worse] if caused else []),
+            *([f"{named} hastens {'; '.join(sooner)}"] if sooner else []),
+        )
+
+    def benefit_of_reaction(self) -> str:
+        """Return what the reaction prevents, and how many faults it makes harmless."""
+        dangerous = [each for each in self.faults if each.dangerous]
+        prevented = _harm({"dangerous": [each.prevented_by_reaction for each in dangerous]})
+        relieved = sum(each.is_relieved for each in dangerous)
+        return (
+            f"the reaction prevents {'; '.join(prevented) or 'nothing'}, and makes {relieved} of "
+            f"{len(dangerous)} dangerous faults harmless"
+        )
+
+    def curve(self, residual: str) -> list[tuple[float, int, float, int]]:
+        """Return factor of the threshold, false alarms, median delay [s], runs in which it sees.
+
+        Of the dangerous runs of all faults; one row for each of the factors.
+        """
+        rows = []
+        for k, factor in enumerate(FACTORS):
+            times = [each.detected[residual][k][~np.isnan(each.violated)] for each in self.faults]
+            seen = np.concatenate(times) if times else np.empty(0)
+            seen = seen[~np.isnan(seen)]
+            median = float(np.median(seen)) if seen.size else math.nan
+            rows.append((factor, self.healthy.alarms[residual][k], median, int(seen.size)))
+        return rows
+
+
+def finding(plan: CampaignPlan, number: int, outcome: Mapping[str, Any]) -> FaultFinding:
+    """Return what the outcome of a fault says, nulls as NaN; ``number``: of it in the plan."""
+    reacted = outcome.get("reacted", {}).get("reached", {})
+    return FaultFinding(
+        plan.faults[number],
+        {name: _numbers(times) for name, times in outcome["reached"].items()},
+        {name: _numbers(times) for name, times in outcome["detected"].items()},
+        {name: [_numbers(each) for each in sides] for name, sides in outcome["extremes"].items()},
+        {name: _numbers(times) for name, times in reacted.items()},
+        outcome.get("reacted", {}).get("cases", ()),
+        0.0 if plan.reaction is None else plan.reaction.delay,
+    )
+
+
+def _harm(groups: Mapping[str, Sequence[Mapping[str, int]]]) -> list[str]:
+    """Return which criteria suffer in how many faults of each group, where any does."""
+    return [
+        f"{', '.join(dict.fromkeys(name for counts in worse for name in counts))} in {len(worse)} "
+        f"of {len(each)} {kind} faults"
+        for kind, each in groups.items()
+        if (worse := [counts for counts in each if counts])
+    ]
+
+
+def _numbers(values: Any) -> Array:
+    return np.array(values, dtype=np.float64)
+
+
+def _first(columns: Sequence[Array]) -> Array:
+    times = np.array(columns)
+    ranked = np.where(np.isnan(times), np.inf, times).min(axis=0)
+    return np.where(np.isfinite(ranked), ranked, np.nan)
+
+
+# --- Running
 
 
 @dataclass(frozen=True)

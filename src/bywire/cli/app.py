@@ -6,17 +6,114 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from functools import cache
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from bywire.cli.bench_commands import benchmark_command, list_command
-from bywire.cli.output import result
-from bywire.cli.serve_command import serve_command
+from bywire.cli import completion
+from bywire.cli.output import INTERRUPTED, message, result
+from bywire.cli.show import JsonFlag, show
 from bywire.cli.use_case_commands import command_of
-from bywire.core.errors import ParameterError
+from bywire.core.errors import InputError, ParameterError
+from bywire.core.interrupts import interrupt_heard
+from bywire.server.address import PORT
 from bywire.usecases import use_cases
+
+
+def list_command(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[TOPIC|NAME|WORD]",
+            help="A kind of things; or a name: its options, signals, units; or what it is about.",
+            autocompletion=completion.names_of(),
+        ),
+    ] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Show what there is: kinds of things, the names of one kind, or all about a name."""
+    from bywire.api.overview import is_topic, overview
+
+    if name is None or is_topic(name):
+        show(lambda _: overview(name or ""), as_json=json)
+        return
+    from bywire.api.describe import describe
+
+    show(lambda _: describe(name), as_json=json)
+
+
+def benchmark_command(
+    parts: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[PART]...", help="What to measure, e.g. commands; else all."),
+    ] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Measure speed against hand-written C and what users would pick instead."""
+    show(lambda progress: _benchmarks().measure(progress, parts or ()), as_json=json)
+
+
+def _benchmarks() -> ModuleType:
+    """Load the benchmarks, which stand in a clone of the repository beside ``src``.
+
+    Raises
+    ------
+    InputError
+        Where bywire runs from anywhere else.
+    """
+    clone = Path(__file__).parents[3]
+    if not (clone / "benchmarks" / "suite.py").is_file():
+        raise InputError(
+            "the benchmarks come with a clone of bywire's repository: run python3 tasks.py demo in "
+            "it, then .venv/bin/bywire benchmark"
+        )
+    sys.path.insert(0, str(clone))
+    return import_module("benchmarks.suite")
+
+
+# --- serve
+
+
+def serve_command(
+    subject: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[BENCH|FOLDER]",
+            show_default=False,
+            autocompletion=completion.names_of(
+                "experiments", "generic_experiments", ending=".toml"
+            ),
+            help="Bench file, experiment or folder; the current folder by default.",
+        ),
+    ] = None,
+    port: Annotated[int, typer.Option(help="Port; 0 for any that is free.")] = PORT,
+    folder: Annotated[
+        Path | None,
+        typer.Option(
+            help="What is served; by default the folder of the bench file.", show_default=False
+        ),
+    ] = None,
+) -> None:
+    """Show benches, results and studies in a browser of this machine, and compute what they ask."""
+    from bywire.server.serving import serve
+
+    def say(link: str) -> None:
+        message("open this link in a browser of this machine; Ctrl-C ends the server")
+        result(link)
+
+    try:
+        serve(subject or "", port=port, folder=folder or "", say=say)
+    except KeyboardInterrupt:  # typer would exit without a word
+        interrupt_heard()
+        message("interrupted")
+        raise typer.Exit(INTERRUPTED) from None
+
+
+# --- All commands
 
 _SIZE = "size"
 

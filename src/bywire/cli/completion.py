@@ -76,7 +76,7 @@ def varied(args: list[str], incomplete: str) -> Completed:
 def _keys_of(bench: str) -> dict[str, str]:
     """Return parameters, and options, of a bench with what they are now."""
     from bywire.bench.bench_file import read
-    from bywire.bench.option_names import OPTION
+    from bywire.bench.changes import OPTION
 
     made = read(bench, {})
     options = {f"{OPTION}{name}": value for name, value in made.chosen_options.flat().items()}

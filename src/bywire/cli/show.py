@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,8 +20,16 @@ from bywire.core.interrupts import interrupt_heard
 from bywire.core.scratch import made_folder
 
 if TYPE_CHECKING:
-    from bywire.bench.running import Progress
+    from bywire.core.typing import Progress
     from bywire.report.answer import Answer
+
+JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+VerboseFlag = Annotated[
+    bool, typer.Option("--verbose", help="Show definitions, explanations and all rows too.")
+]
+
+
+# --- What every command does with its answer: progress, messages, files, the exit status
 
 _INTERVAL = 0.1  # s between two drawings of the bar
 
@@ -113,6 +121,7 @@ def show(
     out: Path | None = None,
     as_json: bool = False,
     advice: str = ANOTHER,
+    verbose: bool = False,
 ) -> None:
     """Compute an answer and show it; a full disk must not cost the numbers too.
 
@@ -126,6 +135,8 @@ def show(
         Whether one JSON object is printed.
     advice
         What to do about a folder that cannot be written.
+    verbose
+        Whether a terminal also shows what it leaves out otherwise.
 
     Raises
     ------
@@ -140,7 +151,7 @@ def show(
         with_files,
         write_document,
     )
-    from bywire.report.terminal import terminal_text
+    from bywire.report.terminal import terminal_text, verdict_line
 
     if out is not None:
         load_matplotlib()
@@ -172,7 +183,7 @@ def show(
     if as_json:
         shown = with_files(document, files) if document.has_files else answer.as_object()
         output.result(json.dumps(shown))
-    elif text := terminal_text(document):
+    elif text := terminal_text(document, verbose):
         output.result(text)
     for remark in (*answer.failures, *document.remarks):
         output.message(remark)
@@ -186,5 +197,7 @@ def show(
         written = [f"written: {path}" for path in files]
         for line in [f"report: {out / document.page_name}"] if document.is_paged else written:
             output.message(line)
+    if not as_json and not interrupted and (verdict := verdict_line(document)):
+        output.result(verdict)
     if interrupted or not answer.holds:
         raise typer.Exit(output.INTERRUPTED if interrupted else 1)

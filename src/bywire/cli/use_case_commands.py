@@ -11,8 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from bywire.cli import completion
-from bywire.cli.options import JsonFlag
-from bywire.cli.show import ANOTHER, folder, show
+from bywire.cli.show import ANOTHER, JsonFlag, VerboseFlag, folder, show
 from bywire.core.pairs import changes, named
 from bywire.usecases.asks import OUT
 from bywire.usecases.declare import Argument, Command, UseCase
@@ -25,7 +24,8 @@ def command_of(case: UseCase, command: Command) -> Callable[..., None]:
     arguments = [a for a in case.arguments if a.name not in command.without]
 
     def run(**given: Any) -> None:
-        as_json, out = given.pop("json"), given.pop("out", None)
+        as_json, verbose = given.pop("json"), given.pop("verbose")
+        out = given.pop("out", None)
         asked = {a.name: _read(a, given[a.name]) for a in arguments if a.name != "out"}
         if command.before is not None:
             command.before(**asked, out=out)
@@ -38,6 +38,7 @@ def command_of(case: UseCase, command: Command) -> Callable[..., None]:
             written,
             as_json,
             command.advice or ANOTHER,
+            verbose,
         )
 
     run.__doc__ = help_of(case, command)
@@ -46,6 +47,7 @@ def command_of(case: UseCase, command: Command) -> Callable[..., None]:
     parameters = [_parameter(a.name, *_typer(a, command)) for a in asked]
     if command.writes == "out" and not any(a.name == "out" for a in asked):
         parameters.append(_parameter("out", *_folder(OUT, None)))
+    parameters.append(_parameter("verbose", VerboseFlag, False))
     parameters.append(_parameter("json", JsonFlag, False))
     setattr(run, "__signature__", Signature(parameters))  # noqa: B010
     run.__annotations__ = {each.name: each.annotation for each in parameters}

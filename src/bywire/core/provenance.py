@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -43,6 +44,8 @@ class Cited:
     def computed(self, values: Mapping[str, Any]) -> tuple[Any, frozenset[str]]:
         """Return what the formula gives with values by dotted name, and the names that it reads.
 
+        It gives NaN where these values are so far off that it has no finite result.
+
         Raises
         ------
         ModelError
@@ -50,7 +53,10 @@ class Cited:
         """
         assert self.formula is not None
         read: set[str] = set()
-        value = self.formula(_Values(values, self.moved, read))
+        try:
+            value = self.formula(_Values(values, self.moved, read))
+        except (ArithmeticError, ValueError):  # overflow, division by zero, root of a negative
+            value = math.nan
         return value, frozenset(read)
 
     def moved_to(self, places: Mapping[str, str]) -> Cited:

@@ -15,6 +15,8 @@ import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
+from importlib.machinery import ModuleSpec
+from itertools import chain
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, Protocol, TypeVar
@@ -172,31 +174,21 @@ class Kind(Generic[T]):
         if self.declared and not files and "did you mean" not in str(error):
             loading = "--system PATH, or " * is_command_line() + "bywire.load_system"
             hints.append(f"that of a brake of your own takes {loading}")
-        return UnknownNameError("; ".join([str(error), *hints]).replace("?; ", "? "))
+        return error.reworded("; ".join([str(error), *hints]).replace("?; ", "? "))
 
     def guess(self, name: str) -> T | None:
-        """Return the thing of a name if the file of that name, or of its kind, declares it.
+        """Return the thing of a name if a file that is called so, or that quotes it, declares it.
 
         No folder is loaded for it: that takes a second where there are many things.
         """
         stem = name.replace("-", "_")
         if not stem.isidentifier():
             return None
-        homes = [
-            home
-            for home in (
-                self.home,
-                *(
-                    f"{brake.module}.{folder}"
-                    for brake in brakes().values()
-                    for folder in self.folders
-                ),
-            )
-            if home
-        ]
-        files = [f"{home}.{stem}" for home in homes if _is_folder(home) is True]
-        files += [home for home in homes if _is_folder(home) is False]
-        for file in files:
+        owned = (f"{b.module}.{folder}" for b in brakes().values() for folder in self.folders)
+        homes = [home for home in (self.home, *owned) if home and _is_folder(home) is not None]
+        called = (f"{home}.{stem}" for home in homes if _is_folder(home))
+        quoting = (file for home in homes for file in _quoting(name, home))
+        for file in chain(called, quoting):
             for module in modules_below(file) if _is_folder(file) is not None else ():
                 for thing in self.read(module):
                     if thing.name == name:
@@ -259,11 +251,30 @@ class Kind(Generic[T]):
 
 def _is_folder(module: str) -> bool | None:
     """Tell whether a module is a package; None where there is none of that name."""
+    spec = _spec(module)
+    return None if spec is None else spec.submodule_search_locations is not None
+
+
+def _spec(module: str) -> ModuleSpec | None:
     try:
-        spec = importlib.util.find_spec(module)
+        return importlib.util.find_spec(module)
     except (ImportError, ValueError, AttributeError):
         return None
-    return None if spec is None else spec.submodule_search_locations is not None
+
+
+def _quoting(name: str, home: str) -> Iterator[str]:
+    """Yield the modules of a file or a folder whose text quotes a name; none is loaded for it."""
+    spec = _spec(home)
+    folders = spec.submodule_search_locations if spec is not None else None
+    if folders is None:
+        files = {home: spec.origin} if spec is not None and spec.has_location else {}
+    else:
+        below = (file for folder in folders for file in sorted(Path(folder).glob("*.py")))
+        files = {f"{home}.{file.stem}": str(file) for file in below if file.stem != "__init__"}
+    for module, file in files.items():
+        text = Path(file or "").read_bytes()
+        if any(f"{quote}{name}{quote}".encode() in text for quote in "\"'"):
+            yield module
 
 
 def instances(kind: type[Thing]) -> Callable[[ModuleType], Iterable[Thing]]:

@@ -5,6 +5,7 @@ SciPy's own come with a package that takes longer to load than a short run takes
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -50,6 +51,23 @@ def filtered(
         driven[j:] += factor * x[: max(count - j, 0)]
         driven[:j] += factor * before
     return _recursive(a, driven, before * (b.sum() / a.sum()) if settled else before)
+
+
+def low_passed(x: Array, f_c: float, interval: float) -> Array:
+    """Return samples behind a first-order low-pass that has long seen the first of them.
+
+    Parameters
+    ----------
+    x
+        Samples, shape (n,).
+    f_c
+        Corner frequency in Hz; the lower it is, the closer the result stays to the first sample.
+    interval
+        Sample time in s.
+    """
+    decay = math.exp(-2.0 * math.pi * f_c * interval)
+    # Off the first sample: its gain at rest would be 0 / 0 where the decay rounds to 1.
+    return np.asarray(x[0] + filtered([1.0 - decay], [1.0, -decay], x - x[0]))
 
 
 def _recursive(a: Array, driven: Array, before: Array) -> Array:

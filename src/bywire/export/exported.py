@@ -1,9 +1,15 @@
-"""The run of a bench that is exported: what its kernel is emitted from, and where it begins."""
+"""The run of a bench that is exported, and its variables: what it takes and gives."""
 
 from __future__ import annotations
 
+import math
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
+from typing import Literal, get_args
 
 import casadi as ca
 import numpy as np
@@ -12,16 +18,25 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.bench.running import run_of
 from bywire.core.errors import BywireError, ParameterError, unknown_name
-from bywire.simulation.emission import indented, layout_of, leaf_namer, statements
+from bywire.core.field_notes import field_notes
+from bywire.core.leaf import Leaf
+from bywire.core.parameters import leaf_fields
+from bywire.core.signals import ranges_of, signals_of
 from bywire.simulation.emit_single import EXPORTED, emit_single
 from bywire.simulation.engine import prepare
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph, Node
-from bywire.simulation.layout import Layout
 from bywire.simulation.program import Program
 from bywire.simulation.run import Run, initial_vector
-from bywire.simulation.schedule import Schedule
-from bywire.simulation.stages import Stages, build_stages
+from bywire.simulation.schedule import Layout, Schedule
+from bywire.simulation.stages import (
+    Stages,
+    build_stages,
+    indented,
+    layout_of,
+    leaf_namer,
+    statements,
+)
 from bywire.simulation.symbols import SX, column, scalars
 
 
@@ -211,3 +226,310 @@ def _start(made: Exported) -> ca.Function | None:
         if not np.allclose(value, exact, rtol=_AGREES, atol=1e-300):
             return None
     return function
+
+
+# --- Variables
+
+Place = Literal[
+    "parameter",
+    "stimulus",
+    "state",
+    "row",
+    "sampled",
+    "rate",
+    "mode",
+    "closed",
+    "indicator",
+    "events",
+]
+Causality = Literal["parameter", "input", "output", "local"]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A number that a client sets or gets.
+
+    Parameters
+    ----------
+    name
+        Structured: ``motor.R_m``, ``caliper.p_table[1]``.
+    causality
+        What it is for a client.
+    place, index
+        Where the C code keeps it.
+    unit, label
+        SI unit, and what it means.
+    start
+        Value before anything is set; None of what is computed.
+    leaf
+        Range of a parameter.
+    is_tunable
+        Whether a parameter may change during the run: those that the ECU alone reads.
+    is_held
+        Whether it changes at ticks alone.
+    ends
+        Admissible range of an input whose signal declares one.
+    """
+
+    name: str
+    causality: Causality
+    place: Place
+    index: int
+    unit: str
+    label: str
+    start: float | None = None
+    leaf: Leaf | None = None
+    is_tunable: bool = False
+    is_held: bool = False
+    ends: tuple[float, float] = (-math.inf, math.inf)
+
+
+def row_variable(made: Exported, k: int, place: Literal["row", "sampled"]) -> Variable:
+    """Return a recorded signal as it is now, or as the last tick left it."""
+    name, signal = list(made.program.outputs.items())[k]
+    if place == "row":
+        return Variable(name, "output", place, k, signal.unit, signal.label)
+    label = f"{signal.label}, after the tick at the beginning of the last step"
+    return Variable(f"sampled.{name}", "local", place, k, signal.unit, label, is_held=True)
+
+
+def state_variable(made: Exported, k: int, name: str, causality: Causality) -> Variable:
+    """Return a continuous state as a variable of a name."""
+    signal = list(signals_of(made.run.model.State).values())[k]
+    at = made.layout.start["x"] + k
+    start = made.vector[at] if causality == "input" else None
+    return Variable(name, causality, "state", at, signal.unit, signal.label, start)
+
+
+def memory_variable(made: Exported, k: int, causality: Causality) -> Variable:
+    """Return what the ECU holds as a variable."""
+    name, signal = list(signals_of(made.run.model.Memory).items())[k]
+    at = made.layout.start["m"] + k
+    start = made.vector[at] if causality == "input" else None
+    return Variable(name, causality, "state", at, signal.unit, signal.label, start, is_held=True)
+
+
+def parameter_variables(
+    made: Exported, read: frozenset[int], tunable: frozenset[int]
+) -> Iterator[Variable]:
+    """Yield the parameters that are read, of which some are tunable, by index."""
+    fields = leaf_fields(type(made.run.par))
+    notes = field_notes(type(made.run.par))
+    for k, (name, value) in enumerate(made.run.par.leaves().items()):
+        if k not in read:
+            continue
+        group, _, node = name.rpartition(".")
+        leaf = fields.get(name) or fields[group]
+        is_node = name not in fields
+        shown = f"{group}[{int(node) + 1}]" if is_node else name
+        label = notes[group if is_node else name]
+        yield Variable(
+            shown,
+            "parameter",
+            "parameter",
+            k,
+            leaf.unit.symbol,
+            label,
+            value,
+            leaf,
+            is_tunable=k in tunable,
+        )
+
+
+def finite_range(leaf: Leaf) -> tuple[float | None, float | None]:
+    """Return the admissible ends of a parameter's range; None where it has no end.
+
+    An end that does not belong to it becomes the next number within.
+    """
+    low = math.nextafter(leaf.low, math.inf) if leaf.low_open else leaf.low
+    high = math.nextafter(leaf.high, -math.inf) if leaf.high_open else leaf.high
+    return (None if math.isinf(leaf.low) else low, None if math.isinf(leaf.high) else high)
+
+
+# --- Inputs, outputs and parameters
+
+Part = Literal["brake", "plant", "ecu"]
+PARTS: tuple[Part, ...] = get_args(Part)
+Kind = Literal["co-simulation", "model-exchange"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+Numbered = tuple[int, Variable]
+
+
+@dataclass(frozen=True)
+class Interface:
+    """All variables of a part of an exported run.
+
+    Parameters
+    ----------
+    part
+        The whole brake, the plant (what the ECU holds are inputs), or the ECU (its readings of the
+        plant are inputs).
+    variables
+        In the order of their value references.
+    kind
+        Whether it steps by itself, or a client's solver integrates it.
+    """
+
+    part: Part
+    variables: tuple[Variable, ...]
+    kind: Kind = "co-simulation"
+
+    def of(self, causality: Causality) -> tuple[Variable, ...]:
+        """Return the variables of a causality."""
+        return tuple(each for each in self.variables if each.causality == causality)
+
+    def at(self, place: Place) -> dict[int, int]:
+        """Return the value references of what stands in a place, by index there."""
+        return {v.index: k for k, v in enumerate(self.variables) if v.place == place}
+
+
+def interface(made: Exported, part: Part, start_reads: frozenset[int] = frozenset()) -> Interface:
+    """Return the variables of a part.
+
+    Parameters
+    ----------
+    start_reads
+        Parameters that the initial values depend on, by index.
+    """
+    reads = _Reads.of(made.stages)
+    asked = readings(made)
+    signals: list[Variable] = []
+    if part != "plant":
+        signals += _stimuli(made, reads)
+    if part == "plant":
+        signals += (memory_variable(made, k, "input") for k in sorted(reads.plant["m"]))
+    if part == "ecu":
+        signals += (state_variable(made, k, name, "input") for k, name in asked.items())
+        signals += (memory_variable(made, k, "output") for k in range(made.program.sizes.memory))
+    taken = {each.name for each in signals}
+    rows = [row_variable(made, k, "row") for k in reads.shown(part)]
+    signals += (each for each in rows if each.name not in taken)
+    if part == "plant":
+        named = {each.name for each in rows}
+        signals += (
+            state_variable(made, k, name, "output")
+            for k, name in asked.items()
+            if name not in named
+        )
+    if part == "brake":
+        signals += (row_variable(made, k, "sampled") for k in reads.shown(part))
+    parameters = reads.parameters(part) | start_reads
+    return Interface(part, (*signals, *parameter_variables(made, parameters, reads.tunable)))
+
+
+@dataclass(frozen=True)
+class _Reads:
+    """Indices of the leaves, by kind, that the passes read, the ticks, and each recorded signal."""
+
+    plant: dict[str, frozenset[int]]
+    ecu: dict[str, frozenset[int]]
+    outputs: tuple[dict[str, frozenset[int]], ...]
+
+    @classmethod
+    def of(cls, stages: Stages) -> _Reads:
+        passes = [
+            node
+            for each in (stages.fast, stages.exact)
+            for nodes in each.values()
+            for node in nodes
+        ]
+        passes += stages.posed + stages.quadrature.products
+        passes += [c for pairs in stages.quadrature.combinations for c, _ in pairs]
+        ticks = [node for roots in stages.ticks for node in _changed(stages, roots)]
+        return cls(
+            leaves_read(stages.graph, passes),
+            leaves_read(stages.graph, ticks),
+            tuple(leaves_read(stages.graph, [node]) for node in stages.output),
+        )
+
+    def shown(self, part: Part) -> list[int]:
+        """Return the recorded signals of a part: a plant's depend on what it is given alone."""
+        held = self.plant["m"]
+        if part == "plant":
+            return [k for k, each in enumerate(self.outputs) if each["m"] <= held]
+        return list(range(len(self.outputs))) if part == "brake" else []
+
+    def parameters(self, part: Part) -> frozenset[int]:
+        """Return the parameters that a part depends on."""
+        shown = frozenset[int]().union(*(self.outputs[k]["p"] for k in self.shown(part)))
+        own = {
+            "brake": self.plant["p"] | self.ecu["p"],
+            "plant": self.plant["p"],
+            "ecu": self.ecu["p"],
+        }[part]
+        return own | shown
+
+    @property
+    def tunable(self) -> frozenset[int]:
+        """Parameters of the ECU alone."""
+        return self.ecu["p"] - self.plant["p"]
+
+
+def _changed(stages: Stages, roots: list[Node]) -> list[Node]:
+    """Return what a task computes: not what it leaves in the memory as it is."""
+    return [node for k, node in enumerate(roots) if node != stages.graph.leaf("m", k)]
+
+
+def leaves_read(graph: Graph, roots: Iterable[Node]) -> dict[str, frozenset[int]]:
+    """Return the indices of the leaves that values are computed from, by kind."""
+    read: defaultdict[str, set[int]] = defaultdict(set)
+    for node in graph.read_by(roots):
+        operation = graph.nodes[node]
+        if operation.op == "leaf":
+            read[operation.args[0]].add(operation.args[1])
+    return defaultdict(frozenset, {kind: frozenset(each) for kind, each in read.items()})
+
+
+def _stimuli(made: Exported, reads: _Reads) -> Iterator[Variable]:
+    known, starts = signals_of(made.run.model.Stimulus), made.demanded
+    ranges = ranges_of(made.run.model.Stimulus)
+    for k, (name, signal) in enumerate(known.items()):
+        if k in reads.ecu["u"]:
+            label = signal.label + ", a standard normal number" * name.startswith("noise_")
+            yield Variable(
+                name,
+                "input",
+                "stimulus",
+                k,
+                signal.unit,
+                label,
+                starts[k],
+                is_held=True,
+                ends=ranges.get(name, (-math.inf, math.inf)),
+            )
+
+
+def readings(made: Exported) -> dict[int, str]:
+    """Return the names of the states that ticks read; as recorded where that is the same."""
+    outputs = list(made.program.outputs)
+    memory = set(made.run.model.Memory._fields)
+    names = {}
+    for k in sorted(_Reads.of(made.stages).ecu["x"]):
+        name = made.run.model.State._fields[k]
+        leaf = made.stages.graph.leaf("x", k)
+        is_other = name in outputs and made.stages.output[outputs.index(name)] != leaf
+        names[k] = f"state.{name}" if is_other or name in memory else name
+    return names
+
+
+def tables(faces: Interface) -> Iterator[list[Numbered]]:
+    """Yield the variables, the nodes of a table together, each with its value reference."""
+
+    def owner(numbered: Numbered) -> tuple[str, int]:
+        group, bracket, _ = numbered[1].name.partition("[")
+        return (group, -1) if bracket else (group, numbered[0])
+
+    for _, nodes in groupby(enumerate(faces.variables), owner):
+        yield list(nodes)
+
+
+def identifier_of(name: str) -> str:
+    """Return a name of C for a bench.
+
+    Examples
+    --------
+    >>> identifier_of("2nd brake: 37 bar")
+    'b2nd_brake_37_bar'
+    """
+    plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_") or "bench"
+    return plain[:60] if plain[0].isalpha() else f"b{plain[:59]}"

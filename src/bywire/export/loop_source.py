@@ -14,9 +14,9 @@ from bywire.analysis.linear.smooth_functions import smooth_functions
 from bywire.analysis.loop import Loop, Point
 from bywire.core.errors import BywireError
 from bywire.core.parameters import ParameterSet
-from bywire.simulation.emission import indented, leaf_namer, statements
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph
+from bywire.simulation.stages import indented, leaf_namer, statements
 from bywire.simulation.symbols import SX, column, scalars
 
 _NOT_SYMBOLIC = (BywireError, TypeError, ValueError, ArithmeticError, RuntimeError)

@@ -7,10 +7,9 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
-from bywire.export.exported import HEADING, Exported
-from bywire.export.interface import Interface, Variable, finite_range, tables
+from bywire.export.exported import HEADING, Exported, Interface, Variable, finite_range, tables
 from bywire.simulation.c_runtime import SCALAR
-from bywire.simulation.layout import COUNTERS
+from bywire.simulation.schedule import COUNTERS
 
 _PLACES = {
     "parameter": "PARAMETER",

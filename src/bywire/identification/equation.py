@@ -26,7 +26,7 @@ from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.measured import require_signals
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
-from bywire.simulation.buffered_call import BufferedCall
+from bywire.simulation.native import BufferedCall
 from bywire.simulation.symbols import SX, column, scalars
 
 

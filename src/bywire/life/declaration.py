@@ -1,7 +1,7 @@
-"""What a brake declares of its life: slow states, what they change, what a stop does to them.
+"""Declaration of a brake's life: slow states, their effects, and their changes by a stop.
 
-A stop changes slow states by a ten-thousandth of themselves. So stops are simulated with these
-states held, and the states are stepped over many stops; see `bywire.life.projection`.
+A stop changes slow states by a ten-thousandth of themselves. So stops are simulated with constant
+slow states, and these are stepped over many stops; see `bywire.life.projection`.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from bywire.core.registry import Kind, instances
 from bywire.core.typing import Array
 
 Values = dict[str, float]
-"""slow states, or what is left of limits, by name [SI]"""
+"""slow states, or remaining margins to limits, by name [SI]"""
 
 
 class StopConditions(ParameterSet):
-    """What belongs to a stop beside the simulated bench."""
+    """Conditions of a stop other than the simulated bench."""
 
     pause: Annotated[float, Unit("s", 60.0), Field(gt=0, le=1e7, allow_inf_nan=False)]
     """time from this stop to the next"""
@@ -33,16 +33,16 @@ class StopConditions(ParameterSet):
 
 @dataclass(frozen=True)
 class Slow:
-    """A slow state, or a limit that it runs into.
+    """A slow state, or a limit on it.
 
     Parameters
     ----------
     unit
         SI unit; ``"1"`` for a count.
     label
-        What figures and tables say.
+        Label in figures and tables.
     is_drawn
-        Whether the figure has a panel of it.
+        Whether the figure has a panel for it.
     """
 
     unit: str
@@ -52,14 +52,15 @@ class Slow:
 
 @dataclass(frozen=True)
 class Effects:
-    """What each of some stops does.
+    """Effects of several stops.
 
     Parameters
     ----------
     changes
-        Slow state -> its change by each stop [SI], shape (stops,). What is not named stays.
+        Slow state -> its change by each stop [SI], shape (stops,). States without an entry are
+        constant.
     readings
-        What is measured of these stops and read between stops, as means [SI].
+        Measurements of these stops that are read between stops, as means [SI].
     """
 
     changes: Mapping[str, Array]
@@ -67,18 +68,18 @@ class Effects:
 
 
 def as_it_is(z: Values, readings: Mapping[str, float], par: Any, wear: Any) -> Values:
-    """Return the slow states of a brake to which nothing happens between stops."""
+    """Return unchanged slow states: nothing happens between stops."""
     return z
 
 
 @dataclass(frozen=True)
 class Life:
-    """What wears in a brake.
+    """Wear of a brake.
 
     Parameters
     ----------
     name
-        What files and the command line call it.
+        Name in files and on the command line.
     summary
         One line for listings.
     experiment
@@ -86,24 +87,24 @@ class Life:
     wear, values
         Class of the parameters of wear, and each value with its provenance.
     states, limits
-        Slow states, and what is left until the end of life, by name.
+        Slow states, and margins until the end of life, by name.
     begin
         ``begin(par, wear)``: slow states of the new brake; ``par`` are the bench's parameters.
     follows
         ``follows(z, par, wear)``: parameters of the bench that slow states change, by dotted name.
     effects
-        ``effects(figures, stops, z, par, wear)``: what each stop does, by its key figures and
-        conditions (arrays of shape (stops,) by name); ``z`` are the slow states it was made with.
+        ``effects(figures, stops, z, par, wear)``: effects of each stop, by its key figures and
+        conditions (arrays of shape (stops,) by name); ``z`` are the slow states of the stop.
     left
-        ``left(z, par, wear)``: what is left of each limit; life ends where the first is zero.
+        ``left(z, par, wear)``: margin to each limit; life ends where the first is zero.
     figures
         Key figures of the stop that ``effects`` reads.
     between
-        ``between(z, readings, par, wear)``: slow states after what happens between two stops.
+        ``between(z, readings, par, wear)``: slow states after the events between two stops.
     settings
-        Changes of the bench, as ``--set`` takes them, for its stops.
+        Changes of the bench for its stops, in the form of ``--set``.
     population
-        How stops vary unless a file says otherwise: entries of ``[vary]`` by name.
+        Variation of the stops unless a file overrides it: entries of ``[vary]`` by name.
     """
 
     name: str

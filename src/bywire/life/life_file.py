@@ -1,4 +1,4 @@
-"""Life files, and the plan that they hold: which brake wears how, and how it is stepped."""
+"""Life files, and their plan: wear of a brake, its stops, and the steps of the projection."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pydantic import Field
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
 from bywire.core.callers import option
-from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
+from bywire.core.errors import InputError, ParameterError, not_valid, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.quantities import Unit
 from bywire.core.section import Hint, Section, Table
@@ -25,24 +25,24 @@ from bywire.data.file_kinds import LIFE, require_kind
 from bywire.data.toml_file import read_toml
 from bywire.life.declaration import LIVES, Life, StopConditions
 from bywire.studies.designs import Sampled
-from bywire.studies.distribution_section import read_distribution
+from bywire.studies.distribution import read_distribution
 from bywire.studies.plan import Varied
 from bywire.studies.vary_section import entries_of, quantities_of, read_varied
 
 CONDITION = "stop."
-"""what the names of a stop's conditions begin with"""
+"""prefix of the names of a stop's conditions"""
 
 
 @dataclass(frozen=True)
 class LifePlan:
-    """What a life file says.
+    """Content of a life file.
 
     Parameters
     ----------
     name
-        What reports call it.
+        Name in reports.
     life
-        What wears.
+        Wear of the brake.
     bench
         A stop of the new brake.
     wear
@@ -50,19 +50,19 @@ class LifePlan:
     conditions
         Conditions of a stop that does not vary.
     varied
-        How stops differ: numbers of the bench, options, and conditions named ``stop.NAME``.
+        Differences of stops: numbers of the bench, options, and conditions named ``stop.NAME``.
     stops
-        Stops that stand for the population, simulated each time that slow states are held.
+        Stops that represent the population, simulated for each set of slow states.
     seed
-        Of their sample.
+        Seed of their sample.
     share
         A step covers at most this share of the stops that remain, 0 to 1.
     tolerance
-        Largest share of itself by which a rate may be wrong within a step.
+        Largest relative error of a rate within a step.
     longest
-        Stops after which a life is not followed any more.
+        Number of stops after which the projection ends.
     known
-        What was simulated already, by what of the bench follows from slow states.
+        Results so far, by the bench's parameters that follow from slow states.
     """
 
     name: str
@@ -80,7 +80,7 @@ class LifePlan:
 
     @cached_property
     def population(self) -> Mapping[str, NDArray[Any]]:
-        """The stops: what varies by name [SI], shape (stops,); empty where all are alike."""
+        """The stops: varied values by name [SI], shape (stops,); empty if all stops are equal."""
         if not self.varied:
             return {}
         laws = [each.distribution for each in self.varied]
@@ -89,12 +89,12 @@ class LifePlan:
 
     @property
     def count(self) -> int:
-        """How many stops stand for the population."""
+        """Number of stops that represent the population."""
         return self.stops if self.varied else 1
 
     @cached_property
     def different(self) -> tuple[list[int], NDArray[np.intp]]:
-        """The stops whose benches differ, and which of these each of the population is.
+        """The stops with different benches, and the index of each stop of the population in them.
 
         Stops that differ in their conditions alone are simulated once.
         """
@@ -116,14 +116,14 @@ class LifePlan:
 # --- Life files: TOML in, a plan out; nothing in them is executed
 
 WEAR = "wear."
-"""what the names of parameters of wear begin with"""
-_MOST = 4096  # stops that stand for a population
+"""prefix of the names of parameters of wear"""
+_MOST = 4096  # stops that represent a population
 CONDITIONS = StopConditions(pause=600.0, T_air=293.15)
 """a stop every ten minutes at 20 degC"""
 
 
 class ProjectionSection(Section):
-    """The section ``[projection]``; what it leaves out is as of a `LifePlan`."""
+    """The section ``[projection]``; omitted keys have the defaults of `LifePlan`."""
 
     stops: Annotated[int | None, Field(ge=2, le=_MOST)] = None
     seed: Annotated[int | None, Field(ge=0, le=2**63 - 1)] = None
@@ -148,17 +148,17 @@ def read_life(source: str | Path, overrides: Mapping[str, str] = MappingProxyTyp
     Parameters
     ----------
     source
-        TOML file with ``life`` and the sections ``[set]``, ``[vary]`` and ``[projection]`` as
-        wanted, see ``docs/life.md``; or the bare name of a life, with its own population of stops.
+        TOML file with ``life`` and optional sections ``[set]``, ``[vary]`` and ``[projection]``,
+        see ``docs/life.md``; or the bare name of a life, with its declared population of stops.
     overrides
-        Further changes, which count more than those of ``[set]``.
+        Further changes, which override those of ``[set]``.
 
     Raises
     ------
     FileError
-        When the file cannot be read or is no TOML.
+        When the file cannot be read or is not valid TOML.
     InputError
-        For anything in it that does not fit, with the file's name in front.
+        For any invalid entry, with the file's name in front.
     """
     file = Path(source)
     is_name = file.suffix != ".toml" and not file.is_file()
@@ -203,10 +203,8 @@ def _is_of_life(name: str) -> bool:
 def _texts(changes: Mapping[str, Any]) -> dict[str, str]:
     for key, value in changes.items():
         if not isinstance(value, str):
-            raise ParameterError(
-                f"[set] {key} = {quoted(value)}: write the value as a text, with its unit, as "
-                f"{option('overrides')} takes it"
-            )
+            valid = f"a text with its unit, in the form of {option('overrides')}"
+            raise not_valid(f"[set] {key}", quoted(value), valid)
     return dict(changes)
 
 
@@ -218,7 +216,7 @@ def _given(kind: type[ParameterSet], changes: Mapping[str, str], prefix: str) ->
 
 
 def _varied(bench: Bench, conditions: StopConditions, section: Mapping[str, Any]) -> list[Varied]:
-    """Return what varies of the bench, and of the conditions of its stops."""
+    """Return the variations of the bench, and of the conditions of its stops."""
     leaves = {f"{CONDITION}{k}": leaf for k, leaf in leaf_fields(StopConditions).items()}
     each = entries_of(section, {*quantities_of(bench), *leaves})
     of_bench = {name: entry for name, entry in each.items() if not name.startswith(CONDITION)}
@@ -235,14 +233,16 @@ def _varied(bench: Bench, conditions: StopConditions, section: Mapping[str, Any]
 
 
 def _require_free(life: Life, bench: Bench, wear: ParameterSet, varied: tuple[Varied, ...]) -> None:
-    """Refuse what varies from stop to stop although it follows from slow states."""
+    """Require variations of numbers that do not follow from slow states."""
     slow = life.follows(life.begin(bench.par, wear), bench.par, wear)
     for each in varied:
         if not each.unit:
-            raise ParameterError(f"[vary] {each.name} is a choice: numbers vary from stop to stop")
+            name = f"[vary] {each.name}"
+            raise ParameterError(f"{name} is a choice: only numbers can vary", name=name)
         for name in (each.name, *each.together):
             if name in slow:
                 raise ParameterError(
-                    f"[vary] {name} follows from what wears: its first value is the bench's, "
-                    "change it by [set]"
+                    f"[vary] {name} follows from the wear: its first value is the bench's, "
+                    "change it by [set]",
+                    name=f"[vary] {name}",
                 )

@@ -1,7 +1,7 @@
 """Life projected: rates of slow states, and Heun's steps over many stops.
 
-Within a step the states go on stop by stop with rates that are held, so that an adjuster acts
-exactly where it does; the runs are made at the ends of steps alone.
+Within a step the states advance stop by stop with constant rates, so that an adjuster acts at the
+right stop. Only the ends of steps are simulated.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bywire.bench.bench import Bench
-from bywire.bench.ensemble import changed
-from bywire.bench.side_by_side import key_figures_of
+from bywire.bench.ensemble import changed, key_figures_of
 from bywire.core.errors import ParameterError, RunError
 from bywire.core.typing import Array, Progress, silent
 from bywire.core.units import shown
@@ -28,16 +27,16 @@ from bywire.studies.distribution import Distribution
 
 @dataclass(frozen=True)
 class Rates:
-    """How slow states change per stop.
+    """Changes of slow states per stop.
 
     Parameters
     ----------
     z
-        Slow states that were held [SI].
+        Slow states of the simulated stops [SI].
     effects
-        What each stop of the population does.
+        Effects of each stop of the population.
     warnings
-        What the runs warned of.
+        Warnings of the runs.
     """
 
     z: Values
@@ -51,14 +50,14 @@ class Rates:
 
 
 def rates(plan: LifePlan, z: Values) -> Rates:
-    """Return what the plan's population of stops does to slow states that are held meanwhile.
+    """Return the changes per stop at given slow states, by the plan's population of stops.
 
     Raises
     ------
     InputError
         When the brake cannot be set up with these states.
     RunError
-        When a run fails, or a stop lacks a key figure that wear is computed from.
+        When a run fails, or a stop lacks a key figure from which wear is computed.
     KeyboardInterrupt
         When interrupted.
     """
@@ -77,9 +76,9 @@ def stop_figures(plan: LifePlan, z: Values) -> tuple[dict[str, Array], tuple[str
 def simulated(
     plan: LifePlan, z: Values, which: Sequence[int]
 ) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """Return key figures of some stops of the population, and what their runs warned of.
+    """Return key figures of some stops of the population, and warnings of their runs.
 
-    What slow states change nothing of is simulated once.
+    Stops that do not depend on slow states are simulated once.
     """
     follows = plan.life.follows(z, plan.bench.par, plan.wear)
     key = (tuple(follows.items()), tuple(which))
@@ -92,18 +91,19 @@ def simulated(
 def _simulated(
     plan: LifePlan, follows: Mapping[str, float], which: Sequence[int]
 ) -> tuple[dict[str, Array], tuple[str, ...]]:
-    made = key_figures_of([_stop_bench(plan, follows, k) for k in which])
-    known = {figure.name: figure for figure in made.figures}
+    results = key_figures_of([_stop_bench(plan, follows, k) for k in which])
+    figures = {figure.name: figure for figure in results.figures}
     for name in plan.life.figures:
-        lacking = np.flatnonzero(~np.isfinite(known[name].values))
+        lacking = np.flatnonzero(~np.isfinite(figures[name].values))
         if lacking.size:
             stop = ", ".join(f"{n} = {v[which[lacking[0]]]:g}" for n, v in plan.population.items())
             raise RunError(
                 f"a stop{stop and f' with {stop} (in SI)'} has no {name}: "
-                + known[name].told(lacking[0])
+                + figures[name].note_of(lacking[0]),
+                name=name,
             )
-    warnings = dict.fromkeys(text for texts in made.warnings for text in texts)
-    return {name: np.asarray(known[name].values) for name in plan.life.figures}, tuple(warnings)
+    warnings = dict.fromkeys(text for texts in results.warnings for text in texts)
+    return {name: np.asarray(figures[name].values) for name in plan.life.figures}, tuple(warnings)
 
 
 def conditions(plan: LifePlan) -> Mapping[str, Array]:
@@ -119,7 +119,7 @@ def conditions(plan: LifePlan) -> Mapping[str, Array]:
 
 
 def _stop_bench(plan: LifePlan, follows: Mapping[str, float], k: int) -> Bench:
-    """Return a stop of the population with what follows from slow states that are held."""
+    """Return a stop of the population with the parameters that follow from slow states."""
     drawn = {
         name: values[k].item()
         for name, values in plan.population.items()
@@ -128,21 +128,21 @@ def _stop_bench(plan: LifePlan, follows: Mapping[str, float], k: int) -> Bench:
     return changed(plan.bench, {**drawn, **follows})
 
 
-# --- The projection: what happens between stops is never skipped
+# --- The projection: every event between stops counts
 
 CONFIDENCE = 0.95
-"""of the interval of a life"""
-_LEAST = 0.02  # of the whole life, a step is never shorter for the sake of what remains
+"""confidence of the interval of a life"""
+_LEAST = 0.02  # shortest step by the remaining life, as a share of the whole life
 
 
 @dataclass(frozen=True)
 class Step:
-    """Stops that were stepped over at once.
+    """A step over several stops.
 
     Parameters
     ----------
     first, count
-        Number of the stop before the first, and how many there are.
+        Number of the stop before the first, and number of stops.
     rates
         Rates at its begin and at its end.
     """
@@ -159,17 +159,17 @@ class Projection:
     Parameters
     ----------
     plan
-        What was projected.
+        Plan of the projection.
     states, left
-        Slow states, and what is left of the limits, after each stop [SI]: shape (stops + 1,), the
-        new brake first.
+        Slow states, and margins to the limits, after each stop [SI]: shape (stops + 1,), the new
+        brake first.
     ended_by
-        Limit that ended it; empty where it was followed as long as asked for.
+        Limit that ended the life; empty where the projection reached its longest life.
     steps
-        How it was stepped.
+        Steps of the projection.
     error
-        Half the width of the interval of the number of stops, by the sample of the population;
-        NaN where no limit was reached.
+        Half the width of the confidence interval of the number of stops, by the sample of the
+        population; NaN where the life reached no limit.
     """
 
     plan: LifePlan
@@ -181,30 +181,30 @@ class Projection:
 
     @property
     def stops(self) -> int:
-        """Stops until the end of life, or as far as it was followed."""
+        """Stops until the end of life, or until the end of the projection."""
         return len(next(iter(self.states.values()))) - 1
 
     @property
     def warnings(self) -> list[str]:
-        """What the runs warned of."""
+        """Warnings of the runs."""
         each = (text for step in self.steps for r in step.rates for text in r.warnings)
         return [*dict.fromkeys(each)]
 
 
 def projected(plan: LifePlan, progress: Progress = silent) -> Projection:
-    """Return the life of a brake.
+    """Return the projected life of a brake.
 
     Parameters
     ----------
     plan
-        What wears, and by which stops.
+        Wear, and its stops.
     progress
         Called with a label and the finished share, 0 to 1.
 
     Raises
     ------
     InputError
-        When the brake is at its end from the start, or cannot be set up.
+        When the brake has no life at the start, or cannot be set up.
     RunError
         When a run fails.
     KeyboardInterrupt
@@ -243,18 +243,21 @@ def _require_alive(plan: LifePlan, z: Values) -> None:
         if not value > 0.0:
             limit = plan.life.limits[name]
             raise ParameterError(
-                f"life {plan.life.name!r} is over before its first stop: {limit.label} is "
-                f"{shown(value, limit.unit)} where it begins, and must be above zero"
+                f"life {plan.life.name!r} ends before its first stop: {limit.label} is "
+                f"{shown(value, limit.unit)} at the start, and must be above zero",
+                name=limit.label,
+                value=shown(value, limit.unit),
+                valid="above zero",
             )
 
 
 def _walked(
     plan: LifePlan, z: Values, ends: tuple[Rates, Rates], count: int, most: int
 ) -> tuple[list[Values], str]:
-    """Return the slow states after each of at most some stops, and what ended them.
+    """Return the slow states after each of at most ``most`` stops, and the limit that ended them.
 
-    Rates are the mean of those at both ends of the step (Heun's corrector); readings go from the
-    one to the other over its ``count`` stops.
+    Rates are the mean of those at both ends of the step (Heun's corrector); readings change
+    linearly from one end to the other over its ``count`` stops.
     """
     life, par, wear = plan.life, plan.bench.par, plan.wear
     first, last = ends
@@ -274,7 +277,7 @@ def _walked(
 
 
 def _step(plan: LifePlan, before: Rates, held: Sequence[Values], whole: int) -> tuple[int, Rates]:
-    """Return how many stops to step over, and the rates behind them."""
+    """Return the number of stops of a step, and the rates at its end."""
     count = min(math.ceil(max(plan.share * len(held), _LEAST * whole)), len(held))
     while True:
         after = rates(plan, held[count - 1])
@@ -285,7 +288,7 @@ def _step(plan: LifePlan, before: Rates, held: Sequence[Values], whole: int) -> 
 
 
 def _distance(first: Values, second: Values) -> float:
-    """Return the largest change of a rate as a share of itself."""
+    """Return the largest relative change of a rate."""
     largest = {name: max(abs(first[name]), abs(second[name])) for name in first}
     return max(
         (abs(second[name] - first[name]) / size for name, size in largest.items() if size > 0.0),
@@ -296,7 +299,7 @@ def _distance(first: Values, second: Values) -> float:
 def _interval(plan: LifePlan, steps: Sequence[Step], limit: str) -> float:
     """Return half the width of the interval of a life [stops].
 
-    The same stops stand for the population at every step, so that their errors add up.
+    The same stops represent the population at every step, so that their errors add up.
     """
     if not limit:
         return math.nan
@@ -314,11 +317,11 @@ def standard_error(plan: LifePlan, values: Array) -> float:
 
     Notes
     -----
-    The population is a Latin hypercube: along every quantity it is as even as can be, and the
-    spread that a quantity explains is no error of the mean. By successive differences along the
-    quantity that explains most (K. M. Wolter, Introduction to Variance Estimation, section 8.2),
-    which counts the spread by all others in full. Where a quantity of single values goes from one
-    to the next exactly between two stops, as their weights want it, the difference is no error.
+    The population is a Latin hypercube: it is as even as possible along every quantity, so that the
+    spread that a quantity explains is not an error of the mean. The estimate uses successive
+    differences along the quantity that explains most (K. M. Wolter, Introduction to Variance
+    Estimation, section 8.2), which counts the spread by all others in full. A discrete quantity
+    may change its value exactly between two stops, by its weights: that difference is not an error.
     """
     squares = [
         np.diff(values[np.argsort(plan.population[each.name], kind="stable")]) ** 2
@@ -330,7 +333,7 @@ def standard_error(plan: LifePlan, values: Array) -> float:
 
 
 def _counts(law: Distribution, stops: int) -> NDArray[np.bool_]:
-    """Return which differences between neighbors are of chance, shape (stops - 1,)."""
+    """Return the differences between neighbors that are random, shape (stops - 1,)."""
     edges = np.arange(1, stops) / stops
     if not law.is_discrete:
         return np.ones(stops - 1, dtype=bool)
@@ -338,7 +341,7 @@ def _counts(law: Distribution, stops: int) -> NDArray[np.bool_]:
 
 
 def _falls(plan: LifePlan, held: Rates, limit: str) -> Array:
-    """Return by how much each stop lowers what is left of a limit, shape (stops,)."""
+    """Return the loss of margin to a limit by each stop, shape (stops,)."""
     life, par, wear = plan.life, plan.bench.par, plan.wear
     changes, now = held.effects.changes, life.left(held.z, par, wear)[limit]
     each = [
@@ -348,28 +351,28 @@ def _falls(plan: LifePlan, held: Rates, limit: str) -> Array:
     return now - np.array([life.left(z, par, wear)[limit] for z in each])
 
 
-# --- Stops run one by one, each with the slow states that the one before left: brute force
+# --- Brute force: stops run one by one, each with the slow states after the one before
 
 
 def one_by_one(plan: LifePlan, stops: int, progress: Progress = silent) -> dict[str, Array]:
     """Return the slow states after each of some stops [SI], shape (stops + 1,) each.
 
-    The population's stops follow one another, again and again. A projection steps over them: this
-    says how far it is to be trusted.
+    The population's stops repeat in order. The result checks the error of a projection, which steps
+    over them.
 
     Parameters
     ----------
     plan
-        What wears, and by which stops.
+        Wear, and its stops.
     stops
-        How many to run, >= 1.
+        Number of stops, >= 1.
     progress
         Called with a label and the finished share, 0 to 1.
 
     Raises
     ------
     RunError
-        When a run fails, or a stop lacks a key figure that wear is computed from.
+        When a run fails, or a stop lacks a key figure from which wear is computed.
     KeyboardInterrupt
         When interrupted.
     """
@@ -379,8 +382,8 @@ def one_by_one(plan: LifePlan, stops: int, progress: Progress = silent) -> dict[
     path: list[Values] = [z]
     for n in range(stops):
         k = n % count
-        made, _ = simulated(plan, z, [k])
-        for name, value in made.items():
+        stop, _ = simulated(plan, z, [k])
+        for name, value in stop.items():
             figures[name][k] = value[0]
         each = life.effects(figures, conditions(plan), z, par, wear)
         changed = {name: z[name] + float(change[k]) for name, change in each.changes.items()}

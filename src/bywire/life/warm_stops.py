@@ -1,7 +1,7 @@
-"""Stop after stop: how hot the friction surface gets, and what that costs of the pads.
+"""Heat of repeated stops: temperature of the friction surface, and wear of the pads.
 
-One body takes the friction work of every stop and cools between stops. It is what life needs of
-heat: how hot a disc is depends on the pauses more than on the speeds.
+One body takes the friction work of every stop and cools between stops. That is enough for a life:
+the temperature of a disc depends on the pauses more than on the speeds.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ ORGANIC_LINING: Mapping[str, Cited] = MappingProxyType(
         "E_pad": chosen(5e8, "the order of organic linings under load"),
     }
 )
-"""what pads of a road vehicle have in common, whatever their size"""
+"""properties of a road vehicle's pads, whatever their size"""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _HOTTEST = 1500.0  # K: cast iron melts
 
@@ -37,13 +37,13 @@ class Parameters(ParameterSet):
     """The disc as a body of one temperature."""
 
     C_d: Annotated[float, Unit("J/K", 1e3), Field(gt=0, allow_inf_nan=False)]
-    """heat capacity of what takes the friction work"""
+    """heat capacity of the body that takes the friction work"""
     tau_d: Annotated[float, Unit("s", 300.0), Field(gt=0, allow_inf_nan=False)]
     """time constant of its cooling"""
 
 
 def temperatures(work: Array, pause: Array, T_air: Array, par: Parameters) -> tuple[Array, Array]:
-    """Return the temperature of the disc before and after each of stops that repeat for ever.
+    """Return the temperature of the disc before and after each of periodically repeated stops.
 
     Parameters
     ----------
@@ -73,14 +73,15 @@ def temperatures(work: Array, pause: Array, T_air: Array, par: Parameters) -> tu
     after = before + rise
     if not (hottest := float(np.max(after))) < _HOTTEST:
         raise ParameterError(
-            f"the disc would reach {hottest - 273.15:.0f} degC: longer pauses (stop.pause), a "
-            "larger disc, or quicker cooling are wanted"
+            f"the disc would reach {hottest - 273.15:.0f} degC: give longer pauses (stop.pause), "
+            "a larger disc, or faster cooling",
+            name="stop.pause",
         )
     return before, after
 
 
 def thinned(work: Array, before: Array, after: Array, par: pad_wear.Parameters) -> Array:
-    """Return by how much each stop thins a pad [m], shape (stops,).
+    """Return the wear of a pad by each stop [m], shape (stops,).
 
     The surface warms in proportion to the work done, from one temperature [K] to the other.
 

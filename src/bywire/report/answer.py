@@ -89,9 +89,10 @@ class Answer(ABC):
         return write_document(self.document(), Path(folder))
 
     def __str__(self) -> str:
-        from bywire.report.terminal import terminal_text
+        from bywire.report.terminal import terminal_text, verdict_line
 
-        return terminal_text(self.document())
+        document = self.document()
+        return "\n".join(filter(None, [terminal_text(document), verdict_line(document)]))
 
     def _repr_html_(self) -> str:
         from bywire.report.page import fragment_html
@@ -151,7 +152,7 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
         *([document.page_name] if document.is_paged else []),
         *([document.record] if document.record else []),
     ]
-    from bywire.report.side_by_side import drawn_side_by_side  # loads what starts processes
+    from bywire.report.drawing import drawn_side_by_side  # loads what starts processes
 
     with drawn_side_by_side(shown):
         for each in document.attachments:
@@ -162,6 +163,7 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
             document.facts  # noqa: B018 - made while copies draw
     if document.is_paged:
         from bywire.report.drawing import save_figure
+        from bywire.report.identity import identity
         from bywire.report.page import write_page
 
         for block in figures:
@@ -173,6 +175,7 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
             document.page,
             banner=document.banner,
             files=names,
+            made=identity(),
         )
     if document.record:
         _record(document, place, names)

@@ -11,16 +11,15 @@ import xarray as xr
 
 from bywire.bench.energy_ledger import actuator_ledger, further_ledgers
 from bywire.bench.kpis import sine_sweep
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.bench.stated import stated_for
 from bywire.core.errors import ParameterError
 from bywire.core.registry import Kind, instances
-from bywire.report.bode import Response, bode
 from bywire.report.energy_balance import ledger_bars
 from bywire.report.friction_figures import hysteresis_loop, stribeck_curve
-from bywire.report.overlaid import overlaid_traces
+from bywire.report.response_figures import Response, bode
 from bywire.report.step_response import StepFacts, step_limits, step_response, tracking
-from bywire.report.time_traces import time_traces
+from bywire.report.time_traces import overlaid_traces, time_traces
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

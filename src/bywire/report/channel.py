@@ -1,4 +1,4 @@
-"""One variable of a recording, ready to draw: label, display unit, values."""
+"""Variables of a recording, ready to draw: label, display unit, values, fewer points."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.quantities import display_unit
@@ -75,3 +76,143 @@ def channel(recording: xr.Dataset, name: str) -> Channel:
         time=np.asarray(recording["time"].values, dtype=np.float64),
         values=convert(np.asarray(array.values, dtype=np.float64), symbol, unit),
     )
+
+
+# --- Fewer points for long lines, with every peak kept
+
+IntArray = NDArray[np.intp]
+
+COLUMNS = 700
+"""pixel columns of a figure on a screen: finer detail than this is not visible"""
+
+
+def kept_samples(x: Array, y: Array, columns: int = COLUMNS) -> IntArray:
+    """Return the positions of at most five samples per pixel column that draw the same line.
+
+    Of every column the first, the lowest, the highest and the last sample stay, so that a line
+    drawn through them covers the same pixels; a gap (NaN) stays a gap.
+
+    ``x``: abscissa, not decreasing, shape ``(n,)``; ``y``: ordinate, shape ``(n,)``; ``columns``:
+    pixel columns.
+
+    Returns
+    -------
+    ndarray
+        Positions of the samples that stay, ascending. Short lines stay whole.
+
+    References
+    ----------
+    U. Jugel et al., "M4: a visualization-oriented time series data aggregation", Proc. VLDB
+    Endowment 7 (10), 2014.
+    """
+    if len(x) <= 4 * columns:
+        return np.arange(len(x), dtype=np.intp)
+    column = _columns(x, columns)
+    starts = np.flatnonzero(np.diff(column, prepend=-1))
+    ends = np.append(starts[1:], len(x)) - 1
+    gaps = np.isnan(y)
+    lowest = _first_of_each(column, np.where(gaps, np.inf, y))
+    highest = _first_of_each(column, np.where(gaps, np.inf, -y))
+    gap = np.flatnonzero(gaps)
+    gap = gap[np.diff(column[gap], prepend=-1) > 0]
+    return np.unique(np.concatenate([starts, lowest, highest, ends, gap]))
+
+
+def decimate(x: Array, y: Array, columns: int = COLUMNS) -> tuple[Array, Array]:
+    """Return the points of :func:`kept_samples`."""
+    kept = kept_samples(x, y, columns)
+    return x[kept], y[kept]
+
+
+def phases(
+    time: Array, active: NDArray[np.bool_], columns: int = COLUMNS
+) -> list[tuple[float, float]]:
+    """Return the time spans in which a mode is active, no finer than the eye can tell.
+
+    Parameters
+    ----------
+    time
+        Time axis [s], shape ``(n,)``.
+    active
+        Whether the mode is active from this sample to the next, shape ``(n,)``.
+    columns
+        Pixel columns. Where there are more spans than half of them, a column counts as active
+        when the mode is active for at least half of it.
+
+    Returns
+    -------
+    list
+        Start and end of every span [s], ascending, without overlap.
+    """
+    spans = _spans(time, active)
+    if len(spans) <= columns // 2:
+        return spans
+    column = _columns(time, columns)
+    lasting = np.diff(time, append=time[-1])
+    share = np.bincount(column, lasting * active, columns) / np.maximum(
+        np.bincount(column, lasting, columns), np.finfo(float).tiny
+    )
+    edges = np.linspace(time[0], time[-1], columns + 1)
+    return _spans(edges, np.append(share >= 0.5, False))
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A time over which a mode is active, or active now and again.
+
+    ``start``, ``end``: times [s]; ``share``: of that time in which it is active, 1 where it lasts.
+    """
+
+    start: float
+    end: float
+    share: float
+
+
+def lasting_phases(
+    time: Array, active: NDArray[np.bool_], columns: int = COLUMNS, near: int = 16
+) -> list[Phase]:
+    """Return the time spans in which a mode is active, those that follow closely as one.
+
+    Parameters
+    ----------
+    time, active, columns
+        As in `phases`.
+    near
+        Pixel columns between two spans that are too few to see them apart.
+    """
+    spans = _spans(time, active)
+    if not spans:
+        return []
+    starts, ends = np.array(spans).T
+    gap = near * float(time[-1] - time[0]) / columns
+    first = np.concatenate(([0], 1 + np.flatnonzero(starts[1:] - ends[:-1] >= gap)))
+    last = np.concatenate((first[1:] - 1, [len(spans) - 1]))
+    lasting = np.add.reduceat(ends - starts, first)
+    return [
+        Phase(float(starts[a]), float(ends[b]), float(sum_ / (ends[b] - starts[a])))
+        for a, b, sum_ in zip(first, last, lasting, strict=True)
+    ]
+
+
+def _columns(x: Array, columns: int) -> IntArray:
+    span = x[-1] - x[0]
+    if not span > 0:
+        return np.zeros(len(x), dtype=np.intp)
+    column: IntArray = ((x - x[0]) / span * columns).astype(np.intp)
+    return np.minimum(column, columns - 1)
+
+
+def _first_of_each(column: IntArray, key: Array) -> IntArray:
+    """Return the position of the smallest key in every column."""
+    order: IntArray = np.lexsort((key, column)).astype(np.intp)
+    return order[np.flatnonzero(np.diff(column[order], prepend=-1))]
+
+
+def _spans(time: Array, active: NDArray[np.bool_]) -> list[tuple[float, float]]:
+    if len(time) < 2:
+        return []
+    padded = np.concatenate([[False], active, [False]]).astype(np.int8)
+    change = np.diff(padded)
+    starts = np.flatnonzero(change == 1)
+    ends = np.minimum(np.flatnonzero(change == -1), len(time) - 1)
+    return [(float(time[a]), float(time[b])) for a, b in zip(starts, ends, strict=True) if b > a]

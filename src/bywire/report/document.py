@@ -103,21 +103,24 @@ class TableBlock:
 
     Parameters
     ----------
-    width
-        Characters per line that a terminal may give it; 0 for the terminal's own width.
     title
         Line above it on a terminal, which shows no captions; none where it is empty.
+    most
+        Rows that a terminal shows without ``--verbose``; 0 for all.
     """
 
     table: Table
     caption: str = ""
-    width: int = 100
     title: str = ""
+    most: int = 0
 
 
 @dataclass(frozen=True)
 class Details:
-    """Blocks that stay folded until the reader opens them."""
+    """Blocks that a page folds until the reader opens them; a terminal shows them on request.
+
+    On a terminal that is ``--verbose``.
+    """
 
     title: str
     blocks: Sequence[Flat]
@@ -208,7 +211,8 @@ class Document:
     sections
         The page; or what makes it, where that costs drawing.
     brief
-        What a terminal shows, a text or block each: mostly blocks that the page has as well.
+        What a terminal shows, a text or block each: mostly blocks that the page has as well. The
+        banner's text is its last line.
     data
         The JSON object, but for the files, or what makes it, where that costs statistics; NaN and
         infinite numbers become null.
@@ -243,7 +247,7 @@ class Document:
     title: str
     summary: str
     sections: Sequence[Section] | Callable[[], Sequence[Section]]
-    brief: Sequence[str | Flat]
+    brief: Sequence[str | Block]
     data: Mapping[str, Any] | Callable[[], Mapping[str, Any]]
     banner: Banner | None = None
     attachments: Sequence[Attachment] = ()
@@ -283,9 +287,9 @@ class Document:
         return flat_blocks(block for section in self.page for block in section.blocks)
 
 
-def spaced(blocks: Iterable[str | Flat]) -> list[str | Flat]:
+def spaced(blocks: Iterable[str | Block]) -> list[str | Block]:
     """Return blocks of a brief with an empty line between them."""
-    apart: list[str | Flat] = []
+    apart: list[str | Block] = []
     for block in blocks:
         apart += ["", block] if apart else [block]
     return apart

@@ -1,4 +1,4 @@
-"""A figure drawn once, as pixels and as vector graphics: for files, and for one HTML file.
+"""Figures drawn as pixels and vector graphics: for files, for one HTML file, side by side.
 
 To go through a figure's artists takes longer than either format, and to lay it out as long again:
 both formats share one layout, one pass, and what texts measure.
@@ -14,10 +14,12 @@ import re
 import struct
 import warnings
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 import matplotlib as mpl
@@ -30,10 +32,15 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.text import Text
 
+from bywire.core.copies import may_copy, processes
 from bywire.core.errors import FileError
 from bywire.core.scratch import replacing
+from bywire.core.workers import worker_count
 from bywire.report.document import Picture
 from bywire.report.wording import clean
+
+if TYPE_CHECKING:
+    from bywire.report.document import FigureBlock
 
 _COMPRESSION = 3
 """zlib's next takes twice as long for a figure, to save 1 % of many points, 15 % of few lines"""
@@ -442,3 +449,42 @@ def _as_pixels(figure: Figure | Picture, text: str) -> str:
 
 def _attribute(text: str) -> str:
     return escape(clean(text).replace("\n", " "), quote=True)
+
+
+# --- Figures drawn side by side, in copies of this process
+
+FEW = 4
+"""figures up to which copies are not worth their start"""
+
+# What a copy draws: it has them from the process that it was copied from.
+_blocks: list[FigureBlock] = []
+
+
+@contextmanager
+def drawn_side_by_side(blocks: Sequence[FigureBlock]) -> Iterator[None]:
+    """Draw figures while the block runs, where they are many and this process may be copied.
+
+    When it ends their place is taken by what was drawn. Others are drawn when they are asked for.
+    """
+    count = worker_count(most=len(blocks))
+    if len(blocks) <= FEW or count == 1 or not may_copy():
+        yield
+        return
+    _blocks[:] = blocks
+    with processes(count, list, is_copied=True) as pool:
+        # What is long is begun first: at the end it would have all but one copy wait.
+        order = sorted(range(len(blocks)), key=lambda k: not blocks[k].is_long)
+        drawn = {k: pool.submit(_picture, k) for k in order}
+        yield
+        try:
+            for k, each in drawn.items():
+                blocks[k].__dict__["figure"] = each.result()
+        except BrokenProcessPool:  # killed, most likely for want of memory: the rest is drawn here
+            pass
+    _blocks.clear()
+
+
+def _picture(k: int) -> Picture:
+    figure = _blocks[k].figure
+    png, svg = (figure_bytes(figure, kind) for kind in ("png", "svg"))
+    return Picture(png, svg, axes_of(figure))

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis.samples import smoothed
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.channel import Channel, channel
-from bywire.report.decimation import kept_samples
+from bywire.report.channel import Channel, channel, kept_samples
 from bywire.report.wording import amount, duration
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.decimation import decimate
+from bywire.report.channel import decimate
 from bywire.report.panels import Role
 from bywire.report.wording import in_display_unit
 

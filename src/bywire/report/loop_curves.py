@@ -1,9 +1,10 @@
-"""Figures of a loop gain: Bode plot, Nyquist plot, Nichols chart, sensitivities."""
+"""Figures of a loop: Bode plot, Nyquist plot, Nichols chart, sensitivities, and its design."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,20 +14,18 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
 from matplotlib.ticker import MultipleLocator, NullFormatter
 
-from bywire.analysis.loop_curves import Family, LoopCurve, disk
-from bywire.analysis.margins import LoopMargins
+from bywire.analysis.margins import Family, LoopCurve, LoopMargins, disk
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.legend import legend_outside
 from bywire.report.panels import Role
-from bywire.report.style import value_color, value_scale
+from bywire.report.style import legend_outside, value_color, value_scale
 from bywire.report.wording import amount
 
-Points = Callable[[LoopCurve], tuple[Array, Array]]
+_Points = Callable[[LoopCurve], tuple[Array, Array]]
 
 
-def draw_family(
-    axes: Axes, family: Family, points: Points, *, stable_only: bool = False, label: str = ""
+def _draw_family(
+    axes: Axes, family: Family, points: _Points, *, stable_only: bool = False, label: str = ""
 ) -> None:
     """Draw one line per curve; unstable loops dashed, the worst one on top with its value.
 
@@ -65,7 +64,7 @@ def draw_family(
         )
 
 
-def value_bar(figure: Figure, panels: list[Axes], family: Family) -> None:
+def _value_bar(figure: Figure, panels: list[Axes], family: Family) -> None:
     """Put the scale of the varied parameter beside the panels; nothing for a single curve."""
     if family.name and len(family.curves) >= 2:
         value_scale(figure, panels, family.name, family.unit, family.values)
@@ -86,8 +85,8 @@ def _name(family: Family, label: str) -> str:
 def loop_gain(family: Family) -> Figure:
     """Draw magnitude and phase of the loop gain; margins of the worst curve as vertical spans."""
     figure, (upper, lower) = style.new_figure(5.0, (1.0, 1.0))
-    draw_family(upper, family, _magnitude, label="loop gain L")
-    draw_family(lower, family, _phase)
+    _draw_family(upper, family, _magnitude, label="loop gain L")
+    _draw_family(lower, family, _phase)
     upper.axhline(0.0, color=style.GRAY, linewidth=0.8, zorder=1)
     lower.axhline(-180.0, color=style.GRAY, linewidth=0.8, zorder=1)
     _spans(upper, lower, family.curves[family.worst])
@@ -100,7 +99,7 @@ def loop_gain(family: Family) -> Figure:
     upper.set_ylabel("magnitude of L [dB]")
     lower.set_ylabel("phase of L [°]")
     lower.set_xlabel(style.axis_label("frequency", "Hz"))
-    value_bar(figure, [upper, lower], family)
+    _value_bar(figure, [upper, lower], family)
     style.legend_above(upper)
     figure.align_ylabels([upper, lower])
     return figure
@@ -174,7 +173,7 @@ def nyquist(family: Family) -> Figure:
     axes.plot(
         np.cos(turn), np.sin(turn), color=style.GRAY, linewidth=0.7, linestyle=":", label="gain 1"
     )
-    draw_family(axes, family, _in_the_plane, label="loop gain L")
+    _draw_family(axes, family, _in_the_plane, label="loop gain L")
     _mark_on_the_circle(axes, worst)
     axes.plot(
         -1.0,
@@ -194,7 +193,7 @@ def nyquist(family: Family) -> Figure:
     axes.set_aspect("equal", adjustable="datalim")  # more is shown where there is room
     axes.set_xlabel("real part of L [-]")
     axes.set_ylabel("imaginary part of L [-]")
-    value_bar(figure, [axes], family)
+    _value_bar(figure, [axes], family)
     legend_outside(figure, axes.get_legend_handles_labels()[0], columns=3)
     return figure
 
@@ -257,7 +256,7 @@ def _gain_margins(margins: LoopMargins) -> Iterator[tuple[str, str, float, float
 
 # --- Nichols chart with contours of the closed loop's magnitude
 
-CONTOURS = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.0, 1.0, 3.0, 6.0, 12.0)
+_CONTOURS = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.0, 1.0, 3.0, 6.0, 12.0)
 """magnitudes of T = L/(1 + L) that are drawn [dB]"""
 _LOW, _HIGH = -40.0, 40.0  # gains that are shown, dB
 _TURN = 90.0  # the chart ends at multiples of it, degree
@@ -278,7 +277,7 @@ def nichols(family: Family) -> Figure:
         T = 20.0 * np.log10(np.abs(L / (1.0 + L)))
         apart = np.abs((1.0 - L) / (1.0 + L))
     lines = axes.contour(
-        phase, gain, T, levels=CONTOURS, colors=style.GRAY, linewidths=0.6, linestyles="-"
+        phase, gain, T, levels=_CONTOURS, colors=style.GRAY, linewidths=0.6, linestyles="-"
     )
     axes.clabel(lines, fmt="%g dB", fontsize=0.85 * style.TEXT_SIZE)
     handles: list[Line2D | Patch] = [
@@ -305,14 +304,14 @@ def nichols(family: Family) -> Figure:
                 label=f"disk margin {worst.margins.disk:.2f}",
             )
         )
-    draw_family(axes, family, _in_decibels, label="loop gain L")
+    _draw_family(axes, family, _in_decibels, label="loop gain L")
     _mark_on_the_chart(axes, worst)
     axes.set_xlim(left, right)
     axes.set_ylim(_LOW, _HIGH)
     axes.xaxis.set_major_locator(MultipleLocator(45.0 if right - left <= 540.0 else 180.0))
     axes.set_xlabel("phase of L [°]")
     axes.set_ylabel("magnitude of L [dB]")
-    value_bar(figure, [axes], family)
+    _value_bar(figure, [axes], family)
     gain_lines = [h for h in axes.get_legend_handles_labels()[0] if isinstance(h, Line2D)]
     style.legend_above(axes, [*gain_lines, *handles])
     return figure
@@ -388,7 +387,7 @@ def sensitivity(family: Family) -> Figure:
     panels[1].xaxis.set_minor_formatter(NullFormatter())
     f = family.curves[0].frequency
     panels[1].set_xlim(f[0], f[-1])
-    value_bar(figure, panels, family)
+    _value_bar(figure, panels, family)
     for axes in panels:
         style.legend_above(axes)
     figure.align_ylabels(panels)
@@ -408,7 +407,7 @@ def _panel(axes: Axes, family: Family, quantity: str, limit: float) -> None:
         label=f"usual limit {limit:g}",
     )
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
-    draw_family(axes, family, points, stable_only=True, label=f"|{quantity}|")
+    _draw_family(axes, family, points, stable_only=True, label=f"|{quantity}|")
     worst = family.curves[family.worst]
     if worst.margins.stable:
         size = np.abs(getattr(worst, quantity))
@@ -426,3 +425,174 @@ def _panel(axes: Axes, family: Family, quantity: str, limit: float) -> None:
     )
     axes.set_ylim(max(lowest, _LOWEST) - 2.0, max(highest, 20.0 * math.log10(limit)) + 3.0)
     axes.set_ylabel(f"|{quantity}| [dB]")
+
+
+# --- A loop before and after its design
+
+_COLORS = (style.GRAY, style.BLUE, style.VERMILLION)
+_LINES = ("--", "-", "-.")
+
+
+@dataclass(frozen=True, eq=False)
+class DesignCurve:
+    """A set of gains on the nominal linear model.
+
+    Parameters
+    ----------
+    label
+        What the legend calls it.
+    curve
+        Its loop gain.
+    time, step
+        Response of the closed loop to a unit step [s, 1], shape (n,) each; it rests afterwards.
+    span
+        What of it is worth showing [s].
+    """
+
+    label: str
+    curve: LoopCurve
+    time: Array
+    step: Array
+    span: float
+
+
+def loop_gains(curves: Sequence[DesignCurve], phase_margin: float | None) -> Figure:
+    """Draw magnitude and phase of the loop gains; the phase margin read as a vertical span.
+
+    ``curves``: at most three sets of gains, in their order; ``phase_margin``: the required one
+    [degree], drawn as a limit of the phase at the crossovers.
+    """
+    figure, (upper, lower) = style.new_figure(5.0, (1.0, 1.0))
+    for design, color, line in zip(curves, _COLORS, _LINES, strict=False):
+        f = design.curve.frequency
+        margins = design.curve.margins
+        label = f"{design.label}: {margins.phase:.3g}° at {margins.phase_at:.3g} Hz"
+        upper.plot(
+            f,
+            20.0 * np.log10(np.abs(design.curve.L)),
+            line,
+            color=color,
+            linewidth=1.6,
+            label=label if margins.stable else f"{design.label}: unstable",
+        )
+        lower.plot(f, design.curve.phase, line, color=color, linewidth=1.6)
+        if math.isfinite(margins.phase_at):
+            lower.plot(
+                [margins.phase_at] * 2,
+                [-180.0, margins.phase - 180.0],
+                color=color,
+                linewidth=3.0,
+                alpha=0.6,
+                zorder=4,
+            )
+    upper.axhline(0.0, color=style.GRAY, linewidth=0.8, zorder=1)
+    lower.axhline(-180.0, color=style.GRAY, linewidth=0.8, zorder=1)
+    if phase_margin is not None:
+        look = style.STROKES[Role.LIMIT]
+        lower.axhline(
+            phase_margin - 180.0,
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+        )
+        upper.plot(
+            [],
+            [],
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            label=f"required phase margin {phase_margin:.3g}°",
+        )
+    span = max(float(np.ptp(design.curve.phase)) for design in curves)
+    lower.yaxis.set_major_locator(MultipleLocator(45.0 if span < 300.0 else 90.0))
+    upper.set_ylabel("magnitude of L [dB]")
+    lower.set_ylabel("phase of L [°]")
+    _frequency_axis(curves, upper, lower)
+    style.legend_above(upper)
+    figure.align_ylabels([upper, lower])
+    return figure
+
+
+def sensitivities(curves: Sequence[DesignCurve]) -> Figure:
+    """Draw |S| and |T| of the stable loops with the limits that are usually asked for."""
+    figure, panels = style.new_figure(4.8, (1.0, 1.0))
+    for axes, quantity, limit in ((panels[0], "S", MOST_S), (panels[1], "T", MOST_T)):
+        look = style.STROKES[Role.LIMIT]
+        axes.axhline(
+            20.0 * math.log10(limit),
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            label=f"usual limit {limit:g}",
+        )
+        axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
+        highest, lowest = 20.0 * math.log10(limit), 0.0
+        for design, color, line in zip(curves, _COLORS, _LINES, strict=False):
+            if not design.curve.margins.stable:
+                continue
+            size = 20.0 * np.log10(np.abs(getattr(design.curve, quantity)))
+            highest, lowest = max(highest, float(size.max())), min(lowest, float(size.min()))
+            peak = 10.0 ** (float(size.max()) / 20.0)
+            axes.plot(
+                design.curve.frequency,
+                size,
+                line,
+                color=color,
+                linewidth=1.6,
+                label=f"{design.label}: max |{quantity}| {peak:.3g}",
+            )
+        axes.set_ylim(max(lowest, _LOWEST) - 2.0, highest + 3.0)
+        axes.set_ylabel(f"|{quantity}| [dB]")
+        style.legend_above(axes)
+    _frequency_axis(curves, *panels)
+    figure.align_ylabels(panels)
+    return figure
+
+
+def steps(curves: Sequence[DesignCurve], overshoot: float | None) -> Figure:
+    """Draw the linear responses to a unit step; the band of settling and the required overshoot.
+
+    Parameters
+    ----------
+    curves
+        See `loop_gains`; unstable loops are left out.
+    overshoot
+        The required one [%].
+    """
+    figure, (axes,) = style.new_figure(3.2)
+    axes.axhspan(0.98, 1.02, color=style.SHADE, zorder=0.5, label="settled: within 2 %")
+    stable = [design for design in curves if design.curve.margins.stable]
+    end = max((design.span for design in stable), default=1.0)
+    for design, color, line in zip(curves, _COLORS, _LINES, strict=False):
+        if design.curve.margins.stable:
+            time = np.append(design.time, max(end, design.time[-1]))
+            axes.plot(
+                time,
+                np.append(design.step, design.step[-1]),
+                line,
+                color=color,
+                linewidth=1.6,
+                label=design.label,
+            )
+    if overshoot is not None:
+        look = style.STROKES[Role.LIMIT]
+        axes.axhline(
+            1.0 + 0.01 * overshoot,
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            label=f"required overshoot {overshoot:.3g} %",
+        )
+    axes.set_xlim(0.0, end)
+    axes.set_xlabel(style.axis_label("time", "s"))
+    axes.set_ylabel("output over step [-]")
+    style.legend_above(axes)
+    return figure
+
+
+def _frequency_axis(curves: Sequence[DesignCurve], upper: Axes, lower: Axes) -> None:
+    upper.set_xscale("log")
+    upper.set_xlim(curves[0].curve.frequency[0], curves[0].curve.frequency[-1])
+    lower.xaxis.set_major_formatter(lambda hertz, _: f"{hertz:g}")
+    lower.xaxis.set_minor_formatter(NullFormatter())
+    lower.set_xlabel(style.axis_label("frequency", "Hz"))

@@ -43,6 +43,7 @@ def write_page(
     *,
     banner: Banner | None = None,
     files: Sequence[str] = (),
+    made: Sequence[tuple[str, str]] = (),
 ) -> Path:
     """Write a report as one HTML file, whole or not at all.
 
@@ -60,13 +61,15 @@ def write_page(
         Outcome, shown above the contents.
     files
         Names of the files that belong to it.
+    made
+        What identifies it, see `bywire.report.identity`.
 
     Raises
     ------
     FileError
         When the file cannot be written.
     """
-    text = page_html(title, summary, sections, banner=banner, names=files)
+    text = page_html(title, summary, sections, banner=banner, names=files, made=made)
     return write_bytes(path, text.encode("utf-8"))
 
 
@@ -77,6 +80,7 @@ def page_html(
     *,
     banner: Banner | None = None,
     names: Sequence[str] = (),
+    made: Sequence[tuple[str, str]] = (),
 ) -> str:
     """Return a report as one HTML page; see :func:`write_page`."""
     numbered = _numbered(sections)
@@ -88,6 +92,7 @@ def page_html(
         f"<title>{_text(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>",
         f'<header>\n<h1>{_text(title)}</h1>\n<p class="summary">{_text(summary)}</p>',
         _banner(banner) if banner is not None else "",
+        _identity(made),
         _contents(sections) if len(sections) > 2 else "",
         "</header>\n<main>",
         *(_section(section, k, numbered) for k, section in enumerate(sections, 1)),
@@ -149,6 +154,11 @@ def _text(text: str) -> str:
 def _banner(banner: Banner) -> str:
     text = _MARKS[banner.verdict] + _text(banner.text)
     return f'<div class="status {banner.verdict}" role="status">{text}</div>'
+
+
+def _identity(made: Sequence[tuple[str, str]]) -> str:
+    rows = "".join(f"<dt>{_text(label)}</dt><dd>{_text(text)}</dd>" for label, text in made)
+    return f'<dl class="identity">{rows}</dl>' if rows else ""
 
 
 def _contents(sections: Sequence[Section]) -> str:

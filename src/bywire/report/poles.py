@@ -16,10 +16,10 @@ from bywire.analysis.linear.linear_model import STILL
 from bywire.analysis.locus import Border, Locus
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.legend import legend_outside
+from bywire.report.style import legend_outside
 from bywire.report.wording import amount, in_display_unit
 
-RATIOS = (0.1, 0.2, 0.4, 0.6, 0.8)
+_RATIOS = (0.1, 0.2, 0.4, 0.6, 0.8)
 """damping ratios that are drawn"""
 _BEYOND = 0.35  # of the radius: what is shown of the unstable half plane
 
@@ -37,7 +37,7 @@ def planes(titles: tuple[str, ...], height: float = 4.2) -> tuple[Figure, list[A
     return figure, panels
 
 
-def draw_plane(axes: Axes, radius: float, period: float, growth: float = 0.0) -> None:
+def _draw_plane(axes: Axes, radius: float, period: float, growth: float = 0.0) -> None:
     """Draw rays, circles and borders of the upper half plane up to a radius.
 
     Parameters
@@ -55,7 +55,7 @@ def draw_plane(axes: Axes, radius: float, period: float, growth: float = 0.0) ->
     axes.axvspan(0.0, 10.0 * radius, color="#F7E3DA", zorder=0.5, linewidth=0.0)
     axes.axvline(0.0, color=style.BLACK, linewidth=0.9, zorder=1.5)
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1.0)
-    for ratio in RATIOS:
+    for ratio in _RATIOS:
         x, y = -ratio * radius, math.sqrt(1.0 - ratio**2) * radius
         axes.plot([0.0, x], [0.0, y], color=style.GRAY, linewidth=0.5, linestyle="--", zorder=1.0)
         axes.text(
@@ -106,7 +106,7 @@ def draw_plane(axes: Axes, radius: float, period: float, growth: float = 0.0) ->
     axes.set_ylabel("imaginary part [rad/s]")
 
 
-def shown_radius(sizes: list[float], period: float) -> float:
+def _shown_radius(sizes: list[float], period: float) -> float:
     """Return the radius that shows rates of some sizes [1/s], at most half the sampling's."""
     largest = max((s for s in sizes if math.isfinite(s) and s > 0.0), default=1.0)
     return min(1.1 * largest, 1.02 * np.pi / period) if period else 1.1 * largest
@@ -114,7 +114,7 @@ def shown_radius(sizes: list[float], period: float) -> float:
 
 # --- Poles of a closed loop
 
-SLOW = 4.0
+_SLOW = 4.0
 """the second plane shows rates up to this multiple of the bandwidth"""
 
 
@@ -134,11 +134,11 @@ def pole_map(rates: NDArray[np.complex128], period: float, bandwidth: float) -> 
     """
     sizes = np.abs(rates)
     moving = rates[(sizes > STILL) & (rates.imag >= -STILL)]
-    whole = shown_radius([float(s) for s in np.abs(moving)], period)
-    radius = slow_radius([float(s) for s in np.abs(moving)], bandwidth, whole)
+    whole = _shown_radius([float(s) for s in np.abs(moving)], period)
+    radius = _slow_radius([float(s) for s in np.abs(moving)], bandwidth, whole)
     figure, panels = planes(("poles", "the slow ones"))
     for axes, size in zip(panels, (whole, radius), strict=True):
-        draw_plane(axes, size, period)
+        _draw_plane(axes, size, period)
         for unstable in (False, True):
             part = moving[(moving.real > 0) == unstable]
             if not part.size:
@@ -162,7 +162,7 @@ def pole_map(rates: NDArray[np.complex128], period: float, bandwidth: float) -> 
     return figure
 
 
-def slow_radius(sizes: list[float], bandwidth: float, whole: float) -> float:
+def _slow_radius(sizes: list[float], bandwidth: float, whole: float) -> float:
     """Return the radius of the plane of slow poles [1/s].
 
     Parameters
@@ -177,7 +177,7 @@ def slow_radius(sizes: list[float], bandwidth: float, whole: float) -> float:
     middle = 2.0 * np.pi * bandwidth
     if not math.isfinite(middle):
         middle = float(np.median(sizes)) if sizes else whole
-    return min(SLOW * middle, whole)
+    return min(_SLOW * middle, whole)
 
 
 # --- Root locus: poles of a loop or a plant against a parameter
@@ -199,8 +199,8 @@ def root_locus(locus: Locus, bandwidth: float) -> Figure:
     """
     rates = locus.rates
     sizes = [float(s) for s in np.abs(rates[np.isfinite(rates)]) if s > STILL]
-    whole = shown_radius(sizes, locus.period)
-    slow = min(max([slow_radius(sizes, bandwidth, whole), *_borders(locus)]), whole)
+    whole = _shown_radius(sizes, locus.period)
+    slow = min(max([_slow_radius(sizes, bandwidth, whole), *_borders(locus)]), whole)
     crossing = _crossing(locus)
     if not math.isfinite(bandwidth) and crossing > 0.0:
         slow = min(crossing, whole)
@@ -209,7 +209,7 @@ def root_locus(locus: Locus, bandwidth: float) -> Figure:
     norm = Normalize(values[0], values[-1])
     for axes, radius in zip(panels, (whole, slow), strict=True):
         inside = rates[np.isfinite(rates) & (np.abs(rates) <= radius)]
-        draw_plane(axes, radius, locus.period, float(np.max(inside.real, initial=0.0)))
+        _draw_plane(axes, radius, locus.period, float(np.max(inside.real, initial=0.0)))
         _ways(axes, locus, norm, values)
     bar = figure.colorbar(
         ScalarMappable(norm, _COLORS), ax=panels, aspect=40, pad=0.02, format="%g"

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 import numpy as np
 
 from bywire.bench.experiment import Experiment
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis.samples import smoothed
 from bywire.bench.requirements import Verdict
 from bywire.core.errors import ParameterError
 from bywire.core.units import convert
 from bywire.report import style
-from bywire.report.channel import Channel, channel
-from bywire.report.decimation import decimate
+from bywire.report.channel import Channel, channel, decimate
 from bywire.report.panels import Role
 from bywire.report.stated_levels import draw_stated
 from bywire.report.wording import duration

@@ -1,4 +1,4 @@
-"""How every figure looks: colors, line styles by meaning, axes, scales.
+"""How every figure looks: colors, line styles by meaning, legends, axes, scales.
 
 Nothing here changes matplotlib's global state, and pyplot is never imported. Matplotlib itself
 is loaded with the first figure that is drawn: it takes half as long as a short command.
@@ -9,35 +9,34 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.figure import Figure
 
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis.samples import smoothed
 from bywire.core.quantities import display_unit
 from bywire.core.typing import Array
-from bywire.report.channel import Channel
-from bywire.report.decimation import COLUMNS, decimate
+from bywire.report.channel import COLUMNS, Channel, decimate
 from bywire.report.panels import Role
 from bywire.report.wording import clean, duration, in_display_unit, unit_text
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
-    from matplotlib.figure import Figure
 
-FASTEST = 3 * COLUMNS
+_FASTEST = 3 * COLUMNS
 """points of a thinned line beyond which most pixel columns hold a whole wave of the ripple"""
 
 
-def is_band(shown: Channel) -> bool:
+def _is_band(shown: Channel) -> bool:
     """Return whether a line through all samples fills an area."""
     kept = len(decimate(shown.time, shown.values)[0])
-    return FASTEST < kept < len(shown.values)
+    return _FASTEST < kept < len(shown.values)
 
 
-def averaging_time(time: Array) -> float:
+def _averaging_time(time: Array) -> float:
     """Return 1, 2 or 5 times a power of ten [s], at least one pixel column wide.
 
     Examples
@@ -52,9 +51,9 @@ def averaging_time(time: Array) -> float:
 
 def inside(shown: Channel) -> tuple[Channel, float] | None:
     """Return the moving average and its averaging time [s] where a line fills an area."""
-    if not is_band(shown) or not bool(np.all(np.isfinite(shown.values))):
+    if not _is_band(shown) or not bool(np.all(np.isfinite(shown.values))):
         return None
-    width = averaging_time(shown.time)
+    width = _averaging_time(shown.time)
     return replace(shown, values=smoothed(shown.time, shown.values, width)), width
 
 
@@ -113,7 +112,7 @@ STROKES = {
 
 PALE_OPACITY = 0.3
 """of a ripple behind its average"""
-BAND_ORDER = 2.4
+_BAND_ORDER = 2.4
 """drawing order of a ripple that fills an area: behind every line"""
 
 
@@ -238,7 +237,7 @@ def draw_channel(
                 color=look.color,
                 alpha=opacity * PALE_OPACITY,
                 linewidth=0.8,
-                zorder=BAND_ORDER,
+                zorder=_BAND_ORDER,
             )
         shown, width = average
         pale = "" if role is Role.SET_POINT else " (pale: ripple)"
@@ -329,3 +328,25 @@ def value_scale(
     bar = figure.colorbar(ScalarMappable(norm, shown), ax=panels, aspect=40, pad=0.02)
     bar.ax.tick_params(labelsize=TEXT_SIZE)
     bar.set_label(axis_label(name, unit), fontsize=TEXT_SIZE)
+
+
+# --- The one legend of a figure whose panels share what their lines mean
+
+_COLUMNS = 4  # that have room
+
+
+def legend_outside(
+    figure: Figure,
+    handles: Sequence[Artist],
+    place: Literal["left", "right"] = "left",
+    *,
+    columns: int = _COLUMNS,
+) -> None:
+    """Put one legend above all panels of a figure, at its left or right end."""
+    figure.legend(
+        handles=list(handles),
+        ncols=columns,
+        frameon=False,
+        fontsize=TEXT_SIZE,
+        loc="outside upper left" if place == "left" else "outside upper right",
+    )

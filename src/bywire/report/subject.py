@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields
 
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import flattened
-from bywire.bench.bench_source import experiment_of
-from bywire.bench.option_names import OPTION
+from bywire.bench.changes import OPTION
+from bywire.bench.generic_experiment import experiment_of
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError
 from bywire.core.field_notes import field_notes
@@ -18,7 +18,7 @@ from bywire.report.document import Change, Details, Paragraph, Section, TableBlo
 from bywire.report.tables import ParameterRow, parameter_table, text_table, value_text
 from bywire.report.wording import range_text
 
-OVERRIDDEN = "override"
+_OVERRIDDEN = "override"
 """provenance of a value that differs from the cited one"""
 
 
@@ -60,7 +60,7 @@ def _origin(cited: Cited | None, value: object) -> tuple[str, str]:
         return "", ""
     if cited.value != value:
         origin = ", ".join(filter(None, (cited.kind, cited.where)))
-        return OVERRIDDEN, f"cited: {cited.value} in SI ({origin})"
+        return _OVERRIDDEN, f"cited: {cited.value} in SI ({origin})"
     return cited.kind, cited.where
 
 
@@ -75,7 +75,7 @@ _SIMULATION = {"step": "s", "record": "s", "seed": "1", "engine": "1"}
 def bench_changes(bench: Bench) -> tuple[Change, ...]:
     """Return everything that a bench sets to something else than its source and its experiment."""
     return (
-        *set_changes(bench.parameters, bench.par),
+        *_set_changes(bench.parameters, bench.par),
         *_assembly_change(bench),
         *_option_changes(bench),
         *_stimulus_changes(bench),
@@ -83,7 +83,7 @@ def bench_changes(bench: Bench) -> tuple[Change, ...]:
     )
 
 
-def set_changes(parameters: str, par: ParameterSet) -> tuple[Change, ...]:
+def _set_changes(parameters: str, par: ParameterSet) -> tuple[Change, ...]:
     """Return the values that differ from those of a parameter set, in its order."""
     cited = PARAMETER_SETS.find(parameters)
     origins = {name: _origin_of(each) for name, each in cited.values.items()}
@@ -275,7 +275,7 @@ class Subject:
         """What the user changed."""
         if self.bench is not None:
             return (*bench_changes(self.bench), *self.further)
-        return (*set_changes(self.parameters, self.par), *self.further)
+        return (*_set_changes(self.parameters, self.par), *self.further)
 
     @property
     def changes_block(self) -> TableBlock | Paragraph:

@@ -50,10 +50,19 @@ def measured_cell(value: float | None, unit: str, error: float, digits: int = 4)
 
 @dataclass(frozen=True)
 class Column:
-    """Heading of a column; numbers are set to the right."""
+    """Heading of a column.
+
+    Parameters
+    ----------
+    numeric
+        Whether it is set to the right.
+    is_detail
+        Whether a terminal shows it with ``--verbose`` only.
+    """
 
     heading: str
     numeric: bool = False
+    is_detail: bool = False
 
 
 @dataclass(frozen=True)
@@ -62,6 +71,15 @@ class Table:
 
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
+
+    @property
+    def brief(self) -> Table:
+        """The same table without the columns of details."""
+        kept = [k for k, column in enumerate(self.columns) if not column.is_detail]
+        return Table(
+            tuple(self.columns[k] for k in kept),
+            tuple(tuple(row[k] for k in kept) for row in self.rows),
+        )
 
 
 @dataclass(frozen=True)
@@ -170,11 +188,12 @@ def kpi_table(rows: Iterable[KpiRow]) -> Table:
     estimated = any(not math.isnan(row.error) for row in listed)
     stated, placed = any(row.stated for row in listed), any(row.where for row in listed)
     columns = [Column("name"), Column("value", numeric=True)]
-    columns += [Column("error", numeric=True)] * estimated
-    columns += [Column("limit", numeric=True), Column("result")] * limited
-    columns += [Column("stated", numeric=True)] * stated + [Column("stated in")] * placed
+    columns += [Column("numerical error", numeric=True)] * estimated
+    columns += [Column("limit", numeric=True), Column("verdict")] * limited
+    columns += [Column("stated", numeric=True)] * stated
+    columns += [Column("stated in", is_detail=True)] * placed
     return Table(
-        (*columns, Column("definition")),
+        (*columns, Column("definition", is_detail=True)),
         tuple(
             (
                 Cell(clean(row.name)),

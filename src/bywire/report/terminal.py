@@ -5,20 +5,23 @@ from __future__ import annotations
 import shutil
 import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
 
+from bywire.core.callers import is_command_line
 from bywire.report.document import (
+    Block,
     Change,
+    Details,
     Document,
     Drawing,
     FigureBlock,
-    Flat,
     Listing,
     Paragraph,
 )
 from bywire.report.tables import Table
 
-WIDTH = 100
-"""characters of a line of prose"""
+WIDTH = 120
+"""most characters of a line of prose"""
 GAP = "  "
 NARROWEST = 12
 """least width of a column that is wrapped"""
@@ -28,12 +31,27 @@ LONGEST_VALUE = 60
 """characters of a value, such as a table, that a sentence on changes shows"""
 
 
-def terminal_text(document: Document) -> str:
-    """Return what a terminal shows of a document; figures are left out."""
-    shown = (each for each in document.brief if not isinstance(each, FigureBlock | Drawing))
-    first = [_text(Paragraph(document.headline)), ""] if document.headline else []
+def terminal_text(document: Document, verbose: bool = False) -> str:
+    """Return what a terminal shows of a document, without its figures and without the verdict.
+
+    ``verbose``: with definitions, explanations and all rows of long tables.
+    """
+    first = [textwrap.fill(document.headline, _width()), ""] if document.headline else []
     changed = [_bullet(text) for text in change_texts(document.changes or ())]
-    return "\n".join([*first, *changed, *map(_text, shown)])
+    lines: list[str] = []
+    for block in document.brief:
+        text = _text(block, verbose)
+        # An empty line stands between two texts, even where one in between is not shown.
+        if text or (text == "" and lines and lines[-1]):
+            lines.append(text)
+    if lines and not lines[-1]:
+        lines.pop()
+    return "\n".join([*first, *changed, *lines])
+
+
+def verdict_line(document: Document) -> str:
+    """Return the outcome in one line; empty where a document has none."""
+    return "" if document.banner is None else f"verdict: {document.banner.text}"
 
 
 def change_texts(changes: Sequence[Change]) -> list[str]:
@@ -49,21 +67,43 @@ def _shortened(text: str) -> str:
     return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}..."
 
 
-def _text(block: str | Flat) -> str:
+def _text(block: str | Block, verbose: bool) -> str | None:
+    """Return a block as text; None for one that is not shown."""
     if isinstance(block, str):
         return block
+    if isinstance(block, FigureBlock | Drawing):
+        return None
+    if isinstance(block, Details):
+        inner = [text for each in block.blocks if (text := _text(each, verbose)) is not None]
+        titled = [block.title, *inner] if block.title else inner
+        return "\n".join(titled) if verbose else None
     if isinstance(block, Paragraph):
-        return textwrap.fill(block.text, WIDTH)
+        return textwrap.fill(block.text, _width())
     if isinstance(block, Listing):
-        lines = [_bullet(text) for text in block.texts]
-        return "\n".join([block.title, *lines] if block.title else lines)
-    assert not isinstance(block, FigureBlock | Drawing)
-    text = table_text(block.table, block.width or shutil.get_terminal_size().columns)
-    return f"{block.title}\n{text}" if block.title else text
+        items = [_bullet(text) for text in block.texts]
+        return "\n".join([block.title, *items] if block.title else items)
+    table = block.table if verbose else block.table.brief
+    rest = 0 if verbose or not block.most else max(len(table.rows) - block.most, 0)
+    table = replace(table, rows=table.rows[: len(table.rows) - rest])
+    lines = [block.title] if block.title else []
+    lines.append(table_text(table, _columns()))
+    how = "--verbose shows them" if is_command_line() else "tables() has them"
+    lines += [f"and {rest} more rows: {how}"] if rest else []
+    return "\n".join(lines)
+
+
+def _columns() -> int:
+    """Return the characters of the terminal's lines; of a pipe, as many as a log shows."""
+    return shutil.get_terminal_size((WIDTH, 24)).columns
+
+
+def _width() -> int:
+    """Return the length of a line of prose: that of the terminal, within what can be read."""
+    return max(min(_columns(), WIDTH), 20)
 
 
 def _bullet(text: str) -> str:
-    width = max(min(shutil.get_terminal_size().columns, WIDTH), 20)
+    width = _width()
     return textwrap.fill(
         text,
         width,

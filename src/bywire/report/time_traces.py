@@ -1,27 +1,30 @@
-"""Figure: what a recording did over time, in panels one above the other."""
+"""Figures of recordings over time: in panels, several on top of each other, differences."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from bywire.core.errors import ParameterError
-from bywire.core.units import convert
+from bywire.core.units import convert, difference_unit
 from bywire.report import style
-from bywire.report.channel import Channel, channel
-from bywire.report.decimation import lasting_phases, phases
+from bywire.report.channel import Channel, channel, decimate, lasting_phases, phases
 from bywire.report.panels import Panel, Role, Trace, declared_panels, panels_by_unit
 from bywire.report.stated_levels import draw_stated
 from bywire.report.step_response import StepLimits, draw_limits
+from bywire.report.style import Color, inside, value_color, value_scale
+from bywire.report.wording import duration
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
     from bywire.bench.stated import StatedLevel, StatedRange
     from bywire.report.panels import Panel
@@ -32,7 +35,7 @@ FAULTS = "faults"
 _HEIGHT = 0.04  # of a bar, in heights of a panel
 
 
-def mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
+def _mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
     """Draw a bar along the upper edge while a panel's quantity is saturated."""
     spans = _scaled(recording, panel.saturation) if panel.saturation is not None else []
     if spans:
@@ -48,13 +51,13 @@ def mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
         )
 
 
-def mark_faults(axes: Axes, recording: xr.Dataset, *, named: bool) -> None:
+def _mark_faults(axes: Axes, recording: xr.Dataset, *, named: bool) -> None:
     """Draw a bar along the lower edge while a fault is there; ``named``: with a label."""
     if spans := _scaled(recording, FAULTS):
         _draw_fault(axes, spans, 0.0, style.PURPLE, "fault" if named else None)
 
 
-def mark_faults_of(
+def _mark_faults_of(
     axes: Axes, recordings: Sequence[xr.Dataset], colors: Sequence[str | Color], factor: float
 ) -> list[Artist]:
     """Draw the same of several recordings: once where their faults are there at the same times.
@@ -123,7 +126,7 @@ def _spans(recording: xr.Dataset, variable: str) -> list[tuple[float, float]]:
 
 # --- Traces
 
-NEAR = 0.5
+_NEAR = 0.5
 """share of a limit from which its lines are drawn"""
 _LASTING = 0.9  # share of a phase above which its short breaks do not count
 
@@ -186,14 +189,14 @@ def time_traces(
         if axes is rows[0] and limits is not None:
             draw_limits(axes, limits, first)
         _shade_stuck(axes, recording, stuck, named=axes is rows[0])
-        mark_saturation(axes, panel, recording)
-        mark_faults(axes, recording, named=axes is rows[0])
+        _mark_saturation(axes, panel, recording)
+        _mark_faults(axes, recording, named=axes is rows[0])
         _mark_limit(axes, panel, recording, first)
         here = [each for each in left if each.signal in {trace.variable for trace in traces}]
         draw_stated(axes, here, first)
         left = [each for each in left if each not in here]
         axes.margins(x=0.0)
-        set_ticks(axes, panel, first)
+        _set_ticks(axes, panel, first)
         if not panel.levels:  # a mode's ticks say all that its legend would
             style.legend_above(axes)
     _, unit = style.time_scale(first.time)
@@ -298,12 +301,12 @@ def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: boo
 
 def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel) -> None:
     """Draw the limits of a panel's first trace where it comes near; far away they say nothing."""
-    level = limit_of(recording, panel)
+    level = _limit_of(recording, panel)
     if level is None:
         return
     level = convert(level, first.symbol, first.unit)
     look = style.STROKES[Role.LIMIT]
-    sides = [s for s in (1.0, -1.0) if float(np.nanmax(s * first.values)) >= NEAR * level]
+    sides = [s for s in (1.0, -1.0) if float(np.nanmax(s * first.values)) >= _NEAR * level]
     for k, side in enumerate(sides):
         axes.axhline(
             side * level,
@@ -315,7 +318,7 @@ def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel)
         )
 
 
-def limit_of(recording: xr.Dataset, panel: Panel) -> float | None:
+def _limit_of(recording: xr.Dataset, panel: Panel) -> float | None:
     """Return the limit [SI] of a panel's first trace; None where the recording says none."""
     if panel.limit is None:
         return None
@@ -325,7 +328,7 @@ def limit_of(recording: xr.Dataset, panel: Panel) -> float | None:
     return float(value) if isinstance(value, (int, float)) else None
 
 
-def set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:
+def _set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:
     """Set the ticks of an ordinate: few numbers, or the names of a mode."""
     if not panel.levels:
         style.few_ticks(axes, 5 if panel.height < 1.5 else 7)
@@ -333,3 +336,441 @@ def set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:
     axes.set_yticks(range(len(panel.levels)), panel.levels)
     axes.set_ylim(-0.3, len(panel.levels) - 0.7)
     axes.set_ylabel(panel.quantity)
+
+
+# --- Several recordings on top of each other, and differences
+
+_DOTS: style.Dash = (0, (1.2, 1.2))
+"""of the second line of a panel"""
+_APART = 0.03  # of what lines reach over: closer, a set point of a line's color lies below it
+_BRIEF = 0.01  # of the time axis: what shows no longer is not seen
+
+
+@dataclass(frozen=True)
+class Look:
+    """What tells a recording from others: its label, color and dashes."""
+
+    label: str
+    color: str | Color
+    dash: style.Dash
+
+
+def _draw_line(axes: Axes, shown: Channel, look: Look, factor: float, *, second: bool) -> float:
+    """Draw a line, of a ripple that fills an area its average; return its averaging time [s]."""
+    average = inside(shown)
+    shown, width = (shown, 0.0) if average is None else average
+    axes.plot(
+        *decimate(factor * shown.time, shown.values),
+        color=look.color,
+        linestyle=_DOTS if second else look.dash,
+        linewidth=0.9 if second else 1.2,
+        zorder=2.8 if second else 3.0,
+        label="_",
+    )
+    return width
+
+
+def _draw_target(
+    axes: Axes,
+    name: str,
+    lines: Sequence[str],
+    recordings: Sequence[xr.Dataset],
+    looks: Sequence[Look],
+    factor: float,
+) -> list[Line2D]:
+    """Draw a set point: once, in black, where it is the same in all recordings.
+
+    Where each has its own, in its color, they are left out that lie below the lines of their
+    recordings. ``lines``: names of those, the first one followed.
+    """
+    stroke = style.STROKES[Role.SET_POINT]
+    shown = [channel(recording, name) for recording in recordings]
+    same = all(
+        np.array_equal(each.time, shown[0].time) and np.array_equal(each.values, shown[0].values)
+        for each in shown[1:]
+    )
+    followed = [channel(recording, lines[0]) for recording in recordings]
+    if not (same or _are_seen(shown, followed)):
+        return []
+    colors = [stroke.color] if same else [look.color for look in looks]
+    for each, color in zip(shown, colors, strict=False):
+        average = inside(each)
+        each = each if average is None else average[0]
+        axes.plot(
+            *decimate(factor * each.time, each.values),
+            color=color,
+            linestyle=stroke.linestyle,
+            linewidth=0.9,
+            zorder=3.2 if same else 2.9,
+            label="_",
+        )
+    return [entry(shown[0].label, stroke.color if same else style.GRAY, stroke.linestyle)]
+
+
+def _are_seen(targets: Sequence[Channel], followed: Sequence[Channel]) -> bool:
+    """Return whether a set point of any recording shows beside the line that follows it."""
+    ends = [each for line in followed for each in (np.nanmin(line.values), np.nanmax(line.values))]
+    close = _APART * (max(ends) - min(ends))
+    brief = _BRIEF * max(float(line.time[-1] - line.time[0]) for line in followed)
+    return any(
+        float(np.sum(np.diff(line.time)[np.abs(target.values - line.values)[1:] > close])) > brief
+        for target, line in zip(targets, followed, strict=True)
+    )
+
+
+def _draw_limits_of(
+    axes: Axes,
+    panel: Panel,
+    recordings: Sequence[xr.Dataset],
+    looks: Sequence[Look],
+    first: Channel,
+) -> list[Line2D]:
+    """Draw the limits of a panel's first trace where it comes near; each once."""
+    stroke = style.STROKES[Role.LIMIT]
+    levels = [_limit_of(recording, panel) for recording in recordings]
+    is_one = len(set(levels)) == 1
+    drawn = set()
+    for recording, look, level in zip(recordings, looks, levels, strict=True):
+        if level is None:
+            continue
+        values = channel(recording, first.name).values
+        level = convert(level, first.symbol, first.unit)
+        for side in (1.0, -1.0):
+            at = side * level
+            if float(np.nanmax(side * values)) < _NEAR * level or at in drawn:
+                continue
+            drawn.add(at)
+            axes.axhline(
+                at,
+                color=stroke.color if is_one else look.color,
+                linestyle=stroke.linestyle,
+                linewidth=stroke.linewidth,
+                zorder=stroke.zorder,
+                label="_",
+            )
+    color = stroke.color if is_one else style.GRAY
+    return [entry("limit", color, stroke.linestyle)] if drawn else []
+
+
+def entry(label: str, color: str | Color, dash: Any) -> Line2D:
+    """Return an entry of a legend."""
+    from matplotlib.lines import Line2D
+
+    text = style.plain(label, 110)
+    return Line2D([], [], color=color, linestyle=dash, linewidth=1.4, label=text)
+
+
+# --- Panels
+# Every recording has a color, of the palette that any color vision tells apart or, over a range of
+# values, of a scale; what a line is, its dashes say.
+
+_FEW = 3
+"""recordings up to which the second trace of a panel is drawn as well"""
+_DASHES: tuple[style.Dash, ...] = ("-", (0, (4, 2)), (0, (6, 1.5, 1.5, 1.5)))
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What recordings were varied over: name, SI unit and a value for each."""
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+
+
+Chosen = list[tuple[Panel, list[Trace]]]
+
+
+def overlaid_panels(
+    recordings: Mapping[str, xr.Dataset],
+    *,
+    step: tuple[str, StepLimits] | None = None,
+    scale: Scale | None = None,
+    skipped: int = 0,
+) -> Figure:
+    """Draw the signals that all recordings share, in the panels of the first one's brake.
+
+    Panels that stay at zero in all recordings are left out. Set points that are the same are
+    drawn once. Of more than `_FEW` recordings, each panel shows its first trace and set points.
+
+    Parameters
+    ----------
+    recordings
+        Recordings by the label that the legend shows.
+    step
+        Signal, and the step by which it is judged: its band and limit are drawn.
+    scale
+        The range that they belong to: a scale then stands in the legend's place.
+    skipped
+        Colors left to other recordings, those of an earlier figure.
+
+    Raises
+    ------
+    ParameterError
+        When the recordings share no signal that could be drawn.
+    """
+    whole = list(recordings.values())
+    data = _shared(whole)
+    present = _chosen(data)
+    if not present:
+        raise ParameterError(
+            f"the {len(recordings)} recordings share no signal over time that moves: there is "
+            "nothing to lay on top of each other"
+        )
+    looks = _looks(list(recordings), scale, skipped)
+    heights = [panel.height for panel, _ in present]
+    figure, rows = style.new_figure(0.6 + 1.2 * sum(heights), heights)
+    factor, unit = _factor(data)
+    for axes, (panel, traces) in zip(rows, present, strict=True):
+        entries: list[Artist] = [*_draw_panel(axes, panel, traces, data, looks, factor)]
+        if step is not None and traces[0].variable == step[0]:
+            draw_limits(axes, step[1], channel(_longest(data), step[0]))
+            entries += axes.get_legend_handles_labels()[0]
+        heads = (
+            []
+            if scale is not None or axes is not rows[0]
+            else [entry(each.label, each.color, each.dash) for each in looks]
+        )
+        faults = _mark_faults_of(axes, whole, [each.color for each in looks], factor)
+        entries += faults if axes is rows[0] else []
+        style.legend_above(axes, [*heads, *entries])
+        axes.margins(x=0.0)
+    rows[-1].set_xlabel(f"time [{unit}]")
+    figure.align_ylabels(rows)
+    if scale is not None:
+        value_scale(figure, rows, scale.name, scale.unit, scale.values)
+    return figure
+
+
+def can_overlay(recordings: Sequence[xr.Dataset]) -> bool:
+    """Return whether recordings share a signal that `overlaid_panels` would draw."""
+    return bool(_chosen(_shared(recordings)))
+
+
+def _shared(recordings: Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    """Return recordings with the signals over time that all of them have, in one unit."""
+    signals = [
+        {
+            str(name): variable.attrs.get("units")
+            for name, variable in each.variables.items()  # arrays of all of them take 20 ms
+            if name not in each.coords and variable.dims == ("time",) and variable.size > 0
+        }
+        for each in recordings
+    ]
+    names = [
+        name
+        for name, unit in signals[0].items()
+        if all(name in each and each[name] == unit for each in signals[1:])
+    ]
+    return [each[names] for each in recordings]
+
+
+def _chosen(recordings: Sequence[xr.Dataset]) -> Chosen:
+    """Return the declared panels of which the recordings show most, or those by unit."""
+    first = recordings[0]
+    declared = [_present_in_any(recordings, each.panels) for each in declared_panels(first)]
+    most = max(declared, key=len, default=[])
+    return most or _present_in_any(recordings, panels_by_unit(first))
+
+
+def _present_in_any(recordings: Sequence[xr.Dataset], panels: Sequence[Panel]) -> Chosen:
+    """Return the panels that some recording shows, with the traces that some recording moves."""
+    each = [{id(panel): traces for panel, traces in drawable(r, panels)} for r in recordings]
+    chosen: Chosen = []
+    for panel in panels:
+        moved = {trace.variable for drawn in each for trace in drawn.get(id(panel), ())}
+        traces = [trace for trace in panel.traces if trace.variable in moved]
+        if traces:
+            chosen.append((panel, traces))
+    return chosen
+
+
+def _looks(labels: Sequence[str], scale: Scale | None, skipped: int) -> list[Look]:
+    if scale is not None:
+        return [Look(n, value_color(scale.values, k), "-") for k, n in enumerate(labels)]
+    palette = style.SEQUENCE
+    return [
+        Look(n, palette[k % len(palette)], _DASHES[k // len(palette) % len(_DASHES)])
+        for k, n in enumerate(labels, skipped)
+    ]
+
+
+def _draw_panel(
+    axes: Axes,
+    panel: Panel,
+    traces: Sequence[Trace],
+    recordings: Sequence[xr.Dataset],
+    looks: Sequence[Look],
+    factor: float,
+) -> list[Line2D]:
+    """Draw a panel and label its ordinate; return the entries of its legend."""
+    first = channel(recordings[0], traces[0].variable)
+    targets = [trace for trace in traces if trace.role is Role.SET_POINT]
+    lines = [trace for trace in traces if trace not in targets] or targets[:1]
+    entries: list[Line2D] = []
+    for k, trace in enumerate(lines[: 2 if len(recordings) <= _FEW else 1]):
+        averages = [
+            _draw_line(axes, channel(recording, trace.variable), look, factor, second=k > 0)
+            for recording, look in zip(recordings, looks, strict=True)
+        ]
+        width = max(averages)
+        if len(lines) > 1 or width:  # an ordinate names what its lines have in common
+            dash = _DOTS if k > 0 else "-"
+            label = channel(recordings[0], trace.variable).label
+            label += f", {duration(width)} average" if width else ""
+            entries.append(entry(label, style.GRAY, dash))
+    for target in [t for t in targets if t not in lines]:
+        entries += _draw_target(
+            axes, target.variable, [t.variable for t in lines], recordings, looks, factor
+        )
+    entries += _draw_limits_of(axes, panel, recordings, looks, first)
+    axes.set_ylabel(style.axis_label(panel.quantity, first.symbol, "\n"))
+    _set_ticks(axes, panel, first)
+    return entries
+
+
+def _longest(recordings: Sequence[xr.Dataset]) -> xr.Dataset:
+    times = [each["time"].values for each in recordings]
+    return recordings[max(range(len(times)), key=lambda k: float(times[k][-1] - times[k][0]))]
+
+
+def _factor(recordings: Sequence[xr.Dataset]) -> tuple[float, str]:
+    """Return factor and unit of the time axis, as of the longest recording."""
+    return style.time_scale(np.asarray(_longest(recordings)["time"].values, dtype=np.float64))
+
+
+# --- Differences: each less the first, at the first one's times
+
+_LEAST = 1e-9
+"""share of a signal's largest magnitude below which a difference is rounding, and none"""
+
+
+def difference_figure(recordings: Mapping[str, xr.Dataset]) -> Figure | None:
+    """Draw what each recording differs from the first by; None where none does.
+
+    ``recordings``: by the label that the legend shows.
+    """
+    apart = differences_from_first(recordings)
+    if not apart or not can_overlay(list(apart.values())):
+        return None
+    return overlaid_panels(apart, skipped=1)  # in the colors that the recordings have
+
+
+def differences_from_first(recordings: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """Return the signals that all recordings share, less those of the first.
+
+    Between samples of another run signals are straight lines; beyond its end there is no
+    difference. Modes, which are whole numbers, have none either.
+
+    Parameters
+    ----------
+    recordings
+        Recordings over time by label, two or more.
+
+    Returns
+    -------
+    dict
+        A dataset for each recording but the first, by ``"label less first label"``; none where the
+        recordings have no times in common, or do not differ.
+    """
+    (base_label, base), *others = recordings.items()
+    low = max(float(each["time"].values[0]) for each in recordings.values())
+    high = min(float(each["time"].values[-1]) for each in recordings.values())
+    base = base.isel(time=(base["time"].values >= low) & (base["time"].values <= high))
+    if base.sizes["time"] < 2:
+        return {}
+    names = [
+        str(name)
+        for name in base.data_vars
+        if all(_is_comparable(base[name], each, str(name)) for _, each in others)
+    ]
+    apart = {f"{k} less {base_label}": _less(each, base, names) for k, each in others}
+    differ = any(bool(np.any(each[name].values)) for each in apart.values() for name in names)
+    return apart if differ else {}
+
+
+def _is_comparable(first: xr.DataArray, other: xr.Dataset, name: str) -> bool:
+    if name not in other.data_vars or first.dims != ("time",) or other[name].dims != ("time",):
+        return False
+    is_mode = first.attrs.get("units", "1") == "1" and not np.any(np.mod(first.values, 1.0))
+    return not is_mode and first.attrs.get("units") == other[name].attrs.get("units")
+
+
+def _less(other: xr.Dataset, base: xr.Dataset, names: list[str]) -> xr.Dataset:
+    time = base["time"].values
+    is_same = np.array_equal(other["time"].values, time)
+    signals = {}
+    for name in names:
+        first, second = base[name], other[name].values
+        values = second if is_same else np.interp(time, other["time"].values, second)
+        apart = values - first.values
+        size = float(np.nanmax(np.abs(first.values), initial=0.0))
+        apart = np.where(np.abs(apart) <= _LEAST * size, 0.0, apart)
+        unit = difference_unit(str(first.attrs.get("units", "1")))
+        signals[name] = ("time", apart, {**first.attrs, "units": unit})
+    kept = {key: base.attrs[key] for key in ("model",) if key in base.attrs}
+    return xr.Dataset(signals, coords={"time": base["time"]}, attrs=kept)
+
+
+# --- The same variables of several recordings, one color each
+
+_ROOM = "  "  # short labels of wide letters need more than the legend's mean width of a letter
+_DASHES_OF_A_VARIABLE: tuple[style.Dash, ...] = ("-", (0, (4, 2)), (0, (1.5, 1.5)))
+
+
+def overlaid_traces(recordings: Mapping[str, xr.Dataset], variables: Mapping[str, str]) -> Figure:
+    """Draw variables over time, one panel each, with a line for every recording.
+
+    Parameters
+    ----------
+    recordings
+        Recordings by the label that the legend shows.
+    variables
+        What to draw, with its name at the ordinate; those that no recording has, or that are zero
+        in all, are left out.
+
+    Raises
+    ------
+    ParameterError
+        When nothing is left to draw.
+    """
+    shown = [name for name in variables if any(_moves_in_any(r, name) for r in recordings.values())]
+    if not shown:
+        raise ParameterError(
+            f"overlaid_traces: the {len(recordings)} recordings have none of the variables "
+            f"{', '.join(variables)}: name others"
+        )
+    figure, rows = style.new_figure(0.5 + 1.7 * len(shown), [1.0] * len(shown))
+    for axes, name in zip(rows, shown, strict=True):
+        unit = _draw(axes, recordings, name)
+        axes.set_ylabel(style.axis_label(variables[name], unit, "\n"))
+        style.few_ticks(axes, 6)
+        axes.margins(x=0.0)
+    style.legend_above(rows[0])
+    _, scale = style.time_scale(next(iter(recordings.values()))["time"].values)
+    rows[-1].set_xlabel(f"time [{scale}]")
+    figure.align_ylabels(rows)
+    return figure
+
+
+def _moves_in_any(recording: xr.Dataset, name: str) -> bool:
+    return name in recording.data_vars and bool(np.any(recording[name].values))
+
+
+def _draw(axes: Axes, recordings: Mapping[str, xr.Dataset], name: str) -> str:
+    """Draw one variable of all recordings that have it; return its SI unit."""
+    scale, _ = style.time_scale(next(iter(recordings.values()))["time"].values)
+    unit = "1"
+    for k, (label, recording) in enumerate(recordings.items()):
+        if name not in recording.data_vars:
+            continue
+        line, turn = channel(recording, name), k // len(style.SEQUENCE)
+        axes.plot(
+            *decimate(scale * line.time, line.values),
+            linewidth=1.1,
+            color=style.SEQUENCE[k % len(style.SEQUENCE)],
+            linestyle=_DASHES_OF_A_VARIABLE[turn % len(_DASHES_OF_A_VARIABLE)],
+            label=style.plain(label) + _ROOM,
+        )
+        unit = line.symbol
+    return unit

@@ -13,8 +13,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.result import Result
-from bywire.bench.running import Progress, run
+from bywire.bench.running import Progress, Result, run
 from bywire.core.arguments import checked
 from bywire.core.interrupts import raise_if_stopped, thread_pool
 from bywire.core.registry import Kind, instances
@@ -204,7 +203,6 @@ def tallies(items: Iterable[Item]) -> dict[str, Tally]:
 
 # --- Reproductions
 
-_WIDTH = 150  # characters of a line of a part's own table
 _THREADS = 4  # more would wait for each other's Python
 
 
@@ -330,9 +328,9 @@ class Reproduction(Answer):
     def _tables(self) -> list[str | Flat]:
         """Return what a terminal shows: parts' own tables, and the verdicts of all others."""
         rest = [item for part in self.parts if not part.tables for item in part.items]
-        lines: list[str | Flat] = [TableBlock(verdicts(rest), width=0), ""] if rest else []
+        lines: list[str | Flat] = [TableBlock(verdicts(rest)), ""] if rest else []
         for title, table in (pair for part in self.parts for pair in part.tables.items()):
-            lines += [title, TableBlock(table, width=_WIDTH), ""]
+            lines += [title, TableBlock(table), ""]
         return lines
 
     def _sections(self, short: Listing) -> list[Section]:

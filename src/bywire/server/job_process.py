@@ -24,7 +24,7 @@ from typing import Any
 from bywire.core.errors import BywireError
 from bywire.core.heard_warnings import heard_warnings
 from bywire.core.interrupts import interrupt_heard, interrupts_noted
-from bywire.server.telling import begin_to_tell, tell
+from bywire.server.study_so_far import begin_to_tell, tell
 
 _PAUSE = 0.1  # s between two words on progress
 

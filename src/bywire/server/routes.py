@@ -16,8 +16,7 @@ from bywire.server.contents import REPORT, contents, endings
 from bywire.server.exchange import LIVE, SANDBOX, RefusedError, Reply, Request, page, plain
 from bywire.server.field import is_file_name
 from bywire.server.live_pages import experiments, shown_bench
-from bywire.server.pages.file_pages import bench_page, report_page, study_page, task_page
-from bywire.server.pages.index_page import index_page
+from bywire.server.pages import bench_page, index_page, report_page, study_page, task_page
 from bywire.server.place import RESULTS, Place, folder_name, safe_name
 from bywire.server.service import Service
 from bywire.server.task import tasks

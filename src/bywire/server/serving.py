@@ -1,34 +1,247 @@
-"""`bywire.serve`: the server from its start to Ctrl-C."""
+"""`bywire.serve`: the server from its start to Ctrl-C, and the requests of its connections."""
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import json
 import os
+import shutil
 import signal
+import socket
+import sys
 import threading
+import time
+import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from http.server import ThreadingHTTPServer
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from urllib.parse import quote
+from typing import Any, Final
+from urllib.parse import parse_qsl, quote, unquote, urlsplit
 
 from bywire.core.arguments import checked
 from bywire.core.callers import is_command_line
-from bywire.core.errors import FileError, ParameterError, unknown_name
+from bywire.core.clean_text import shortened
+from bywire.core.errors import BywireError, FileError, ParameterError, quoted, unknown_name
+from bywire.core.version import __version__
+from bywire.server import guard
 from bywire.server.address import HERE, PORT
+from bywire.server.exchange import REFUSAL, RefusedError, Reply, Request
 from bywire.server.field import is_file_name
-from bywire.server.handler import Handler, quiet_error
 from bywire.server.live_pages import experiments
+from bywire.server.pages import refusal_page
 from bywire.server.place import Place, place_of
+from bywire.server.routes import answer
 from bywire.server.service import LARGEST_FILE, Service, service_of
+
+_METHODS: Final = ("GET", "HEAD", "POST", "PUT")
+_LINGER: Final = 2.0  # s in which the rest of a refused body is taken and dropped
+_HEADERS: Final = {
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+
+
+class Handler(BaseHTTPRequestHandler):
+    """Answers the requests of a connection."""
+
+    protocol_version = "HTTP/1.1"
+    server_version, sys_version = f"bywire/{__version__}", ""
+    timeout = 60.0  # s without a byte
+    service: Service
+
+    def parse_request(self) -> bool:
+        """Read a first line and headers; a line without a version of HTTP is refused."""
+        if not super().parse_request():
+            return False
+        if self.request_version == "HTTP/0.9":
+            self.send_error(HTTPStatus.HTTP_VERSION_NOT_SUPPORTED)
+            return False
+        return True
+
+    def do_GET(self) -> None:
+        """Answer, whatever the method."""
+        reply = self._reply()
+        with contextlib.suppress(ConnectionError, TimeoutError):  # who asked has left
+            self._send(reply)
+            if self.close_connection:
+                self._linger()
+
+    do_HEAD = do_POST = do_PUT = do_GET
+    do_DELETE = do_OPTIONS = do_PATCH = do_TRACE = do_CONNECT = do_GET
+
+    def _reply(self) -> Reply:
+        try:
+            return self._answered()
+        except RefusedError as refused:
+            return self._refused(refused.status, refused.text, refused.field)
+        except BywireError as error:
+            return self._refused(400, str(error))
+        except (ConnectionError, TimeoutError):
+            return self._refused(408, "the request did not come to its end: send it again")
+        except OSError as error:
+            if error.errno in (errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL):
+                return self._refused(404, "there is no such file: its name is not a valid one")
+            place = f"{error.filename}: " if error.filename else ""
+            return self._refused(507, f"{place}{error.strerror or error}: make room there")
+        except Exception as error:  # a defect ends a request, not the server
+            traceback.print_exception(error)
+            return self._refused(
+                500,
+                "this is a defect of bywire; please report it with the lines that the server "
+                "printed",
+            )
+
+    def _answered(self) -> Reply:
+        port = int(self.connection.getsockname()[1])
+        guard.require_place(self.command, self.headers, port)
+        try:
+            address = urlsplit(self.path)
+        except ValueError:  # brackets that hold no address, for instance
+            raise RefusedError(400, f"{quoted(self.path)} is not a valid address") from None
+        query = dict(parse_qsl(address.query, keep_blank_values=True))
+        guard.require_token(self.headers, query, port, self.service.token)
+        if self.command not in _METHODS:
+            raise RefusedError(405, f"{self.command} is not answered: use {', '.join(_METHODS)}")
+        request = Request(
+            self.command, unquote(address.path), query, self.headers, self._body(), self._length()
+        )
+        if "token" in query and self.command in ("GET", "HEAD"):
+            return self._welcomed(request.path, port)
+        return answer(self.service, request)
+
+    def _welcomed(self, path: str, port: int) -> Reply:
+        """Keep the token as a cookie, and lead to the same page without it in the address."""
+        others = "&".join(
+            part for part in urlsplit(self.path).query.split("&") if not part.startswith("token=")
+        )
+        cookie = (
+            f"{guard.cookie_name(port)}={self.service.token}; Path=/; HttpOnly; SameSite=Strict"
+        )
+        # One slash: two would lead to another machine.
+        target = f"/{urlsplit(self.path).path.lstrip('/')}" + (f"?{others}" if others else "")
+        return Reply(b"", status=303, headers={"Location": target, "Set-Cookie": cookie})
+
+    def _length(self) -> int:
+        text = self.headers.get("Content-Length", "")
+        if self.headers.get("Transfer-Encoding"):
+            return -1
+        return int(text) if text.isascii() and text.isdecimal() and len(text) < 16 else -1
+
+    def handle_expect_100(self) -> bool:
+        """Wait with the word to go on until the request itself is found right."""
+        return True
+
+    def _body(self) -> _Body:
+        return _Body(self)
+
+    def _refused(self, status: int, text: str, field: str = "") -> Reply:
+        text = shortened(text)
+        if self.path.startswith("/api/"):
+            body = json.dumps({"error": text, **({"field": field} if field else {})}).encode()
+            return Reply(body, "application/json", status, REFUSAL)
+        return Reply(refusal_page(status, text).encode(), status=status, policy=REFUSAL)
+
+    def _send(self, reply: Reply) -> None:
+        body = reply.body
+        size = body.stat().st_size if isinstance(body, Path) else len(body)
+        self.send_response(reply.status)
+        if any(name in self.headers for name in ("Content-Length", "Transfer-Encoding")):
+            self.close_connection = True  # what nobody read of a body is no further request
+        headers = {
+            **_HEADERS,
+            "Content-Type": reply.kind,
+            "Content-Length": str(size),
+            "Content-Security-Policy": reply.policy,
+            **reply.headers,
+            **({"Connection": "close"} if self.close_connection else {}),
+        }
+        for name, value in headers.items():
+            self.send_header(name, value)
+        self.end_headers()
+        if self.command == "HEAD":
+            return
+        if isinstance(body, Path):
+            with body.open("rb") as stream:
+                shutil.copyfileobj(stream, self.wfile)
+        else:
+            self.wfile.write(body)
+
+    def _linger(self) -> None:
+        """Take what still comes of a body: who is cut off while sending never reads the answer."""
+        until = time.monotonic() + _LINGER
+        with contextlib.suppress(OSError):  # the other side is gone, or sends no more
+            self.connection.shutdown(socket.SHUT_WR)
+            while (left := until - time.monotonic()) > 0.0:
+                self.connection.settimeout(left)
+                if not self.connection.recv(1 << 16):
+                    return
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """Say what of a request HTTP itself does not understand, always with a status line."""
+        self.close_connection = True
+        self.request_version = self.protocol_version
+        if code == HTTPStatus.NOT_IMPLEMENTED:
+            code, message = (
+                405,
+                f"{quoted(self.command)} is not answered: use {', '.join(_METHODS)}",
+            )
+        elif code == HTTPStatus.HTTP_VERSION_NOT_SUPPORTED:
+            code, message = 400, "this version of HTTP is not spoken: ask by HTTP/1.1"
+        status = HTTPStatus(code)
+        body = refusal_page(code, message or status.phrase).encode()
+        self.send_response(code)
+        for name, value in {
+            **_HEADERS,
+            "Content-Type": "text/html; charset=utf-8",
+            "Connection": "close",
+            "Content-Length": str(len(body)),
+            "Content-Security-Policy": REFUSAL,
+        }.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing: a line would hold the token."""
+
+
+class _Body:
+    """The body of a request; who sends it is told to go on when it is first read."""
+
+    def __init__(self, handler: Handler) -> None:
+        self._handler = handler
+        self._is_awaited = handler.headers.get("Expect", "").lower() == "100-continue"
+
+    def read(self, size: int) -> bytes:
+        """Return so many bytes, fewer only where the other side has left."""
+        if self._is_awaited:
+            self._is_awaited = False
+            self._handler.wfile.write(b"HTTP/1.1 100 Continue\r\n\r\n")
+        return self._handler.rfile.read(size)
+
+
+def _quiet_error(*_: object) -> None:
+    """Tell of an error outside of requests, unless somebody has just left."""
+    error = sys.exc_info()[1]
+    if error is not None and not isinstance(error, (ConnectionError, TimeoutError)):
+        traceback.print_exception(error)
+
+
+# --- The server
 
 
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
     request_queue_size = 128  # connections that wait: by the standard library's 5, many are cut off
     allow_reuse_address = os.name == "posix"  # elsewhere it lets two servers share a port
-    handle_error = quiet_error  # type: ignore[assignment]
+    handle_error = _quiet_error  # type: ignore[assignment]
 
 
 @dataclass(frozen=True)

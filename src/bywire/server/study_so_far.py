@@ -1,22 +1,43 @@
-"""What a study shows so far, as estimates and bars: told between chunks, long before a report."""
+"""What a study shows so far, and all else that the process of a job tells its server."""
 
 from __future__ import annotations
 
+import contextlib
+import json
 import math
+import os
 import time
 import warnings
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from bywire.core.errors import BywireError
 from bywire.core.typing import Progress
 from bywire.server.contents import REPORT
-from bywire.server.telling import tell
 
 if TYPE_CHECKING:
     from bywire.studies.findings import Findings
+
+_told: list[IO[str]] = []
+
+
+def begin_to_tell() -> None:
+    """Take standard output for what is told: what a brake prints there is no answer."""
+    _told.append(os.fdopen(os.dup(1), "w", encoding="utf-8"))
+    os.dup2(2, 1)
+
+
+def tell(**said: Any) -> None:
+    """Tell the server, if there is one."""
+    for stream in _told:
+        with contextlib.suppress(OSError):  # it is gone, which ends this process
+            stream.write(json.dumps(said) + "\n")
+            stream.flush()
+
+
+# --- A study
 
 _ESTIMATE, _REPORT = 1.0, 5.0  # s of computing between two of each at least
 _SHARE = 5.0  # and this many times what one took
@@ -46,7 +67,7 @@ class StudyProgress:
                 self._progress(label, share)
 
     def _estimate(self) -> None:
-        from bywire.api.run_study import kept_study
+        from bywire.api.study_run import kept_study
 
         tell(so_far=so_far(kept_study(self._folder).findings))
 

@@ -207,7 +207,7 @@ def _path_of(name: str, place: Place) -> Path:
 
 def _run_of(name: str, place: Place) -> Path:
     """Return where a run is; a result goes before an experiment of its name."""
-    from bywire.bench.bench_source import names_experiment
+    from bywire.bench.bench_file import names_experiment
     from bywire.bench.result_folder import is_result_folder
 
     path = place.root / name

@@ -1,1 +1,1 @@
-"""The engine: time stepping, kernel emission, compilation, runs. It knows no brake."""
+"""The engine: time stepping, kernel emission, compilation, runs. It is independent of any brake."""

@@ -17,9 +17,8 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Role, Signal, signals_of
 from bywire.core.typing import Array
 from bywire.simulation.engine import Engine
-from bywire.simulation.layout import Layout
 from bywire.simulation.native import CHUNK, Request
-from bywire.simulation.schedule import Schedule
+from bywire.simulation.schedule import Layout, Schedule
 
 Progress = Callable[[float], None]
 
@@ -106,8 +105,10 @@ def require_work(work: Any, most: Any) -> None:
     """Raise ``WorkLimitError`` where runs took more work than they may."""
     if np.any(work > most):
         raise WorkLimitError(
-            f"the run takes more than {np.min(most):.3g} substeps' work: contacts or frictions "
-            "hardly settle; look for a parameter that is extreme"
+            f"the run takes more work than {np.min(most):.3g} substeps: contacts or frictions "
+            "rarely settle; look for an extreme parameter",
+            name="most_work",
+            value=f"{np.min(most):.3g}",
         )
 
 
@@ -124,8 +125,8 @@ def require_finite(layout: Layout, vector: Array, what: str) -> None:
 
 # --- Changes: between two frames, all states and memories kept
 # Where such a parameter belongs to a store of energy, the change does work. It is recorded, so
-# that it stands in the books and not in their closing error. A contact's loss is what its work
-# exceeds its store by: what a change does there stands in that loss.
+# that it is part of the energy balance, not of its closing error. A contact's loss is its work
+# minus its stored energy, and so includes the work of a change there.
 
 _PUT_IN = "E_change"
 _TOLERANCE = 1e-9
@@ -133,7 +134,7 @@ _TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Change:
-    """Parameters that hold from a time on.
+    """Parameters from a time on.
 
     Parameters
     ----------
@@ -150,7 +151,7 @@ class Change:
 
 
 def frame_of(change: Change, schedule: Schedule) -> int:
-    """Return the first frame in which a change holds."""
+    """Return the first frame with a change."""
     return max(math.ceil(change.time / schedule.frame - _TOLERANCE), 0)
 
 
@@ -173,25 +174,26 @@ def pieces(
 
 
 def require_unchanged(changes: Sequence[Change], what: str) -> None:
-    """Refuse changes of a run where they would be passed over in silence.
+    """Reject changes of a run where they would be ignored.
 
     Raises
     ------
     ParameterError
-        When there are any; ``what`` says what cannot be computed.
+        When there are any; ``what``: results that cannot be computed.
     """
     if changes:
         raise ParameterError(
-            f"{what} of a run whose parameters change, as by a fault, are not available: leave "
-            "the change out, or give the parameters from the start"
+            f"{what} are not available for a run whose parameters change, for instance by a fault: "
+            "leave the change out, or set the parameters from the start",
+            name="changes",
         )
 
 
 @cache
 def put_in_signals(output: type) -> Mapping[str, Signal]:
-    """Return the signals of what changes put into the energies of an Output: one for each book.
+    """Return the signals of the work of changes, one for each energy balance of an Output.
 
-    That of the first book has the plain name: of the actuator's own, which has none, if there is.
+    That of the first balance, the actuator's own if there is one, has the plain name.
     """
     books = dict.fromkeys(_books(output).values())
     first = "" if "" in books else next(iter(books), "")
@@ -206,7 +208,7 @@ def put_in_signals(output: type) -> Mapping[str, Signal]:
 
 
 def energies(output: type, names: Sequence[str]) -> Array:
-    """Return which of some outputs are energies, and of which book's.
+    """Return which of some outputs are energies, and of which energy balance.
 
     Integrals do not jump, stores do. Shape (books, outputs), 1 where an output is one of the
     book's, in the order of `put_in_signals`.
@@ -223,7 +225,7 @@ def _books(output: type) -> dict[str, str]:
 
 
 def energy_of(engine: Engine, request: Request, vector: Array, books: Array) -> Array:
-    """Return the sum of each book's energies at an instant with a request's parameters [J].
+    """Return the total energy of each balance at an instant with a request's parameters [J].
 
     ``books``: `energies` of all outputs.
     """
@@ -231,5 +233,5 @@ def energy_of(engine: Engine, request: Request, vector: Array, books: Array) -> 
     row = np.empty((1, books.shape[1]))
     asked = replace(request, selection=np.arange(books.shape[1], dtype=np.int32))
     engine.advance(asked, vector.copy(), end, end, row)
-    # Outputs that are no energies need not be finite.
+    # Other outputs need not be finite.
     return np.array([row[0, book > 0].sum() for book in books])

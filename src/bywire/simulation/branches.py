@@ -1,9 +1,8 @@
-"""Work that a single run's kernel saves: branches not taken, and what follows from ramps alone.
+"""Work that a kernel saves: values that change with a mode alone, branches not taken, ramps.
 
-A selection computes both arms. Where only one of them needs costly functions, such as the curve of
-a tyre that slides, the processor skips them while the other arm holds. Selections by one condition
-share what their arms need together: the first computes it, the others take it over. The values are
-the same.
+A mode is a handful of truth values. What depends on them and on parameters, such as the matrix of a
+substep, its pivots and their reciprocals, is computed when one of them changes: a few hundred times
+in a run of many thousand substeps.
 """
 
 from __future__ import annotations
@@ -11,10 +10,121 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from bywire.simulation.expressions import COSTLY, Namer, as_number, condition
+from bywire.simulation.expressions import COSTLY, Namer, as_number, condition, needed
 from bywire.simulation.graph import Graph, Node
-from bywire.simulation.modes import cost
 from bywire.simulation.quadrature import Levels
+
+_COMPARISONS = frozenset({"lt", "le", "eq", "ne"})
+_TRUTHS = _COMPARISONS | {"and", "or", "not"}
+_FREE = _TRUTHS | {"if_else_zero", "select", "neg"}  # as cheap as what finds out about a change
+_COST = {"inv": 8.0, "sqrt": 8.0, "exp": 40.0, "sin": 40.0, "cos": 40.0, "log": 40.0, "pow": 60.0}
+_WORTH_ATOM, _WORTH_MODE = 4.0, 0.15
+
+
+@dataclass(frozen=True)
+class Modes:
+    """A substep in three parts.
+
+    Parameters
+    ----------
+    first
+        Nodes from which the truth values follow, in order.
+    atoms
+        The truth values; empty where a mode does not pay.
+    values
+        Nodes to renew when one of them changes, in order; no truth values.
+    rest
+        All other nodes, in order.
+    """
+
+    first: list[Node]
+    atoms: list[Node]
+    values: list[Node]
+    rest: list[Node]
+
+    def without(self, known: Collection[Node]) -> Modes:
+        """Return the parts without nodes that are known already."""
+        return Modes(
+            *(
+                [n for n in each if n not in known]
+                for each in (self.first, self.atoms, self.values, self.rest)
+            )
+        )
+
+
+def modes(graph: Graph, roots: Sequence[Node], level: Levels) -> Modes:
+    """Split the nodes of a substep by how often they change.
+
+    Parameters
+    ----------
+    roots
+        Results of the substep.
+    level
+        How often each node changes, see ``stages.LEVEL``.
+    """
+    substep = needed(graph, roots, lambda n: level[n] < 2)
+    order = needed(graph, roots, lambda n: level[n] == 0)
+    refused: set[Node] = set()
+    while True:
+        deciding = _classified(graph, order, level, refused)
+        poor = _poor_atoms(graph, order, deciding)
+        if not poor:
+            break
+        refused |= poor
+    atoms = sorted({a for own in deciding.values() for a in own})
+    first = needed(graph, atoms, lambda n: level[n] < 2)
+    early = frozenset(first)
+    values = [n for n in order if n in deciding and n not in early and not _is_truth(graph, n)]
+    saved = sum(cost(graph, n) for n in values if level[n] == 2) - 2.0 * len(atoms)
+    if saved < _WORTH_MODE * sum(cost(graph, n) for n in substep):
+        return Modes([], [], [], substep)
+    late = frozenset(values)
+    return Modes(first, atoms, values, [n for n in substep if n not in early and n not in late])
+
+
+def _is_truth(graph: Graph, node: Node) -> bool:
+    return graph.nodes[node].op in _TRUTHS
+
+
+def cost(graph: Graph, node: Node) -> float:
+    """Return about how long an operation takes, a product being 1."""
+    return _COST.get(graph.nodes[node].op, 1.0)
+
+
+def _classified(
+    graph: Graph, order: Sequence[Node], level: Levels, refused: Collection[Node]
+) -> dict[Node, frozenset[Node]]:
+    """Return every node that a mode decides, and the truth values that it follows from."""
+    deciding: dict[Node, frozenset[Node]] = {}
+    late: set[Node] = set()  # follows from such a node, but not from it alone
+    for node in order:
+        changing = [a for a in graph.arguments(node) if level[a] > 0]
+        if all(a in deciding for a in changing):
+            deciding[node] = frozenset().union(*(deciding[a] for a in changing))
+        elif any(a in deciding or a in late for a in changing):
+            late.add(node)
+        elif graph.nodes[node].op in _COMPARISONS and node not in refused:
+            deciding[node] = frozenset({node})
+    return deciding
+
+
+def _poor_atoms(
+    graph: Graph, order: Sequence[Node], deciding: dict[Node, frozenset[Node]]
+) -> set[Node]:
+    """Return truth values from which too little follows."""
+    worth: dict[Node, float] = {}
+    for node in order:
+        price = 0.0 if graph.nodes[node].op in _FREE else cost(graph, node)
+        for atom in deciding.get(node, ()):
+            worth[atom] = worth.get(atom, 0.0) + price
+    return {atom for atom, value in worth.items() if value < _WORTH_ATOM}
+
+
+# --- Branches and ramps
+# A selection computes both arms. Where only one of them needs costly functions, such as the curve
+# of a tyre that slides, the processor skips them while the other arm holds. Selections by one
+# condition share what their arms need together: the first computes it, the others take it over.
+# The values are the same.
 
 _WORTH = 45.0  # of operations: a costly function and a little of what leads to it
 _SELECTIONS = ("if_else_zero", "select")
@@ -22,16 +132,16 @@ _SELECTIONS = ("if_else_zero", "select")
 
 @dataclass(frozen=True)
 class Arm:
-    """What an arm of a selection needs alone.
+    """Nodes that only one arm of a selection needs.
 
     Parameters
     ----------
     nodes
-        What is computed in it, in order.
+        Nodes computed in it, in order.
     kept
         Those of them that a later selection by the same condition takes over.
     taken
-        What it takes over from earlier ones.
+        Nodes taken over from earlier arms.
     """
 
     nodes: tuple[Node, ...] = ()
@@ -45,7 +155,7 @@ Arms = tuple[Arm, Arm]
 def branched(
     graph: Graph, order: Sequence[Node], kept: Collection[Node]
 ) -> tuple[list[Node], dict[Node, Arms]]:
-    """Take out of an order what the arms of its selections alone need.
+    """Remove from an order the nodes that only arms of its selections need.
 
     Parameters
     ----------
@@ -140,7 +250,7 @@ def _arm(graph: Graph, selection: Node, place: int) -> Node | None:
 
 
 def _needs(graph: Graph, end: Node | None, cone: Collection[Node]) -> set[Node]:
-    """Return what of a cone a value needs."""
+    """Return the nodes of a cone that a value needs."""
     needs: set[Node] = set()
     stack = [] if end is None else [end]
     while stack:
@@ -182,7 +292,7 @@ def _cone(
     users: Mapping[Node, Sequence[Node]],
     kept: Collection[Node],
 ) -> set[Node]:
-    """Return what one arm of selections needs and nothing else does."""
+    """Return the nodes that only one arm of selections needs."""
     ends: dict[Node, set[Node]] = {}
     for selection in selections:
         arm = _arm(graph, selection, place)
@@ -219,7 +329,7 @@ def branch(
     return [*declared, f"if ({test}) {{", *texts[0], "} else {", *texts[1], "}"]
 
 
-# --- What follows from ramps alone is kept for as long as these stand still
+# --- Values that follow from ramps alone are kept while the ramps are constant
 # A ramp is a linear function of states between two limits, such as the share of a road's second
 # surface over the place. All but a short while it stands at a limit, and what follows from it and
 # from parameters, a peak of adhesion with its logarithm for one, need not be computed again. The
@@ -255,7 +365,7 @@ def remembered(
     states: Collection[Node],
     level: Levels,
 ) -> tuple[list[Node], tuple[Remembered, ...], list[Node]]:
-    """Return what is worth remembering of a substep, what that follows from, and all else.
+    """Split a substep: values worth remembering, their inputs, and the rest.
 
     Parameters
     ----------
@@ -268,7 +378,7 @@ def remembered(
     states
         Nodes that are there already, and linear in states.
     level
-        Tells how often a node changes, see ``stages.LEVEL``.
+        How often each node changes, see ``stages.LEVEL``.
 
     Returns
     -------
@@ -349,7 +459,7 @@ def _read_outside(
 
 
 def declarations(groups: Sequence[Remembered], name: Namer) -> list[str]:
-    """Return the declarations of what is remembered, unknown so far."""
+    """Return the declarations of remembered values, unknown at first."""
     lines = []
     for k, group in enumerate(groups):
         lines.append(f"uint64_t known{k} = 0;")

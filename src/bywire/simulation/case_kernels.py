@@ -14,16 +14,13 @@ import numpy as np
 from bywire.core.errors import unknown_name
 from bywire.core.typing import Array
 from bywire.core.workers import worker_count
-from bywire.simulation.compiler import IN_TURN, VECTOR, Compiler, find_compiler, load_library
+from bywire.simulation.compiler import IN_TURN, VECTOR, Compiler, find_compiler, load, load_library
 from bywire.simulation.engine import CUDA, Prepared, built_once, engine_names
-from bywire.simulation.kernel_cache import load
-from bywire.simulation.layout import Layout
 from bywire.simulation.native import Ends, plan_array, pointer, run_in_calls
-from bywire.simulation.schedule import Schedule
+from bywire.simulation.schedule import Layout, Schedule
 
 if TYPE_CHECKING:
-    from bywire.simulation.cuda_device import CudaDevice
-    from bywire.simulation.cuda_kernel import CudaKernel
+    from bywire.simulation.cuda import CudaDevice, CudaKernel
     from bywire.simulation.program import Program
 
 PAIRED = 32
@@ -47,7 +44,7 @@ class CaseKernel(Protocol):
     at_once: int
 
     def rows(self, cases: int, rows: int) -> Array:
-        """Return room for what cases record, shape (cases, rows, signals)."""
+        """Return an array for the recorded rows, shape (cases, rows, signals)."""
         ...
 
     def advance(
@@ -66,7 +63,7 @@ class CaseKernel(Protocol):
 
 
 class LaneKernel:
-    """Compiled kernel for a group of cases, of the signals that are wanted and nothing else.
+    """Compiled kernel for a group of cases and a selection of signals.
 
     ``signals``: how many outputs it records; ``ends``: how many of them, the last ones, at both
     ends of the rows alone.
@@ -100,9 +97,8 @@ class LaneKernel:
         ``in_pairs``: whether there are cases enough for two vectors, should they pay; ``ends``: see
         `LaneKernel`.
         """
-        from bywire.simulation.emission import layout_of
         from bywire.simulation.emit_lanes import emit_lanes, takes_turns
-        from bywire.simulation.stages import build_stages
+        from bywire.simulation.stages import build_stages, layout_of
 
         stages = build_stages(program, outputs=selection)
         in_turn = in_pairs and takes_turns(stages)
@@ -170,7 +166,7 @@ def is_side_by_side(engine: str) -> bool:
     Raises
     ------
     UnknownNameError
-        When there is no such engine.
+        When the engine is unknown.
     """
     if engine not in engine_names():
         raise unknown_name("engine", engine, engine_names())
@@ -192,10 +188,10 @@ def case_kernel(
     Raises
     ------
     DeviceError
-        For ``cuda`` where there is no graphics processor, or no room on it.
+        For ``cuda`` without a graphics processor, or without enough memory on it.
     """
     if engine == CUDA:
-        from bywire.simulation.cuda_device import find_device
+        from bywire.simulation.cuda import find_device
 
         return cuda_kernel(prepared, find_device(), selection).for_cases(count, schedule)
     compiler = find_compiler()
@@ -206,7 +202,7 @@ def case_kernel(
 @built_once
 def cuda_kernel(prepared: Prepared, device: CudaDevice, selection: tuple[int, ...]) -> CudaKernel:
     """Return a graphics processor's kernel that records some outputs, by index; built once."""
-    from bywire.simulation.cuda_kernel import CudaKernel
+    from bywire.simulation.cuda import CudaKernel
     from bywire.simulation.stages import build_stages
 
     return CudaKernel(device, build_stages(prepared.program, outputs=selection))

@@ -1,4 +1,10 @@
-"""The C compiler: found once, run on generated source, results cached by content."""
+"""The C compiler, and the folder of compiled kernels: only the user may write there.
+
+A file is run only if it, its folder and every folder above belong to the user or to root, and
+nobody else may write to them; of the folders above, one like ``/tmp`` will do, where others cannot
+replace what is not theirs. Digests tell damage, not intent: who can write a library can write its
+digest. On Windows rights are not modes, and the user's folders are taken as they are.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +13,198 @@ import ctypes
 import hashlib
 import os
 import platform
+import stat
+import struct
 import subprocess
+import sys
+import warnings
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from platformdirs import user_cache_path
+
 from bywire.core.child_process import find_program, module_command, run_program
 from bywire.core.errors import CompilerError
-from bywire.core.scratch import process_folder, scratch_folder
-from bywire.simulation.kernel_cache import digest_of, is_intact, load, sha256, usable_folder
+from bywire.core.scratch import process_folder, replacing, scratch_folder
+
+if sys.platform != "win32":
+    import grp
+    import pwd
+
+
+def cache_folder() -> Path:
+    """Return the folder of compiled kernels (``BYWIRE_CACHE`` moves it)."""
+    moved = os.environ.get("BYWIRE_CACHE")
+    return Path(moved) if moved else user_cache_path("bywire", "bywire") / "kernels"
+
+
+def usable_folder() -> Path:
+    """Return a folder for kernels that exists, can be written, and is the user's alone.
+
+    The cache folder, else a fresh temporary one for this process.
+
+    Raises
+    ------
+    CompilerError
+        When ``BYWIRE_CACHE`` names a folder that others may write to, or a relative one.
+    """
+    folder = cache_folder()
+    if not folder.is_absolute():  # in whatever folder one works, somebody else's perhaps
+        if "BYWIRE_CACHE" in os.environ:
+            raise CompilerError(
+                f"BYWIRE_CACHE = {folder} is relative, so that kernels of the working folder would "
+                f"run: name an absolute folder, such as {folder.absolute()}, or unset it",
+                name="BYWIRE_CACHE",
+                value=str(folder),
+                valid="an absolute folder",
+            )
+        return process_folder()
+    try:
+        for each in reversed((folder, *folder.parents)):  # each, or those above get other rights
+            each.mkdir(mode=0o700, exist_ok=True)
+        with scratch_folder(folder):
+            pass
+    except OSError:
+        return process_folder()
+    place = open_to_others(folder)
+    if not place:
+        return folder
+    advice = f"{place} is not yours alone, and others could put code there"
+    if "BYWIRE_CACHE" in os.environ:
+        raise CompilerError(
+            f"BYWIRE_CACHE = {folder}: {advice}: name a new folder within a folder that only you "
+            "can write to, or unset it",
+            name="BYWIRE_CACHE",
+            value=str(folder),
+        )
+    _warn_once(f"compiled kernels are not kept: {advice}: set BYWIRE_CACHE to a folder of yours")
+    return process_folder()
+
+
+@cache
+def _warn_once(text: str) -> None:
+    warnings.warn(text, stacklevel=3)
+
+
+def open_to_others(path: Path) -> str:
+    """Return what others may write to of a file or folder and the folders above; else nothing.
+
+    Raises
+    ------
+    OSError
+        When it is not there.
+    """
+    if sys.platform == "win32":
+        return ""
+    resolved = path.resolve(strict=True)
+    is_folder = resolved.is_dir()
+    for steps, each in enumerate((resolved, *resolved.parents)):
+        status = each.stat(follow_symlinks=False)
+        is_above = steps > (0 if is_folder else 1)
+        if status.st_uid not in (os.getuid(), 0) or not _is_closed(status, is_above):
+            return str(each)
+    return ""
+
+
+def _is_closed(status: os.stat_result, is_above: bool) -> bool:
+    """Return whether only its owner may write to a file or folder."""
+    by_others = status.st_mode & stat.S_IWOTH
+    by_group = status.st_mode & stat.S_IWGRP and not _is_private(status.st_gid)
+    return not (by_others or by_group) or bool(is_above and status.st_mode & stat.S_ISVTX)
+
+
+def _is_private(group: int) -> bool:
+    """Return whether a group is a user's own, as many systems make one for each."""
+    if sys.platform == "win32":
+        return True
+    try:
+        entry, user = grp.getgrgid(group), pwd.getpwuid(os.getuid())
+    except KeyError:
+        return False
+    is_personal = user.pw_gid == group and entry.gr_name == user.pw_name
+    return is_personal and set(entry.gr_mem) <= {user.pw_name}
+
+
+def keep_text(path: Path, text: str) -> None:
+    """Write a file of the folder completely or not at all."""
+    with contextlib.suppress(OSError), replacing(path) as fresh:
+        fresh.write_text(text, encoding="utf-8")
+
+
+def is_intact(library: Path, entry: str) -> bool:
+    """Return whether a library is the user's, has a function, and is what its digest was made of.
+
+    Parameters
+    ----------
+    entry
+        Name of the function; any library will do without.
+    """
+    try:
+        content = _content(library)
+        digest = _content(digest_of(library)).decode()
+    except (OSError, ValueError):  # missing, of somebody else, or no text at all
+        return False
+    is_same = hashlib.sha256(content).hexdigest() == digest
+    return is_same and _is_whole(content) and f"{entry}\0".encode() in content
+
+
+def digest_of(library: Path) -> Path:
+    """Return the file with the digest of a library."""
+    return library.with_suffix(".sha256")
+
+
+def _content(path: Path) -> bytes:
+    """Return the bytes of a file that only the user could have written."""
+    place = open_to_others(path)
+    if place:
+        raise PermissionError(place)
+    return path.read_bytes()
+
+
+def _is_whole(content: bytes) -> bool:
+    """Return whether a library is as long as its header says: the system would crash on others."""
+    if content[:4] != b"\x7fELF":
+        return len(content) > 4  # of another system
+    if len(content) < 64 or content[4] != 2:
+        return False
+    (table,) = struct.unpack_from("=Q", content, 40)
+    size, count = struct.unpack_from("=HH", content, 58)
+    return bool(table) and len(content) >= table + size * count
+
+
+def load(library: Path, entry: str) -> ctypes.CDLL:
+    """Load a library; whose it is, is looked at once more.
+
+    Nobody but the user and root can then put another in its place in between.
+
+    Raises
+    ------
+    CompilerError
+        When it is not the user's alone, or cannot be loaded.
+    """
+    try:
+        place = open_to_others(library)
+        if place:
+            raise CompilerError(
+                f"{library} is not loaded: {place} is not yours alone, and others could put code "
+                "there: set BYWIRE_CACHE to a new folder within a folder that only you can write "
+                "to",
+                name=str(library),
+            )
+        loaded = ctypes.CDLL(str(library.resolve(strict=True)))
+        getattr(loaded, entry)
+    except (OSError, AttributeError) as error:
+        raise CompilerError(f"{library} cannot be loaded ({error}): delete it") from None
+    return loaded
+
+
+def sha256(path: Path) -> str:
+    """Return the digest of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+# --- The compiler
 
 # Kernels compare and select all the time: without these, maxima become branches. A compiler that
 # fuses a product and a sum where it sees fit rounds a case in lanes otherwise than alone, and on
@@ -58,14 +247,14 @@ _OTHERWISE = (
 
 @dataclass(frozen=True)
 class Compiler:
-    """How to call a C compiler.
+    """C compiler and how to call it.
 
     Parameters
     ----------
     command
         Program and leading arguments.
     label
-        What messages and recordings call it, with its version.
+        Name in messages and recordings, with its version.
     quick
         Whether it takes half the time for kernels that give the same digits by GCC and run a
         tenth slower.
@@ -99,8 +288,11 @@ def find_compiler() -> Compiler | None:
         if program := find_program(wanted):
             return _labeled((program,), is_quick)
         raise CompilerError(
-            f"BYWIRE_CC = {wanted!r} names no program: "
-            "unset it, or set it to a C compiler or 'none'"
+            f"BYWIRE_CC = {wanted!r} is not a program: "
+            "unset it, or set it to a C compiler or 'none'",
+            name="BYWIRE_CC",
+            value=wanted,
+            valid="a C compiler or 'none'",
         )
     commands: list[tuple[str, ...]] = [
         (path,) for name in ("cc", "gcc", "clang") if (path := find_program(name))
@@ -128,7 +320,12 @@ def _is_quick() -> bool:
     """
     quick = os.environ.get("BYWIRE_CC_QUICK") or "0"
     if quick not in ("0", "1"):
-        raise CompilerError(f"BYWIRE_CC_QUICK = {quick!r} is not valid: set it to 0 or 1")
+        raise CompilerError(
+            f"BYWIRE_CC_QUICK = {quick!r} is not valid: it must be 0 or 1",
+            name="BYWIRE_CC_QUICK",
+            value=quick,
+            valid="0 or 1",
+        )
     return quick == "1"
 
 
@@ -137,13 +334,13 @@ def _labeled(command: tuple[str, ...], is_quick: bool) -> Compiler:
         done = run_program([*command, "--version"], 60.0)
     except (OSError, subprocess.TimeoutExpired) as error:
         reason = getattr(error, "strerror", None) or "it took longer than 60 s"
-        what = f"the C compiler {command[0]} does not start ({reason})"
-        raise CompilerError(f"{what}: {_OTHERWISE}") from None
+        text = f"the C compiler {command[0]} does not start ({reason}): {_OTHERWISE}"
+        raise CompilerError(text, name=command[0]) from None
     if done.returncode != 0:
-        what = f"the C compiler {command[0]} does not tell its version"
-        raise CompilerError(f"{what}: {_OTHERWISE}")
+        text = f"the C compiler {command[0]} does not report its version: {_OTHERWISE}"
+        raise CompilerError(text, name=command[0])
     first = (done.stdout.splitlines() or [Path(command[0]).name])[0].strip()
-    # Said in the label, by which kept kernels and recordings tell compilers apart.
+    # Part of the label, which identifies the compiler in kept kernels and recordings.
     return Compiler(command, f"{first}, quick" if is_quick else first, is_quick)
 
 
@@ -238,7 +435,7 @@ def _compiled_into(library: Path, source: str, flags: tuple[str, ...], compiler:
 
 @cache
 def processor() -> str:
-    """Return what tells processors of different abilities apart that share a cache folder."""
+    """Return a digest of the processor's features, for machines that share a cache folder."""
     try:
         with Path("/proc/cpuinfo").open() as lines:  # of which there are many where cores are
             return next(line for line in lines if line.startswith(("flags", "Features"))).rstrip()
@@ -260,5 +457,5 @@ def _compile(compiler: Compiler, flags: tuple[str, ...], source: Path, target: P
     if done.returncode != 0 or not target.exists():
         message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
         raise CompilerError(
-            f"{compiler.label} refused a generated kernel:\n{message}\n{_OTHERWISE}"
+            f"{compiler.label} rejected a generated kernel:\n{message}\n{_OTHERWISE}"
         )

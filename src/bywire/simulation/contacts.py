@@ -88,7 +88,7 @@ def _largest(cases: list[tuple[Any, Any]]) -> Any:
 
 
 def contact_forces(model: Model, par: ParameterSet, x: Any) -> Any:
-    """Return the forces of all contacts at an instant: what is recorded, not what acts in a step.
+    """Return the forces of all contacts at an instant, which are recorded.
 
     Those of a substep belong to its middle; recorded as they are, they would be half a substep old.
     """
@@ -149,7 +149,9 @@ def overlaps(model: Model, par: ParameterSet) -> Callable[[Any, Any], Any]:
     groups = model.gap(symbol_tuple(model.State, state), symbol_tuple(model.State, fixed), par)
     gap = column([d for group in groups for d in group])
     if any(nonlinear(gap, state)):
-        raise SolverError(f"{model.name}: the overlaps of contacts must be affine in the state")
+        raise SolverError(
+            f"{model.name}: the overlaps of contacts must be affine in the state", name="gap"
+        )
     slope = ca.jacobian(gap, state)
     rest = ca.substitute(gap, state, SX.zeros(n))
 
@@ -161,7 +163,7 @@ def overlaps(model: Model, par: ParameterSet) -> Callable[[Any, Any], Any]:
 
 
 def violations(model: Model, par: ParameterSet, d: Any, F: Any, exact: bool) -> list[Any]:
-    """Return what is positive where a contact set does not fit the midpoint that came out.
+    """Return values that are positive where a contact set contradicts the computed midpoint.
 
     Forces of the assumed set that push, and overlaps outside it that they close, are the solution:
     there is only one. Cheaper than to choose the set once more.
@@ -222,7 +224,7 @@ def _stiffness(C: Any) -> Any:
 def unresolved(
     opened: NDArray[np.float64], closed: Sequence[NDArray[np.float64]], step: float
 ) -> list[str]:
-    """Return what is wrong with a step for the closed contacts of each case; empty for nothing.
+    """Return a warning on the step for the closed contacts of each case; empty without one.
 
     Parameters
     ----------

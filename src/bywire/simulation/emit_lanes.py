@@ -9,8 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
+from bywire.simulation.branches import modes
 from bywire.simulation.c_runtime import LANES
-from bywire.simulation.emission import (
+from bywire.simulation.emit_rare import most_tries, rare_roots, rare_substep
+from bywire.simulation.expressions import VECTOR_C, as_number, condition, needed
+from bywire.simulation.graph import Node
+from bywire.simulation.schedule import Layout
+from bywire.simulation.stages import (
+    STATE,
+    Stages,
     branching_statements,
     indented,
     layout_of,
@@ -20,12 +27,6 @@ from bywire.simulation.emission import (
     statements,
     unread,
 )
-from bywire.simulation.emit_rare import most_tries, rare_roots, rare_substep
-from bywire.simulation.expressions import VECTOR_C, as_number, condition, needed
-from bywire.simulation.graph import Node
-from bywire.simulation.layout import Layout
-from bywire.simulation.modes import modes
-from bywire.simulation.stages import STATE, Stages
 
 
 class Lanes:
@@ -95,28 +96,28 @@ class Lanes:
         return as_number(self.graph, node, self.name, VECTOR_C)
 
     def once(self) -> list[str]:
-        """Return the statements of what depends on parameters alone."""
+        """Return the statements for values that depend on parameters alone."""
         ticks = [n for task in self.stages.ticks for n in task]
         roots = [*self.pass_roots, *self.coefficients, *ticks, *self.stages.output]
         order = needed(self.graph, roots, lambda _: False)
         return self.lines([n for n in order if self.level[n] == 0])
 
     def framed(self) -> list[str]:
-        """Return the statements of what changes with the ticks."""
+        """Return the statements for values that change with the ticks."""
         roots = [*self.pass_roots, *self.coefficients]
         order = needed(self.graph, roots, lambda n: self.level[n] == 0)
         own = frozenset(self.mode.values)
         return self.lines([n for n in order if self.level[n] == 1 and n not in own])
 
     def mode_state(self) -> list[str]:
-        """Return the declarations of what changes with the mode alone, and of the mode."""
+        """Return the declarations of values that change with the mode alone, and of the mode."""
         if not self.mode.atoms:
             return []
         values = [f"V {self.name(n)} = SET(0.0);" for n in self.mode.values]
         return [*values, *(f"B b{n} = (B){{0}};" for n in self.mode.atoms), "int fresh = 1;"]
 
     def judged(self) -> list[str]:
-        """Return the statements of what tells whether one pass serves a substep.
+        """Return the statements that decide whether one pass suffices for a substep.
 
         What hangs on the mode is renewed with it.
         """

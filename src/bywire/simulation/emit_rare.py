@@ -1,4 +1,4 @@
-"""C text of what is rare: a substep that one ordinary pass does not serve.
+"""C text of rare substeps, for which one ordinary pass does not suffice.
 
 Its functions stand alone and compute for any length of a step what does not follow from
 parameters alone. A substep in which a velocity with dry friction changes its sign is cut where
@@ -11,13 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from bywire.simulation.emission import indented, leaf_namer, statements
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph, Node
-from bywire.simulation.layout import ATTEMPTS, CAP, CLOSE, EDGE, NEAR, STILL, most_cuts
 from bywire.simulation.quadrature import Levels
+from bywire.simulation.schedule import ATTEMPTS, CAP, CLOSE, EDGE, NEAR, STILL, most_cuts
 from bywire.simulation.set_valued import FITTING, NEVER, NOTHING, RESIDUAL
-from bywire.simulation.stages import STATE, Stages
+from bywire.simulation.stages import STATE, Stages, indented, leaf_namer, statements
 
 # The same as ``set_valued.project_exact``, which says why, in a loop: that is a tenth of the code.
 PROJECTION = """

@@ -10,16 +10,24 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from bywire.simulation.branches import (
+    Modes,
     Remembered,
     branch,
     branched,
     declarations,
+    modes,
     remembered,
     renewal,
 )
 from bywire.simulation.c_runtime import SCALAR
-from bywire.simulation.emission import (
+from bywire.simulation.emit_rare import most_tries, rare_substep
+from bywire.simulation.expressions import Namer, as_number, condition, needed
+from bywire.simulation.graph import Graph, Node
+from bywire.simulation.schedule import Layout
+from bywire.simulation.stages import (
     PLAN,
+    STATE,
+    Stages,
     branching_statements,
     indented,
     layout_of,
@@ -29,12 +37,6 @@ from bywire.simulation.emission import (
     statements,
     unread,
 )
-from bywire.simulation.emit_rare import most_tries, rare_substep
-from bywire.simulation.expressions import Namer, as_number, condition, needed
-from bywire.simulation.graph import Graph, Node
-from bywire.simulation.layout import Layout
-from bywire.simulation.modes import Modes, modes
-from bywire.simulation.stages import STATE, Stages
 
 SIGNATURE = """{} bw_run(const double *restrict p, double h, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
@@ -222,7 +224,7 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
 
 
 def _mode_state(mode: Modes, name: Namer) -> list[str]:
-    """Return the declarations of what changes with the mode alone, and of the mode: unknown."""
+    """Return the declarations of values that change with the mode alone, and of an unknown mode."""
     if not mode.atoms:
         return []
     return [*(f"double {name(n)} = 0.0;" for n in mode.values), "uint64_t mode = 0, fresh = 1;"]

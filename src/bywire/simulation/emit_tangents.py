@@ -11,12 +11,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bywire.simulation.c_runtime import SCALAR
-from bywire.simulation.emission import PLAN, indented, layout_of, leaf_count, leaf_namer, statements
 from bywire.simulation.emit_rare import most_tries, rare_substep
 from bywire.simulation.expressions import PLAIN_C, Dialect, as_number, needed
 from bywire.simulation.graph import Node
-from bywire.simulation.layout import Layout
-from bywire.simulation.stages import SEEDS, STATE, Stages
+from bywire.simulation.schedule import Layout
+from bywire.simulation.stages import (
+    PLAN,
+    SEEDS,
+    STATE,
+    Stages,
+    indented,
+    layout_of,
+    leaf_count,
+    leaf_namer,
+    statements,
+)
 
 _LOCATED = """
 // What a part of length t gives, and its tangents along parameters, start and length, in lanes.
@@ -137,7 +146,7 @@ static APART void exact_tangents(int lanes, const double *restrict p, double h,
 
 
 def located_statements(layout: Layout) -> list[str]:
-    """Return the statements that repeat or cut a substep and take over what comes out."""
+    """Return the statements that repeat or cut a substep and take over the result."""
     nx, nm, q, m = (layout.length["x"], layout.length["m"], layout.start["q"], layout.start["m"])
     names = [f"{kind}{k}" for kind in STATE for k in range(layout.length[kind])]
     return [

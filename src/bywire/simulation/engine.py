@@ -34,10 +34,18 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
 from bywire.core.sources import source_state
-from bywire.simulation.compiler import Compiler, find_compiler, processor
-from bywire.simulation.kernel_cache import is_intact, keep_text, load, sha256, usable_folder
-from bywire.simulation.layout import Layout
+from bywire.simulation.compiler import (
+    Compiler,
+    find_compiler,
+    is_intact,
+    keep_text,
+    load,
+    processor,
+    sha256,
+    usable_folder,
+)
 from bywire.simulation.native import Request, SingleKernel, text_digest
+from bywire.simulation.schedule import Layout
 from bywire.simulation.virtual_machine import VirtualMachine
 
 if TYPE_CHECKING:
@@ -54,7 +62,7 @@ class Keepable(Protocol):
 
 
 class Identity(int):
-    """The address of an object: it tells structures apart in this process, and in no other."""
+    """Address of an object, which distinguishes structures within this process."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +95,7 @@ class KeptKernel:
 
 @dataclass(frozen=True)
 class Place:
-    """Where the kernel of a structure is kept, and for which state of the files.
+    """File of a structure's kept kernel, and the state of the sources for which it is valid.
 
     Parameters
     ----------
@@ -106,7 +114,7 @@ class Place:
         return Place(self.file.with_name(f"lanes-{name}.json"), self.state)
 
     def kept(self) -> KeptKernel | None:
-        """Return what is kept there; None where there is nothing, or it is stale or damaged."""
+        """Return the kept content; None if it is missing, stale or damaged."""
         try:
             digest, _, text = self.file.read_text(encoding="utf-8").partition("\n")
             if digest != _digest(text):
@@ -241,12 +249,12 @@ def built_once(build: Callable[_P, _T]) -> Callable[_P, _T]:
 
 
 def engine_names() -> tuple[str, ...]:
-    """Return what may compute a run: ours, then what rooms above declare."""
+    """Return the names of all engines: those of the simulation, then declared ones."""
     return ("auto", "compiled", "virtual-machine", CUDA, *declared_engines())
 
 
 class Engine(Protocol):
-    """What advances a run."""
+    """Engine that advances a run."""
 
     label: str
     layout: Layout
@@ -360,7 +368,7 @@ class Prepared:
 
     def _build(self, kind: str) -> Engine:
         if kind == CUDA:
-            from bywire.simulation.cuda_kernel import CudaEngine
+            from bywire.simulation.cuda import CudaEngine
 
             return CudaEngine(self.program)
         compiler = None if kind == "virtual-machine" else find_compiler()
@@ -371,8 +379,11 @@ class Prepared:
             return engine
         if kind == "compiled" or make is not None:
             raise CompilerError(
-                "there is no C compiler: install one, or the extra bywire[compiler], or take "
-                "engine = 'auto'"
+                "there is no C compiler: install one, or the extra bywire[compiler], or use "
+                "engine = 'auto'",
+                name="engine",
+                value=kind,
+                valid="auto",
             )
         if kind == "auto":
             _warn_once()
@@ -393,7 +404,7 @@ _PREPARED: dict[tuple[object, ...], Prepared] = {}
 
 
 def prepare(model: Model, par: ParameterSet) -> Prepared:
-    """Return what is built for a model of this structure; the numbers of ``par`` do not matter."""
+    """Return program and kernels for a model's structure; numbers in ``par`` do not matter."""
     key = structure_of(model, par)
     with _LOCK:
         if key not in _PREPARED:
@@ -402,7 +413,7 @@ def prepare(model: Model, par: ParameterSet) -> Prepared:
 
 
 def structure_of(model: Model, par: ParameterSet) -> tuple[object, ...]:
-    """Return what tells models of different structure apart: type, own fields, choices."""
+    """Return the key of a model's structure: type, own fields, choices."""
     return (*_makeup(model), type(par), _in_order(tuple(par.choices().items())))
 
 
@@ -416,7 +427,7 @@ def are_alike(model: Model, par: ParameterSet, like: Model, like_par: ParameterS
 
 
 def _makeup(model: Model) -> tuple[object, ...]:
-    """Return the type of a model and what tells its own values apart."""
+    """Return the type of a model and the key of its own values."""
     fields = sorted(getattr(model, "__dict__", {}).items())
     return (type(model), tuple((name, _fingerprint(value)) for name, value in fields))
 
@@ -427,7 +438,7 @@ def _in_order(choices: tuple[tuple[str, Any], ...]) -> tuple[tuple[str, str], ..
 
 
 def _fingerprint(value: object) -> object:
-    """Return what tells a model's own values apart: contents, else the object itself."""
+    """Return the key of a model's own value: its contents, else its identity."""
     if isinstance(value, np.ndarray):
         return (value.shape, value.dtype.str, value.tobytes())
     if isinstance(value, (str, int, float, bool, type(None))):

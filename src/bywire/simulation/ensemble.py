@@ -1,24 +1,348 @@
-"""Ensembles: many cases of one model, in lanes on all cores, or on a graphics processor."""
+"""Many cases of one model, side by side in lanes on all cores, or on a graphics processor.
+
+An ensemble varies parameters of one run. Here every run has initial values and a stimulus of its
+own as well, as the cases of a bench have whose equilibrium or set point follows what is varied.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from itertools import pairwise
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, not_valid, unknown_name
 from bywire.core.interrupts import thread_pool
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, leaf_table
 from bywire.core.typing import Array
-from bywire.simulation.advance import require_finite, require_unchanged
-from bywire.simulation.case_kernels import case_kernel, is_side_by_side
-from bywire.simulation.engine import prepare
-from bywire.simulation.layout import COUNTERS
-from bywire.simulation.run import Run, initial_vector, sampled_stimulus, selected, simulate
+from bywire.simulation.advance import (
+    energies,
+    pieces,
+    put_in_signals,
+    require_finite,
+    require_unchanged,
+    require_work,
+    work_of,
+)
+from bywire.simulation.case_kernels import CaseKernel, case_kernel, is_side_by_side
+from bywire.simulation.engine import CUDA, are_alike, prepare
+from bywire.simulation.native import Ends
+from bywire.simulation.run import (
+    Run,
+    Trajectory,
+    initial_vector,
+    initial_vectors,
+    put_into,
+    sampled_stimulus,
+    selected,
+    simulate,
+    stimulus_ranges,
+)
+from bywire.simulation.schedule import COUNTERS, Schedule
+
+# Pieces of a run, between which progress and interrupts are handled: their largest number, and
+# their least number of substeps. A piece costs as much as a hundred substeps.
+_CHUNKS, _SUBSTEPS = 20, 20_000
+
+
+def fit_lanes(runs: Sequence[Run], engine: str = "auto") -> bool:
+    """Return whether runs can be computed side by side: a compiler, one structure, one plan.
+
+    ``engine``: see `bywire.simulation.ensemble.simulate_ensemble`.
+    """
+    if not is_side_by_side(engine) or not runs:
+        return False
+    first, schedule = runs[0], runs[0].schedule()
+    return all(
+        are_alike(each.model, each.par, first.model, first.par) and each.schedule() == schedule
+        for run in runs
+        for each in (run, *(replace(run, par=change.par, changes=()) for change in run.changes))
+    )
+
+
+@dataclass(frozen=True)
+class RunGroup(Sequence[Trajectory]):
+    """Trajectories of runs side by side, kept together.
+
+    Parameters
+    ----------
+    runs
+        The runs.
+    time
+        Times of the rows [s], shape (rows,).
+    values
+        Signals, each of all runs in one piece, shape (signals, runs, rows). Where runs have changes
+        and the stored energy is recorded, the last one is the work of the changes.
+    names
+        Signals, in the order of the first axis.
+    vectors
+        State vectors at the end, shape (entries, runs).
+    kernel
+        Kernel that computed them.
+    ends, end_names
+        Signals of which the first and the last row alone were recorded, shape (signals, runs, 2).
+    """
+
+    runs: tuple[Run, ...]
+    time: Array
+    values: Array
+    names: tuple[str, ...]
+    vectors: Array
+    kernel: CaseKernel
+    ends: Array
+    end_names: tuple[str, ...] = ()
+
+    @property
+    def unsettled(self) -> NDArray[np.int64]:
+        """Substeps of each run that hit the cap of the contact iteration, shape (runs,)."""
+        return np.asarray(self.vectors[self.kernel.layout.start["counters"]], dtype=np.int64)
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    @overload
+    def __getitem__(self, k: int) -> Trajectory: ...
+
+    @overload
+    def __getitem__(self, k: slice) -> tuple[Trajectory, ...]: ...
+
+    def __getitem__(self, k: int | slice) -> Trajectory | tuple[Trajectory, ...]:
+        if isinstance(k, slice):
+            return tuple(self)[k]
+        layout, schedule, vector = self.kernel.layout, self.runs[k].schedule(), self.vectors[:, k]
+        unsettled, repeated = (int(n) for n in vector[layout.start["counters"] :][:2])
+        return Trajectory(
+            run=self.runs[k],
+            time=self.time,
+            values=self.values[:, k].T,
+            names=self.names,
+            status="unsettled" if unsettled else "done",
+            unsettled=unsettled,
+            repeated=repeated,
+            work=float(work_of(schedule, layout, schedule.frames, vector)),
+            engine=self.kernel.label,
+            vector=vector.copy(),
+        )
+
+
+def simulate_group(
+    runs: Sequence[Run],
+    signals: Sequence[str] | None = None,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    first: int = 0,
+    engine: str = "auto",
+    ends: Sequence[str] = (),
+) -> RunGroup:
+    """Compute runs that `fit_lanes`, each with its parameters, initial values and stimulus.
+
+    Parameters
+    ----------
+    runs
+        Runs of one model, of one duration, step, recording interval and set of sample times.
+    signals
+        Outputs to record; all by default.
+    threads
+        Threads to use, >= 1; all cores by default.
+    progress
+        Called with the finished share, 0 to 1, now and then.
+    first
+        Rows at the beginning that are not recorded, for instance those of a settling time.
+    engine
+        ``auto`` and ``compiled``: in lanes, ``cuda``: on a graphics processor.
+    ends
+        Further outputs, of which the first and the last of the rows recorded are wanted alone; of
+        runs without changes, in lanes.
+
+    Raises
+    ------
+    ParameterError
+        When the runs do not fit, or a stimulus is not finite.
+    UnknownNameError
+        When a signal is unknown.
+    SolverError
+        When a trajectory leaves the numbers.
+    WorkLimitError
+        When a run takes more work than it may.
+    DeviceError
+        For ``cuda`` without a graphics processor, or without enough memory on it.
+    """
+    if threads is not None and threads < 1:
+        raise not_valid("threads", str(threads), ">= 1")
+    if not fit_lanes(runs, engine):
+        raise ParameterError(
+            "these runs cannot be computed side by side: they need a C compiler and the same "
+            "model, structure, duration, step, recording interval and sample times"
+        )
+    prepared = prepare(runs[0].model, runs[0].par)
+    names = tuple(prepared.outputs)
+    wanted = names if signals is None else tuple(signals)
+    if ends and (engine == CUDA or any(run.changes for run in runs)):
+        raise ParameterError(
+            "runs with changes or on a graphics processor record all rows: leave ends out",
+            name="ends",
+        )
+    selection = tuple(selected(names, (*wanted, *ends)).tolist())
+    schedule = runs[0].schedule()
+    kernel = case_kernel(prepared, engine, selection, len(runs), schedule, len(ends))
+    edges = _edges(schedule, first, runs)
+    output = runs[0].model.Output
+    jumping = energies(output, wanted) if any(run.changes for run in runs) else np.empty((0, 0))
+    watch = _Watch(-(-len(runs) // kernel.lanes) * (len(edges) - 1), progress)
+    recorded = (*wanted, *put_in_signals(output)) if jumping.any() else wanted
+    values = np.zeros((len(recorded), len(runs), schedule.rows - first))
+    at_ends = np.zeros((len(ends), len(runs), 2))
+    frames = (first * schedule.record_frames, (schedule.rows - 1) * schedule.record_frames)
+
+    def computed(begin: int) -> Array:
+        cases = slice(begin, begin + kernel.lanes)
+        carried = _Carried(kernel, schedule, runs[cases], jumping)
+        apart = Ends(at_ends[:, cases], frames) if ends else None
+        return carried.to_the_end(values[:, cases], edges, first, watch, apart)
+
+    with thread_pool(threads or kernel.at_once) as pool:
+        vectors = list(pool.map(computed, range(0, len(runs), kernel.lanes)))
+    vector = np.concatenate(vectors, axis=1)[:, : len(runs)]
+    return RunGroup(
+        tuple(runs),
+        schedule.record_times[first:],
+        values,
+        recorded,
+        vector,
+        kernel,
+        at_ends,
+        tuple(ends),
+    )
+
+
+def _edges(schedule: Schedule, first: int, runs: Sequence[Run]) -> list[int]:
+    """Return the frames at which pieces of a run begin and end.
+
+    One is the first row recorded, others are where a run has changes.
+    """
+    every = schedule.record_frames
+    count = min(_CHUNKS, schedule.frames * schedule.substeps // _SUBSTEPS + 1)
+    rows = {*np.linspace(0, schedule.frames // every, count + 1).astype(int).tolist(), first}
+    changed = (pieces(run.par, run.changes, schedule) for run in runs if run.changes)
+    begins = {begin for stretches in changed for begin, _, _ in stretches}
+    return sorted(begins.union(each * every for each in rows))
+
+
+class _Watch:
+    """Progress of several threads."""
+
+    def __init__(self, pieces: int, progress: Callable[[float], None] | None) -> None:
+        self._pieces, self._done = pieces, 0
+        self._progress, self._lock = progress, threading.Lock()
+
+    def piece(self) -> None:
+        with self._lock:
+            self._done += 1
+            if self._progress is not None:
+                self._progress(self._done / self._pieces)
+
+
+def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
+    """Return the rows of the stimuli of runs, shape (rows, nu, width); (rows, nu) of equal ones."""
+    t = schedule.stimulus_times
+    signals = np.zeros((width, len(group[0].model.Stimulus._fields), t.size))  # each in one piece
+    for lane, run in enumerate(group):
+        put_into(signals[lane].T, run, t)
+    signals[len(group) :] = signals[len(group) - 1]
+    is_usual = np.isfinite(signals).all() and all(
+        (signals[:, k] >= low).all() and (signals[:, k] <= high).all()
+        for k, low, high in stimulus_ranges(group[0].model)
+    )
+    if not is_usual:
+        for run in group:
+            sampled_stimulus(run, schedule)  # says which and when
+    is_shared = all(np.array_equal(signals[0], other) for other in signals[1:])
+    return (signals[0].T if is_shared else signals.transpose(2, 1, 0)).copy()
+
+
+class _Carried:
+    """Runs that are carried on side by side.
+
+    ``jumping``: energies among the signals that jump at changes, by balance; see `energies`.
+    """
+
+    def __init__(
+        self, kernel: CaseKernel, schedule: Schedule, group: Sequence[Run], jumping: Array
+    ) -> None:
+        self._kernel, self._schedule, self._jumping = kernel, schedule, jumping
+        self._books = len(jumping) if jumping.any() else 0
+        self._count, width = len(group), kernel.lanes
+        filled = [*group, *[group[-1]] * (width - len(group))]  # idle lanes repeat the last
+        states, memories = [run.state for run in filled], [run.memory for run in filled]
+        self._vector = initial_vectors(kernel.layout, states, memories).T.copy()
+        self._parameters = leaf_table([run.par for run in filled]).T.copy()
+        self._changes: dict[int, list[tuple[int, ParameterSet]]] = {}
+        for lane, run in enumerate(filled):
+            for begin, _, par in pieces(run.par, run.changes, schedule) if run.changes else ():
+                self._changes.setdefault(begin, []).append((lane, par))
+        self._stimulus = _stimuli(group, schedule, width)
+        self._most = np.array([run.most_work for run in filled])
+
+    def to_the_end(
+        self, values: Array, edges: Sequence[int], skipped: int, watch: _Watch, ends: Ends | None
+    ) -> Array:
+        """Carry the runs on to their end; fill ``values``, return the state vectors."""
+        schedule, every = self._schedule, self._schedule.record_frames
+        silent = replace(schedule, record_frames=schedule.frames + 1)  # but for the first row
+        for begin, end in pairwise(edges):
+            first = -(-begin // every) - skipped
+            self._change(begin, values[:, :, max(first, 0) :])
+            last = (schedule.rows if end == schedule.frames else -(-end // every)) - skipped
+            signals = values.shape[0] - self._books
+            if first >= 0:
+                rows = values[:signals, :, first : max(last, first + 1)].transpose(1, 2, 0)
+                self._advance(schedule, rows, begin, end, ends)
+            else:
+                rows = np.empty((self._count, 1, signals))
+                self._advance(silent, rows, begin, end)
+            require_finite(
+                self._kernel.layout,
+                self._vector,
+                f"one of {self._count} runs left the numbers before t = {end * schedule.frame:g} s",
+            )
+            require_work(work_of(schedule, self._kernel.layout, end, self._vector), self._most)
+            watch.piece()
+        return self._vector
+
+    def _change(self, begin: int, rows: Array) -> None:
+        """Set the parameters from a frame on, and record the work of the change."""
+        here = self._changes.get(begin, ())
+        if not here:
+            return
+        before = self._energies(rows) if self._books and begin else None
+        for lane, par in here:
+            self._parameters[:, lane] = list(par.leaves().values())
+        if before is not None:
+            rows[-self._books :] += (self._energies(rows) - before)[:, : self._count, None]
+
+    def _energies(self, rows: Array) -> Array:
+        """Return the total energy of each balance in every lane [J], shape (balances, lanes)."""
+        end, kept = self._schedule.frames, self._vector
+        row = np.empty((self._kernel.lanes, 1, rows.shape[0] - self._books))
+        self._vector = kept.copy()
+        self._advance(self._schedule, row, end, end)
+        self._vector = kept
+        return np.array([row[:, 0, book > 0].sum(axis=-1) for book in self._jumping])
+
+    def _advance(
+        self, plan: Schedule, rows: Array, begin: int, end: int, ends: Ends | None = None
+    ) -> None:
+        self._kernel.advance(
+            plan, self._parameters, self._stimulus, self._vector, rows, end, begin, ends
+        )
+
+
+# --- One run for many values of its parameters
 
 Variations = Mapping[str, Array | Sequence[float]]
 
@@ -44,7 +368,11 @@ def case_matrix(run: Run, variations: Variations) -> Array:
             raise unknown_name("parameter", name, names)
     lengths = {name: array.size for name, array in arrays.items()}
     if not arrays or len(set(lengths.values())) != 1 or 0 in lengths.values():
-        raise ParameterError(f"variations must have one length >= 1 each, got {lengths}")
+        raise ParameterError(
+            f"variations must all have the same length >= 1, got {lengths}",
+            name="variations",
+            value=str(lengths),
+        )
     count = next(iter(lengths.values()))
     matrix = np.repeat(np.array(list(run.par.leaves().values()))[:, None], count, axis=1)
     for name, array in arrays.items():
@@ -63,7 +391,9 @@ def _check_extremes(run: Run, name: str, array: Array) -> None:
     for value in values:
         changed = run.par.replace({name: value})
         if [task.period for task in run.model.tasks(changed)] != periods:
-            raise ParameterError(f"{name} is a sample time and cannot vary within an ensemble")
+            raise ParameterError(
+                f"{name} is a sample time, which cannot vary within an ensemble", name=name
+            )
 
 
 def _check_group(par: ParameterSet, group: str, arrays: Mapping[str, Array], count: int) -> None:
@@ -78,7 +408,7 @@ def _check_group(par: ParameterSet, group: str, arrays: Mapping[str, Array], cou
         try:
             node.replace({name: float(values[k]) for name, values in varied.items()})
         except ParameterError as error:
-            raise ParameterError(f"case {k}: {error}") from None
+            raise error.reworded(f"case {k}: {error}") from None
 
 
 def _has_rules(cls: type[ParameterSet]) -> bool:
@@ -94,7 +424,7 @@ def _has_rules(cls: type[ParameterSet]) -> bool:
 
 @dataclass(frozen=True)
 class Ensemble:
-    """What an ensemble gave.
+    """Results of an ensemble.
 
     Parameters
     ----------
@@ -159,11 +489,11 @@ def simulate_ensemble(
     CompilerError
         For ``compiled`` without a compiler.
     DeviceError
-        For ``cuda`` where there is no graphics processor, or no room on it.
+        For ``cuda`` without a graphics processor, or without enough memory on it.
     """
     prepared = prepare(run.model, run.par)
     if threads is not None and threads < 1:
-        raise ParameterError(f"threads = {threads} is not valid: it must be >= 1")
+        raise not_valid("threads", str(threads), ">= 1")
     matrix = case_matrix(run, variations)
     if not is_side_by_side(engine):
         return _one_by_one(run, variations, tuple(signals), engine)

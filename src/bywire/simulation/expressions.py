@@ -18,7 +18,7 @@ EXPONENT_RANGE = 708.0  # by which the exponential's argument may lie below zero
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a kind of C writes what is not arithmetic.
+    """Dialect of C for operations that are not arithmetic.
 
     Parameters
     ----------

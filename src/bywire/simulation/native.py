@@ -1,4 +1,4 @@
-"""Compiled kernels: emitted, compiled, loaded, called through raw pointers."""
+"""Compiled kernels and CasADi functions, called through raw pointers and buffers."""
 
 from __future__ import annotations
 
@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 
 from bywire.core.interrupts import raise_if_stopped
 from bywire.core.typing import Array
-from bywire.simulation.compiler import SINGLE, Compiler, load_library
-from bywire.simulation.kernel_cache import load
-from bywire.simulation.layout import Layout
-from bywire.simulation.schedule import Schedule
+from bywire.simulation.compiler import SINGLE, Compiler, load, load_library
+from bywire.simulation.schedule import Layout, Schedule
 
 if TYPE_CHECKING:
     from bywire.simulation.program import Program
@@ -31,7 +29,7 @@ _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.S)
 
 @dataclass(frozen=True)
 class Request:
-    """What a kernel works on, as contiguous arrays.
+    """Inputs of a kernel, as contiguous arrays.
 
     Parameters
     ----------
@@ -51,7 +49,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Ends:
-    """Where the signals recorded at both ends of the rows alone go.
+    """Destination of the signals that are recorded in the first and last rows alone.
 
     Parameters
     ----------
@@ -90,7 +88,7 @@ def run_in_calls(
     call: Callable[[int, int, int], int],
     most: int = CHUNK,
 ) -> None:
-    """Run frames begin..end in calls of a kernel between which an interrupt is heeded.
+    """Run frames begin..end in calls of a kernel, with a check for interrupts between them.
 
     Parameters
     ----------
@@ -122,7 +120,7 @@ def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
 
 
 def text_digest(text: str) -> str:
-    """Digest of a kernel's C: what it computes, without comments."""
+    """Digest of a kernel's C without comments."""
     return hashlib.sha256(_COMMENT.sub("", text).encode()).hexdigest()
 
 
@@ -142,9 +140,8 @@ class SingleKernel:
     @classmethod
     def of(cls, program: Program, compiler: Compiler) -> SingleKernel:
         """Emit the kernel of a program, and compile it unless the cache has it."""
-        from bywire.simulation.emission import layout_of
         from bywire.simulation.emit_single import emit_single
-        from bywire.simulation.stages import build_stages
+        from bywire.simulation.stages import build_stages, layout_of
 
         stages = build_stages(program)
         text = emit_single(stages)
@@ -177,3 +174,32 @@ class SingleKernel:
             )
 
         run_in_calls(request.schedule, begin, end, call)
+
+
+# --- CasADi functions
+
+
+class BufferedCall:
+    """A function that is called many times, by one caller at a time.
+
+    Parameters
+    ----------
+    function
+        CasADi function, of dense arguments and results.
+    """
+
+    def __init__(self, function: Any) -> None:
+        self._buffer, self._trigger = function.buffer()
+        self._inputs = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
+        self._outputs = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
+        for k, array in enumerate(self._inputs):
+            self._buffer.set_arg(k, memoryview(array.data))
+        for k, array in enumerate(self._outputs):
+            self._buffer.set_res(k, memoryview(array.data))
+
+    def __call__(self, *arguments: Array) -> list[Array]:
+        """Return the results, column by column; the next call overwrites them."""
+        for own, given in zip(self._inputs, arguments, strict=True):
+            own[:] = given
+        self._trigger()
+        return self._outputs

@@ -1,4 +1,4 @@
-"""All symbolic functions of a model: what kernels are emitted from and the machine evaluates."""
+"""Symbolic functions of a model: source of the kernels, and evaluated by the virtual machine."""
 
 from __future__ import annotations
 
@@ -27,15 +27,16 @@ def check_model(model: Model, par: ParameterSet) -> None:
     Raises
     ------
     ModelError
-        Naming the model, the part, and what is wanted.
+        Naming the model, the part, and what is valid.
     """
     for part in ("State", "Memory", "Stimulus", "Flow", "Output"):
         _annotated(model, part)
     require_states(model)
     if not model.tasks(par):
         raise ModelError(
-            f"{model.name}: tasks returns none, but one task must sample the stimulus, if only "
-            "to hold it: Task('source', period, lambda x, m, u, par: Memory(...))"
+            f"{model.name}: tasks returns none, but at least one task must sample the stimulus: "
+            "Task('source', period, lambda x, m, u, par: Memory(...))",
+            name="tasks",
         )
     if isinstance(model, Assembly):
         check_wiring(model, par)
@@ -63,7 +64,10 @@ def _check_equations(model: Model, par: ParameterSet) -> None:
     if [len(g) for g in gaps] != sizes:
         raise ModelError(
             f"{model.name}: gap has groups of {[len(g) for g in gaps]} overlaps, compliance of "
-            f"{sizes}: they must match"
+            f"{sizes}: they must match",
+            name="gap",
+            value=str([len(g) for g in gaps]),
+            valid=str(sizes),
         )
     bounds = _evaluated(model, "bounds", x, x, m, symbolic, contact)
     _sized(model, "bounds", bounds, len(model.frictions), "one (low, high) per friction")
@@ -81,7 +85,8 @@ def _evaluated(model: Model, part: str, *arguments: Any) -> Any:
         reason = str(error).splitlines()[-1] if str(error) else type(error).__name__
         raise ModelError(
             f"{model.name}: {part} cannot be evaluated on symbols ({reason}): use core.ops for "
-            "functions and core.ops.where instead of if, math and numpy"
+            "functions and core.ops.where instead of if, math and numpy",
+            name=part,
         ) from error
 
 
@@ -100,7 +105,11 @@ def _sized(model: Model, part: str, value: Any, wanted: int, meaning: str) -> No
     length = value.shape[0] if isinstance(value, ca.SX) else len(value) if value is not None else -1
     if length != wanted:
         raise ModelError(
-            f"{model.name}: {part} returns {max(length, 0)} values, wanted are {wanted} ({meaning})"
+            f"{model.name}: {part} returns {max(length, 0)} values: it must return {wanted} "
+            f"({meaning})",
+            name=part,
+            value=str(max(length, 0)),
+            valid=str(wanted),
         )
 
 
@@ -166,7 +175,7 @@ class Program:
 
     @property
     def rows(self) -> int:
-        """How many set-valued forces an exact pass has: frictions, then one-sided limits."""
+        """Number of set-valued forces in an exact pass: frictions, then one-sided limits."""
         return len(self.model.frictions) + len(self.model.limits)
 
     @property
@@ -183,7 +192,7 @@ def build_program(model: Model, par: ParameterSet) -> Program:
     model
         The system.
     par
-        Any parameter set of the wanted structure: its numbers are not used, they become
+        Any parameter set of the structure: its numbers are not used, they become
         arguments.
     """
     check_model(model, par)
@@ -259,7 +268,7 @@ def _pass_function(name: str, s: Symbols, result: Pass, further: Sequence[Any] =
 
 
 def _halves(s: Symbols, exact: Pass) -> tuple[Any, Any]:
-    """Return what comes before the set-valued forces are found, and what after."""
+    """Return the functions before and after the solution of the set-valued forces."""
     problem = exact.problem
     assert problem is not None
     found = problem.solution

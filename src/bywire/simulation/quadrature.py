@@ -33,7 +33,7 @@ class Quadrature:
     combinations: list[list[tuple[Node, int]]]
 
     def of(self, wanted: Sequence[bool]) -> Quadrature:
-        """Return what the wanted integrals take; the others stay as they are."""
+        """Return the nodes that the given integrals need; others stay unchanged."""
         chosen = [
             pairs if is_wanted else []
             for pairs, is_wanted in zip(self.combinations, wanted, strict=True)
@@ -57,7 +57,7 @@ def factored(
     computed
         Nodes that the substep computes anyhow: such a sum is not multiplied out.
     level
-        Tells how often a node changes, see ``stages.LEVEL``.
+        How often each node changes, see ``stages.LEVEL``.
     """
     expansion = _Expansion(graph, computed, level)
     products: list[Node] = []
@@ -120,7 +120,7 @@ def _summed(graph: Graph, terms: Terms) -> Node:
 
 
 class Levels:
-    """How often the nodes of a growing graph change."""
+    """Levels of change of the nodes in a growing graph."""
 
     def __init__(self, graph: Graph, of_leaf: dict[str, int]) -> None:
         self._graph, self._of_leaf = graph, of_leaf
@@ -178,7 +178,7 @@ class _Expansion:
         return {node: self._one}
 
     def _separated(self, product: Node) -> Terms:
-        """Return a product as what changes rarely times the rest."""
+        """Return a product as its rarely changing factors times the rest."""
         graph, coefficient, rest = self._graph, self._one, self._one
         stack = [product]
         while stack:

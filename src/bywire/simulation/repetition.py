@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import ParameterError, StepError
+from bywire.core.errors import StepError, not_valid
 from bywire.core.interrupts import thread_pool
 from bywire.core.typing import Array, Complex
 from bywire.core.workers import worker_count
@@ -18,10 +18,9 @@ from bywire.simulation.advance import require_finite
 from bywire.simulation.case_kernels import lane_kernel
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.engine import prepare
-from bywire.simulation.layout import Layout
 from bywire.simulation.native import Request
 from bywire.simulation.run import Run, initial_vector, selected
-from bywire.simulation.schedule import Schedule
+from bywire.simulation.schedule import Layout, Schedule
 
 Stimuli = Callable[[NDArray[np.int64], int, int], Array]
 """``stimuli(cases, first, last)``: these rows of some cases, shape (cases, last - first, nu)"""
@@ -54,7 +53,7 @@ def advance_window(
 
 
 def given_rows(stimuli: Array | Stimuli, count: int, schedule: Schedule) -> Stimuli:
-    """Return what gives rows of the stimulus, whether they exist or are made.
+    """Return a function for rows of the stimulus, which exist or are computed.
 
     Raises
     ------
@@ -65,7 +64,7 @@ def given_rows(stimuli: Array | Stimuli, count: int, schedule: Schedule) -> Stim
         return stimuli
     every, rows = stimuli, schedule.frames // schedule.stimulus_frames
     if every.shape[:2] != (count, rows):
-        raise ParameterError(f"stimuli: shape ({count}, {rows}, nu) is wanted, got {every.shape}")
+        raise not_valid("shape of stimuli", str(every.shape), f"({count}, {rows}, nu)")
     return lambda cases, first, last: every[cases, first:last]
 
 
@@ -157,7 +156,7 @@ class Lanes:
 
 
 def _same(before: Complex, now: Complex, tolerance: float) -> bool:
-    """Return whether a window repeats the one before; what does not move at all repeats."""
+    """Return whether a window repeats the previous one; constant signals repeat."""
     return bool(np.linalg.norm(now - before) <= tolerance * np.linalg.norm(now))
 
 
@@ -241,7 +240,7 @@ def repeat(
     Raises
     ------
     StepError
-        When a window holds no whole number of sample times.
+        When a window is not a multiple of the sample times.
     ParameterError
         When the shapes do not fit.
     SolverError
@@ -327,13 +326,16 @@ def window_schedule(run: Run) -> Schedule:
     Raises
     ------
     StepError
-        When the window holds no whole number of sample times and recording intervals.
+        When the window is not a multiple of the sample times and recording intervals.
     """
     schedule = run.schedule()
     common = math.lcm(schedule.record_frames, *schedule.task_frames)
     if schedule.frames % common or abs(schedule.frames * schedule.frame / run.duration - 1) > 1e-9:
         raise StepError(
-            f"a window of {run.duration:g} s holds no whole number of the common interval of all "
-            f"sample times, {common * schedule.frame:g} s: round it to one"
+            f"a window of {run.duration:g} s is not a multiple of the common interval of all "
+            f"sample times, {common * schedule.frame:g} s: round it to a multiple",
+            name="duration",
+            value=f"{run.duration:g} s",
+            valid=f"a multiple of {common * schedule.frame:g} s",
         )
     return schedule

@@ -28,19 +28,17 @@ from bywire.simulation.advance import (
     put_in_signals,
     work_of,
 )
-from bywire.simulation.buffered_call import BufferedCall
 from bywire.simulation.contacts import unresolved
 from bywire.simulation.engine import Engine, prepare
-from bywire.simulation.layout import Layout
-from bywire.simulation.native import Request
-from bywire.simulation.schedule import Schedule, plan
+from bywire.simulation.native import BufferedCall, Request
+from bywire.simulation.schedule import Layout, Schedule, plan
 
 Status = Literal["done", "interrupted", "unsettled"]
 
 
 @dataclass(frozen=True)
 class Run:
-    """What is to be computed.
+    """Run to compute.
 
     Parameters
     ----------
@@ -82,12 +80,12 @@ class Run:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What a run gave.
+    """Trajectory of a run.
 
     Parameters
     ----------
     run
-        What was computed.
+        The run.
     time, values
         Shapes (rows,) and (rows, signals).
     names
@@ -98,7 +96,7 @@ class Trajectory:
     unsettled, repeated
         Substeps that hit the cap, and that took more than one pass.
     work
-        What it took, counted in ordinary substeps: the same on every machine.
+        Computing effort in ordinary substeps, the same on every machine.
     vector
         State vector at the end.
     """
@@ -116,7 +114,7 @@ class Trajectory:
 
     @cached_property
     def doubt(self) -> str:
-        """Why the result may be wrong though every substep settled; empty where there is none."""
+        """Reason why the result may be wrong although every substep settled; empty without one."""
         return doubts_of([self.run])[0]
 
     def __getitem__(self, name: str) -> Array:
@@ -138,7 +136,7 @@ def initial_vectors(layout: Layout, states: Sequence[Any], memories: Sequence[An
 
 
 def request_for(run: Run, signals: Sequence[str] | None = None) -> Request:
-    """Return what a kernel needs to compute a run; all outputs by default."""
+    """Return the request of a run for a kernel; all outputs by default."""
     names = tuple(prepare(run.model, run.par).outputs)
     schedule = run.schedule()
     return Request(
@@ -227,7 +225,7 @@ def _advanced_in_pieces(
     Raises
     ------
     ParameterError
-        When a change alters the sample times or what the model's state consists of.
+        When a change alters the sample times or the model's state variables.
     """
     schedule, books = request.schedule, put_in_signals(run.model.Output)
     put_in = np.zeros((schedule.rows, len(books)))
@@ -238,9 +236,10 @@ def _advanced_in_pieces(
         engine = prepared.engine(kind)
         is_planned = replace(run, par=par, changes=()).schedule() == schedule
         if not is_planned or engine.layout.total != vector.size:
-            what = "what the model's state consists of" if is_planned else "a sample time"
+            what = "the model's state variables" if is_planned else "a sample time"
             raise ParameterError(
-                f"a change during the run alters {what}: only values and laws may change"
+                f"a change during the run alters {what}: only values and laws may change",
+                name="changes",
             )
         here = replace(request, parameters=np.array(list(par.leaves().values())))
         places = energies(run.model.Output, tuple(prepared.outputs))
@@ -299,7 +298,10 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
         row, signal = np.argwhere(~is_finite)[0]
         raise ParameterError(
             f"the stimulus {run.model.Stimulus._fields[signal]} is {rows[row, signal]} at "
-            f"t = {schedule.stimulus_times[row]:g} s: it must be finite all through the run"
+            f"t = {schedule.stimulus_times[row]:g} s: it must be finite throughout the run",
+            name=run.model.Stimulus._fields[signal],
+            value=str(rows[row, signal]),
+            valid="finite",
         )
     for signal, low, high in stimulus_ranges(run.model):
         outside = (rows[:, signal] < low) | (rows[:, signal] > high)
@@ -311,7 +313,10 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
             ends += [f"<= {shown(high, unit)}"] * (high < np.inf)
             raise ParameterError(
                 f"the stimulus {name} is {shown(rows[row, signal], unit)} at "
-                f"t = {schedule.stimulus_times[row]:g} s: it must be {' and '.join(ends)}"
+                f"t = {schedule.stimulus_times[row]:g} s: it must be {' and '.join(ends)}",
+                name=name,
+                value=shown(rows[row, signal], unit),
+                valid=" and ".join(ends),
             )
     return rows
 

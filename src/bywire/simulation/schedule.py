@@ -1,4 +1,4 @@
-"""Steps, sample times and recording intervals: how they divide each other."""
+"""Steps and sample times of a run: how they divide each other; its state vector."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import StepError
+from bywire.core.errors import StepError, not_valid
 
 _TOLERANCE = 1e-9
 _REST = 1e-6  # of a step, that an interval may differ from whole steps
-_MOST = 2**53  # substeps in an interval or a run: beyond, not even a float tells them apart
+_MOST = 2**53  # substeps in an interval or a run: a float cannot count more
 _FRAME = 100_000  # substeps of a frame at most: between two frames a run heeds an interrupt
 _TRIALS = 10_000  # divisors that are tried for one that is short to write
 
@@ -107,9 +107,9 @@ def _planned(
     duration: float, step: float, periods: tuple[tuple[str, float], ...], record: float
 ) -> Schedule:
     if not (math.isfinite(step) and step > 0):
-        raise StepError(f"step = {step:g} s is not valid: it must be > 0 s, usually 20 us")
+        raise not_valid("step", f"{step:g} s", "> 0 s", "usually 20 us", StepError)
     if not (math.isfinite(duration) and duration > 0):
-        raise StepError(f"duration = {duration:g} s is not valid: it must be > 0 s")
+        raise not_valid("duration", f"{duration:g} s", "> 0 s", kind=StepError)
     counts = {name: _whole(period, step, name) for name, period in periods}
     recorded = _whole(record, step, "recording")
     frame = _divided(math.gcd(recorded, *counts.values()))
@@ -134,7 +134,9 @@ def _require_few(name: str, length: float, step: float) -> None:
     if length / step > _MOST:
         raise StepError(
             f"step = {step * 1e6:g} us is too short for the {name} interval of {length:g} s, which "
-            f"would hold more than {_MOST:.2g} steps: take a shorter interval"
+            f"would contain more than {_MOST:.2g} steps: take a shorter interval",
+            name="step",
+            value=f"{step * 1e6:g} us",
         )
 
 
@@ -146,7 +148,10 @@ def _whole(period: float, step: float, name: str) -> int:
     if count < 1 or rest > min(_TOLERANCE * period, rounding):
         raise StepError(
             f"step = {step * 1e6:g} us does not divide the {name} interval of "
-            f"{period * 1e6:.12g} us: take for instance {_divisor(period, step):.16g} us"
+            f"{period * 1e6:.12g} us: take for instance {_divisor(period, step):.16g} us",
+            name="step",
+            value=f"{step * 1e6:g} us",
+            valid=f"{_divisor(period, step):.16g} us",
         )
     return count
 
@@ -168,3 +173,40 @@ def _divisor(period: float, step: float) -> float:
             if whole % each == 0:
                 return each * 1e-3
     return period / least * 1e6
+
+
+# --- The state vector
+
+COUNTERS = 3  # at the end of the state vector, see `Layout`
+CAP = 8  # passes through one substep before it is counted as unsettled
+JUMP, FLAG, DOUBT = 4, 5, 6  # places among the results of a pass, behind x, d, r, q
+# Where a substep is cut: how often the instant is tried, within which share of the substep's change
+# of velocity it counts as met, or as so near that a line leads there, and the least share of a part
+# that is cut off or left.
+ATTEMPTS, CLOSE, NEAR, EDGE = 12, 1e-12, 1e-9, 1e-9
+STILL = 1e-9  # share of its speed below which another velocity counts as zero at the same instant
+
+
+def most_cuts(velocities: int) -> int:
+    """Return into how many parts a substep is cut before it is counted as unsettled.
+
+    Each velocity with dry friction may turn, and turn once more when others have.
+    """
+    return 2 * velocities + 2
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Start of each part of the state vector.
+
+    The vector holds x, d, r, q, the memory m, and the counters: substeps that did not settle,
+    substeps that were repeated, and parts of substeps that were tried for that.
+    """
+
+    start: dict[str, int]
+    length: dict[str, int]
+
+    @property
+    def total(self) -> int:
+        """Length of the state vector."""
+        return self.start["counters"] + COUNTERS

@@ -177,7 +177,7 @@ def eliminate(
     n = A.shape[0]
     entries: Entries = {(i, j): A[i, j] for i in range(n) for j in range(n) if _present(A[i, j])}
     right = dict(right)
-    # The matrix is a diagonal less what rows that are linear have before the states.
+    # The matrix is a diagonal minus the coefficients of the states in linear rows.
     alike = {(i, j) for i, form in right.items() for j in form.coefficients if j != i}
     left = [i for i in range(n) if i not in keep]
     steps = []
@@ -273,7 +273,7 @@ class Pass:
     turn
         Positive where a velocity with dry friction does: where that jumps, the substep is cut.
     problem
-        What is solved outside an exact pass; None in the other.
+        Problem to solve outside an exact pass; None in other passes.
     """
 
     x: Any
@@ -360,7 +360,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
 
 
 def _turn(model: Model, start: Any, end: Any) -> Any:
-    """Return what is positive where a velocity with dry friction changes its sign."""
+    """Return values that are positive where a velocity with dry friction changes its sign."""
     turn = SX(0)
     for name in model.frictions:
         k = _index(model, name)

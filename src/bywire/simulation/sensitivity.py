@@ -16,11 +16,9 @@ from bywire.core.errors import CompilerError, ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite, require_unchanged, work_of
 from bywire.simulation.compiler import VECTOR, Compiler, find_compiler, load_library
-from bywire.simulation.emission import layout_of
 from bywire.simulation.emit_tangents import emit_tangents
 from bywire.simulation.engine import built_once, prepare
 from bywire.simulation.expressions import needed
-from bywire.simulation.layout import Layout
 from bywire.simulation.native import Request, plan_array, pointer, run_in_calls
 from bywire.simulation.program import Program
 from bywire.simulation.run import (
@@ -30,7 +28,8 @@ from bywire.simulation.run import (
     sampled_stimulus,
     selected,
 )
-from bywire.simulation.stages import Stages, build_stages
+from bywire.simulation.schedule import Layout
+from bywire.simulation.stages import Stages, build_stages, layout_of
 
 DIRECTIONS = 8
 _CHUNK = 5_000  # substeps after which a call of the kernel ends
@@ -175,7 +174,7 @@ def simulate_with_sensitivities(
         When there is no compiler.
     """
     if not parameters:
-        raise ParameterError("sensitivities need at least one parameter: name it")
+        raise ParameterError("sensitivities need at least one parameter", name="parameters")
     require_unchanged(run.changes, "sensitivities")
     prepared = prepare(run.model, run.par)
     directions = _directions(run, parameters, prepared.program.parameter_names)
@@ -234,13 +233,16 @@ def simulate_with_sensitivities(
 def _require_shape(name: str, given: Array | None, wanted: tuple[int, int]) -> None:
     if given is not None and np.shape(given) != wanted:
         raise ParameterError(
-            f"{name} has the shape {np.shape(given)}, wanted is {wanted}: rows, parameters"
+            f"{name} has the shape {np.shape(given)}: it must be {wanted}, rows and parameters",
+            name=name,
+            value=str(np.shape(given)),
+            valid=str(wanted),
         )
 
 
 @dataclass(frozen=True)
 class _Directions:
-    """What moves along each direction.
+    """Changes of initial values, parameters and stimuli along each direction.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ class Projection:
 
 @dataclass(frozen=True)
 class Problem:
-    """What set-valued forces of an exact pass must solve, and the symbols of their solution.
+    """Problem of the set-valued forces of an exact pass, and the symbols of its solution.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def soft(z: Any, a: Any, b: Any) -> Any:
 
 
 def sliding(v: Any, low: Any, high: Any) -> Any:
-    """Return the force on what moves: a velocity keeps the sign that it begins a substep with.
+    """Return the force on moving rows: a velocity keeps the sign from the start of the substep.
 
     Where it does not, the substep is cut.
     """
@@ -69,7 +69,7 @@ def sliding(v: Any, low: Any, high: Any) -> Any:
 
 
 def project_fast(S: Any, c: Any, low: Any, high: Any, v: list[Any]) -> Projection:
-    """Solve with everything that rests still at rest, and check that its bounds can hold it.
+    """Solve with all resting rows at rest, and check that their bounds can hold them.
 
     One row is exact. Several take one linear solve, whose matrix changes with what rests alone;
     where a force at rest leaves its bounds, a body breaks away: ``failed``.
@@ -81,7 +81,7 @@ def project_fast(S: Any, c: Any, low: Any, high: Any, v: list[Any]) -> Projectio
     low, high
         Bounds, shape (m,).
     v
-        Velocities at the start of the substep, one per row: what is zero there rests.
+        Velocities at the start of the substep, one per row: rows with zero velocity rest.
     """
     m = c.shape[0]
     if m == 0:

@@ -1,4 +1,4 @@
-"""A program as one expression graph: which node is which result, and when it must be computed.
+"""A program as one expression graph: which node is when computed, and its C text.
 
 A substep is one long chain of dependent operations, and the processor waits for it. Sums and
 products of three and more are therefore rebuilt such that a late operand passes through as few
@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import heapq
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
-from bywire.simulation.expressions import needed
-from bywire.simulation.graph import NOT_NEGATIVE, Graph, Interval, Node, raised
+from bywire.simulation.expressions import COSTLY, PLAIN_C, Dialect, Namer, needed, text
+from bywire.simulation.graph import NOT_NEGATIVE, Graph, Interval, Node, Operation, raised
 from bywire.simulation.program import Program
 from bywire.simulation.quadrature import Levels, Quadrature, collapsed, factored
+from bywire.simulation.schedule import Layout
 
 # Cycles from operands to result, about right for the processors of the last ten years.
 _LATENCY = {"inv": 13, "sqrt": 18, "exp": 40, "sin": 50, "cos": 50, "log": 40, "pow": 80}
@@ -137,7 +138,7 @@ class _Balance:
 
 
 def balanced(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
-    """Return nodes of the same values, in an order of operations that waits less."""
+    """Return nodes with the same values, in an order of operations with less waiting."""
     balance = _Balance(graph, roots, level)
     return [balance.node(root) for root in roots]
 
@@ -147,7 +148,7 @@ def balanced(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
 # When a leaf changes: 0 once a run, 1 once a frame (a tick may change it), 2 every substep.
 LEVEL = {"p": 0, "h": 0, "sp": 0, "su": 0, "m": 1, "sm": 1}
 SEEDS = frozenset({"sp", "su", "sm", "sx", "sd", "sr", "sq", "sh"})
-STATE = ("x", "d", "r", "q")  # what a substep renews, in the order of the state vector
+STATE = ("x", "d", "r", "q")  # renewed in every substep, in the order of the state vector
 
 
 @dataclass(frozen=True)
@@ -344,3 +345,133 @@ def _with_tangents(function: Any, kinds: str, directions: Sequence[int], fixed: 
     point, seed = ca.vertcat(*points), ca.vertcat(*seeds)
     tangents = [ca.densify(ca.jtimes(r, point, seed)) for r in results]
     return ca.Function(f"{function.name()}_t", [*arguments, *extra], tangents)
+
+
+# --- C statements of a stage
+
+# plan: first frame, end frame, whether the end is recorded, substeps a frame, frames a stimulus
+# row, frames a recorded row, first recorded row, recorded signals, frames a tick of each task.
+PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
+  const int64_t stim = plan[4], every = plan[5], row0 = plan[6], chosen = plan[7];"""
+"""C text that reads a run's plan"""
+
+
+def unread(stages: Stages) -> frozenset[str]:
+    """Return the half increments and reactions that no stage reads.
+
+    They need not be kept. Those of velocities with dry friction are read where a substep is cut.
+    """
+    roots = [
+        node for pass_ in (stages.fast, stages.exact) for nodes in pass_.values() for node in nodes
+    ]
+    roots += [node for tick in stages.ticks for node in tick] + stages.output + stages.posed
+    read = stages.graph.read_by(roots)
+    return frozenset(
+        f"{kind}{k}"
+        for kind in ("d", "r")
+        for k in range(len(stages.fast[kind]))
+        if stages.graph.leaf(kind, k) not in read and not (kind == "d" and k in stages.velocities)
+    )
+
+
+def midpoints(graph: Graph, order: Iterable[Node]) -> dict[Node, int]:
+    """Return the nodes that are a state plus its half increment, and which state it is.
+
+    A kernel carries these from substep to substep: the next one begins with them. Half increments
+    alone only cut substeps read.
+    """
+    chosen = {}
+    for node in order:
+        parts = {graph.nodes[a] for a in graph.arguments(node)}
+        for k in {op.args[1] for op in parts if op.op == "leaf" and op.args[0] == "d"}:
+            if graph.nodes[node].op == "add" and Operation("leaf", ("x", k)) in parts:
+                chosen[node] = int(k)
+    return chosen
+
+
+def leaf_count(stages: Stages, kind: str) -> int:
+    """Return how many inputs of a kind there are, for instance ``"u"`` for the stimulus."""
+    return sum(1 for op in stages.graph.nodes if op.op == "leaf" and op.args[0] == kind)
+
+
+def layout_of(stages: Stages) -> Layout:
+    """Return the layout of a model's state vector."""
+    length = {kind: len(stages.fast[kind]) for kind in STATE}
+    length["m"] = len(stages.ticks[0])
+    start, at = {}, 0
+    for kind, count in length.items():
+        start[kind] = at
+        at += count
+    start["counters"] = at
+    return Layout(start, length)
+
+
+def literal(graph: Graph, node: Node) -> str:
+    """Return a constant as C text."""
+    value = str(graph.nodes[node].args[0])
+    return f"({value})" if value.startswith("-") else value
+
+
+def leaf_namer(
+    graph: Graph, leaf: Callable[[str, int], str], other: Namer, constant: str = "{}"
+) -> Namer:
+    """Return the namer that knows constants and leaves and leaves operations to another."""
+
+    def name(node: Node) -> str:
+        operation = graph.nodes[node]
+        if operation.op == "const":
+            return constant.format(literal(graph, node))
+        if operation.op == "leaf":
+            return leaf(*operation.args)
+        return other(node)
+
+    return name
+
+
+def statements(
+    graph: Graph,
+    order: Sequence[Node],
+    name: Namer,
+    declare: str,
+    dialect: Dialect = PLAIN_C,
+) -> list[str]:
+    """Return one declaration per operation; truth values are written where they are used."""
+    return [
+        f"{declare}{name(node)} = {text(graph, node, name, dialect)};"
+        for node in order
+        if not graph.is_boolean(node)
+    ]
+
+
+def branching_statements(
+    graph: Graph,
+    order: Sequence[Node],
+    name: Namer,
+    declare: str,
+    dialect: Dialect = PLAIN_C,
+    later: Iterable[Node] = (),
+) -> list[str]:
+    """Return declarations with costly functions inside the only branch that needs them.
+
+    If the condition fails, the processor skips the function. ``later``: further nodes that read
+    these declarations.
+    """
+    uses = Counter(a for node in (*order, *later) for a in graph.arguments(node))
+    inside = {
+        graph.nodes[node].args[1]
+        for node in order
+        if graph.nodes[node].op == "if_else_zero"
+        and graph.nodes[graph.nodes[node].args[1]].op in COSTLY
+        and uses[graph.nodes[node].args[1]] == 1
+    }
+
+    def inlined(node: Node) -> str:
+        return f"({text(graph, node, inlined, dialect)})" if node in inside else name(node)
+
+    rest = [node for node in order if node not in inside]
+    return statements(graph, rest, inlined, declare, dialect)
+
+
+def indented(lines: Iterable[str], spaces: int) -> str:
+    """Return lines joined with an indentation."""
+    return ("\n" + " " * spaces).join(lines)

@@ -82,7 +82,7 @@ class Stroboscope:
     CompilerError
         When there is no compiler.
     StepError
-        When the period holds no whole number of sample times.
+        When the period is not a multiple of the sample times.
     UnknownNameError
         When a signal is unknown.
     ParameterError
@@ -103,7 +103,9 @@ class Stroboscope:
         if self._kernel.rounds:
             raise ParameterError(
                 "a sampled value is rounded to whole codes, through which derivatives are zero: "
-                "choose the law without rounding (adc.law = 'ideal')"
+                "choose the law without rounding (adc.law = 'ideal')",
+                name="adc.law",
+                valid="'ideal'",
             )
         self._p = np.array(list(run.par.leaves().values()))
         self._layout = self._kernel.layout

@@ -41,7 +41,7 @@ def nonlinear(expression: Any, variables: Any) -> list[bool]:
 
 
 def _jumping(expression: Any, variables: Any) -> set[int]:
-    """Return the variables that an expression jumps with: no derivative of any order tells."""
+    """Return the variables with which an expression jumps, which no derivative shows."""
     known = {each.element_hash() for each in ca.symvar(variables)}
     others = [each for each in ca.symvar(expression) if each.element_hash() not in known]
     function = ca.Function("jumps", [variables, ca.vertcat(*others)], [ca.densify(expression)])

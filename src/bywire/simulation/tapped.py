@@ -87,7 +87,7 @@ class Tapped(Wrapping):
 
     @property
     def Memory(self) -> type[NamedTuple]:
-        """That of the model inside, then what every tap returned last and what is under way."""
+        """Memory of the inner model, then the last values of every tap and delayed values."""
         return _memory(self.inner.Memory, self.inner.State, self.inner.Stimulus, self.taps)
 
     @property

@@ -14,8 +14,8 @@ import numpy as np
 
 from bywire.core.interrupts import raise_if_stopped
 from bywire.core.typing import Array
-from bywire.simulation.buffered_call import BufferedCall
-from bywire.simulation.layout import (
+from bywire.simulation.native import BufferedCall, Request
+from bywire.simulation.schedule import (
     ATTEMPTS,
     CAP,
     CLOSE,
@@ -29,7 +29,6 @@ from bywire.simulation.layout import (
     Layout,
     most_cuts,
 )
-from bywire.simulation.native import Request
 
 if TYPE_CHECKING:
     from bywire.simulation.program import Program

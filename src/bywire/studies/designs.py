@@ -20,8 +20,7 @@ from scipy import special
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.data.file_format import library
-from bywire.studies.distribution import TAIL, Distribution
-from bywire.studies.laws import normal_quantile
+from bywire.studies.distribution import TAIL, Distribution, normal_quantile
 
 SAMPLED = ("monte-carlo", "latin-hypercube", "sobol")
 """designs that draw from the distributions: what they count are probabilities"""

@@ -1,21 +1,207 @@
-"""How a quantity varies: a distribution, or single values such as structural choices.
+"""How a quantity varies: laws by closed forms, as SciPy's, single values, and how files write them.
 
-A range or a tolerance is a distribution as any other; a grid and a worst-case search use its ends.
+``scipy.stats`` takes as long to load as all else of a study, and every process of one would.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
+from bywire.bench.changes import refuse_share_of_temperature, share_of
 from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.core.leaf import Leaf
+from bywire.core.quantities import Unit
 from bywire.core.typing import Array
+from bywire.core.units import difference_unit, parse, shown
+from bywire.core.values import written
+
+
+class Law(Protocol):
+    """A law of probability over the real numbers."""
+
+    def support(self) -> tuple[float, float]:
+        """Return its ends."""
+        ...
+
+    def ppf(self, q: Array) -> Array:
+        """Return the values below which such shares lie, of shares in (0, 1)."""
+        ...
+
+    def cdf(self, x: float) -> float:
+        """Return the probability of what lies below a value."""
+        ...
+
+    def sf(self, x: float) -> float:
+        """Return the probability of what lies above a value."""
+        ...
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Evenly from ``low`` on, over a width."""
+
+    low: float
+    width: float
+
+    def support(self) -> tuple[float, float]:
+        """Return its ends."""
+        return self.low, self.width + self.low
+
+    def ppf(self, q: Array) -> Array:
+        """Return quantiles."""
+        return q * self.width + self.low
+
+    def cdf(self, x: float) -> float:
+        """Return the probability below."""
+        return min(max((x - self.low) / self.width, 0.0), 1.0)
+
+    def sf(self, x: float) -> float:
+        """Return the probability above."""
+        return 1.0 - self.cdf(x)
+
+
+@dataclass(frozen=True)
+class Normal:
+    """The normal one, by mean and standard deviation."""
+
+    mean: float
+    sd: float
+
+    def support(self) -> tuple[float, float]:
+        """Return its ends: none."""
+        return -math.inf, math.inf
+
+    def ppf(self, q: Array) -> Array:
+        """Return quantiles."""
+        return np.asarray(normal_quantile(q) * self.sd + self.mean)
+
+    def cdf(self, x: float) -> float:
+        """Return the probability below."""
+        return float(special.ndtr((x - self.mean) / self.sd))
+
+    def sf(self, x: float) -> float:
+        """Return the probability above."""
+        return float(special.ndtr((self.mean - x) / self.sd))
+
+
+@dataclass(frozen=True)
+class LogNormal:
+    """Of which the logarithm is normal, with standard deviation ``sigma`` around the median's."""
+
+    sigma: float
+    median: float
+
+    def support(self) -> tuple[float, float]:
+        """Return its ends."""
+        return 0.0, math.inf
+
+    def ppf(self, q: Array) -> Array:
+        """Return quantiles."""
+        return np.asarray(np.exp(self.sigma * normal_quantile(q)) * self.median)
+
+    def cdf(self, x: float) -> float:
+        """Return the probability below."""
+        return float(special.ndtr(self._score(x)))
+
+    def sf(self, x: float) -> float:
+        """Return the probability above."""
+        return float(special.ndtr(-self._score(x)))
+
+    def _score(self, x: float) -> float:
+        share = x / self.median
+        return math.log(share) / self.sigma if share > 0.0 else -math.inf
+
+
+@dataclass(frozen=True)
+class Triangular:
+    """Rising to a mode and falling from it; the mode as a share of the width."""
+
+    mode: float
+    low: float
+    width: float
+
+    def support(self) -> tuple[float, float]:
+        """Return its ends."""
+        return self.low, self.width + self.low
+
+    def ppf(self, q: Array) -> Array:
+        """Return quantiles."""
+        c = self.mode
+        shares = np.where(q < c, np.sqrt(c * q), 1 - np.sqrt((1 - c) * (1 - q)))
+        return np.asarray(shares * self.width + self.low)
+
+    def cdf(self, x: float) -> float:
+        """Return the probability below."""
+        at, c = min(max((x - self.low) / self.width, 0.0), 1.0), self.mode
+        return at * at / c if at < c else 1.0 - (1.0 - at) ** 2 / (1.0 - c) if c < 1.0 else at * at
+
+    def sf(self, x: float) -> float:
+        """Return the probability above."""
+        return 1.0 - self.cdf(x)
+
+
+def truncated_normal(low: float, high: float, mean: float, sd: float) -> Law:
+    """Return the normal law of what lies between two scores; SciPy's, for its tails' digits."""
+    from scipy import stats
+
+    law: Law = stats.truncnorm(low, high, mean, sd)
+    return law
+
+
+def normal_quantile(share: Any) -> Any:
+    """Return the standard normal score below which a share lies."""
+    return special.ndtri(share)
+
+
+def binomial_ranks(count: int, probability: float, beyond: float) -> tuple[int, int]:
+    """Return the ends of how often something comes, with a share beyond either of them.
+
+    Parameters
+    ----------
+    count, probability
+        Trials, and how probable it is in each.
+    beyond
+        Share, above 0 and below 1/2.
+
+    Returns
+    -------
+    tuple
+        The least number that no more come with at least this probability, and the least one that
+        more come with at most this probability.
+    """
+    low = _least(lambda k: special.bdtr(k, count, probability) >= beyond, count)
+    high = _least(lambda k: special.bdtrc(k, count, probability) <= beyond, count)
+    return low, high
+
+
+def _least(is_enough: Any, count: int) -> int:
+    """Return the least number for which something holds that holds for all above it."""
+    below, above = -1, count
+    while above - below > 1:
+        middle = (below + above) // 2
+        below, above = (below, middle) if is_enough(middle) else (middle, above)
+    return above
+
+
+def ranked(values: Array) -> Array:
+    """Return the ranks of values from 1 on, that of equal ones their mean."""
+    _, place, times = np.unique(values, return_inverse=True, return_counts=True)
+    last = np.cumsum(times)
+    return np.asarray((last - 0.5 * (times - 1))[place])
+
+
+# --- Distributions
+# A range or a tolerance is a distribution as any other; a grid and a worst-case search use its
+# ends.
 
 NEVER = 1e-9
 """probability that counts as none: of values that the model would not admit"""
@@ -235,3 +421,373 @@ def weights_of(where: str, section: Mapping[str, Any], count: int) -> Array:
         )
     shares = weights / weights.max()  # whose sum is finite
     return np.asarray(shares / shares.sum())
+
+
+# --- Distributions as study files write them: a tolerance, or a section with ``kind``
+
+_NEXT = {
+    "tolerance": "take a narrower tolerance, or kind 'uniform' with ends within it",
+    "uniform": "give 'low' and 'high' within it",
+    "normal": "truncate it, with 'low' or 'high' within it",
+    "log-normal": "take another 'median', or a smaller 'sd'",
+    "triangular": "give 'low', 'mode' and 'high' within it",
+}
+"""what helps, by the kind of a distribution"""
+_ROUNDING = 1e-12  # share of a range by which an end may miss a limit that it was meant to be at
+
+
+def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Distribution:
+    """Return a distribution that stays within the admissible range of its number.
+
+    An end that rounding put beside a limit is at the limit. Where a distribution is truncated at a
+    limit that is itself not admissible (``> 0``), it ends there but as one without an end: designs
+    that go to the ends stop within it.
+
+    Parameters
+    ----------
+    where
+        What errors call it, for instance ``"[vary] motor.R_m"``.
+    made, leaf
+        How it varies, and what is known about it.
+    advice
+        What to do about a distribution that does not; by default what its kind has for that.
+
+    Raises
+    ------
+    ParameterError
+        With what is admissible, and the probability of what is not, or the end that is not.
+    """
+    if made.singles:
+        _require_singles(where, made.singles, leaf)
+        return made
+    assert made.below is not None
+    assert made.above is not None
+    wanted, advice = leaf.range_text, advice or _NEXT[made.kind]
+    beyond = made.below(leaf.low) + made.above(leaf.high)
+    if beyond > NEVER:
+        often = f", with a probability of {beyond:.2g}" if beyond < 1.0 else ""
+        raise ParameterError(
+            f"{where}: {made.text} leaves the valid range, {wanted}{often}: {advice}"
+        )
+    low, high = (_at_limit(end, leaf, made.high - made.low) for end in (made.low, made.high))
+    if made.kind == "normal":
+        low = -math.inf if leaf.low_open and low == leaf.low else low
+        high = math.inf if leaf.high_open and high == leaf.high else high
+    for end in (low, high):
+        if math.isfinite(end) and not leaf.admits(end):
+            raise ParameterError(
+                f"{where}: {made.text}: its end at {shown(end, leaf.unit.symbol)} is not "
+                f"valid: it must be {wanted}; {advice}"
+            )
+    return replace(made, low=low, high=high)
+
+
+def _require_single_values(where: str, kind: str, leaf: Leaf, nominal: float) -> None:
+    """Refuse a distribution of a whole number that has any value between its ends.
+
+    Parameters
+    ----------
+    where, kind
+        What errors call it, and the kind of its distribution.
+    leaf, nominal
+        What is known about it, and what the bench has.
+
+    Raises
+    ------
+    ParameterError
+        With single values that it may have.
+    """
+    if not leaf.is_whole or kind == DISCRETE:
+        return
+    near = [x for x in (nominal - 1.0, nominal, nominal + 1.0) if leaf.admits(x)]
+    raise ParameterError(
+        f"{where} is a whole number, {leaf.range_text}, and kind {kind!r} has values in between: "
+        f"vary it by kind = '{DISCRETE}', values = [{', '.join(f'{x:g}' for x in near)}] for "
+        "instance"
+    )
+
+
+def whole(where: str, values: Sequence[float], leaf: Leaf) -> list[float]:
+    """Return single values; of a whole number without the last digit that a share leaves.
+
+    Raises
+    ------
+    ParameterError
+        For those of a whole number that are not whole.
+    """
+    if not leaf.is_whole:
+        return list(values)
+    for value in values:
+        if not math.isfinite(value) or abs(value - round(value)) > _ROUNDING * abs(value):
+            raise ParameterError(
+                f"{where}.values: {value:.10g} is not valid: it must be a whole number, "
+                f"{leaf.range_text}"
+            )
+    return [float(round(value)) for value in values]
+
+
+def require_following(where: str, made: Distribution, leaf: Leaf, unit: Unit, ratio: float) -> None:
+    """Refuse a distribution that takes what keeps its ratio to it out of the range of that.
+
+    Parameters
+    ----------
+    where
+        What errors call what follows.
+    made, unit
+        How the other one varies, and its unit.
+    leaf
+        What is known about the one that follows.
+    ratio
+        Its value over that of the other in the bench, not zero.
+
+    Raises
+    ------
+    ParameterError
+        As `admitted`, in the unit of the other one.
+    """
+    low, high = (leaf.low, leaf.low_open), (leaf.high, leaf.high_open)
+    low, high = (low, high) if ratio > 0.0 else (high, low)
+    admitted(where, made, Leaf(leaf.name, unit, low[0] / ratio, high[0] / ratio, low[1], high[1]))
+
+
+def _require_singles(where: str, values: Sequence[float], leaf: Leaf) -> None:
+    beyond = [value for value in values if not leaf.admits(value)]
+    if beyond:
+        texts = [", ".join(shown(x, leaf.unit.symbol) for x in each) for each in (values, beyond)]
+        raise ParameterError(
+            f"{where}: one of {texts[0]} leaves the valid range, {leaf.range_text}: leave out "
+            f"{texts[1]}"
+        )
+
+
+def _at_limit(end: float, leaf: Leaf, width: float) -> float:
+    """Return an end, or the limit that it misses by rounding alone."""
+    limits = [limit for limit in (leaf.low, leaf.high) if math.isfinite(limit)]
+    room = _ROUNDING * width if math.isfinite(width) else 0.0
+    return next((limit for limit in limits if abs(end - limit) <= room), end)
+
+
+# --- Distributions of numbers
+
+_TOLERANCE = re.compile(r"\s*(?:\+-|\+/-|±)\s*(\S.*)")
+
+
+def read_distribution(
+    name: str, entry: Any, leaf: Leaf, nominal: float, title: str = "[vary]", advice: str = ""
+) -> Distribution:
+    """Return how a number varies.
+
+    Parameters
+    ----------
+    name
+        Dotted name of the parameter or option.
+    entry
+        What the study file says: a tolerance as text, ``"+-5 %"``, or a section with ``kind``.
+    leaf
+        Unit and admissible range of the number.
+    nominal
+        Its value in the bench [SI]: shares are of it.
+    title
+        Section of the file that says so, for errors.
+    advice
+        What to do about a distribution that leaves the admissible range; by default what its kind
+        has for that.
+
+    Raises
+    ------
+    InputError
+        For entries that cannot be read, contradict themselves, or leave the admissible range.
+    """
+    tolerance = _TOLERANCE.fullmatch(entry) if isinstance(entry, str) else None
+    if tolerance is not None:
+        entry = {"kind": "tolerance", "tolerance": tolerance[1]}
+    if not isinstance(entry, Mapping):
+        raise ParameterError(
+            f"{title} {name} = {quoted(entry)}: write a tolerance such as '+-5 %', or a section "
+            "such as { kind = 'normal', sd = '5 %' }"
+        )
+    if "kind" not in entry:
+        raise _without_kind(f"{title} {name}", entry, leaf)
+    kind = entry["kind"]
+    if not isinstance(kind, str) or kind not in _KINDS:
+        raise unknown_name(f"kind of {title} {name}", choice_text(kind), _KINDS)
+    _require_single_values(f"{title} {name}", kind, leaf, nominal)
+    known, make = _KINDS[kind]
+    for key in entry.keys() - {"kind", "together"}:
+        if key not in known:
+            raise unknown_name(f"key of {title} {name} (kind {kind})", key, known)
+    made = make(_Entry(f"{title} {name}", entry, leaf, nominal))
+    first, *_, last = made.levels(2)
+    if not made.singles and not first < last:
+        raise ParameterError(
+            f"{title} {name}: {made.text}: it is no wider than the last digit of a number, and "
+            "nothing varies: give it a larger width"
+        )
+    return admitted(f"{title} {name}", made, leaf, advice)
+
+
+def _without_kind(where: str, entry: Mapping[str, Any], leaf: Leaf) -> ParameterError:
+    """Return the error of a section that does not say what kind of distribution it is."""
+    given = entry.keys() - {"together"}
+    near = [kind for kind, (keys, _) in _KINDS.items() if given and given <= {*keys}]
+    near = [DISCRETE] if leaf.is_whole else near
+    which = " or ".join(map(repr, near or _KINDS))
+    others = f" (there are {', '.join(_KINDS)})" if near else ""
+    return ParameterError(f"{where} = {quoted(entry)}: kind is missing: add kind = {which}{others}")
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A section of ``[vary]`` with what its texts are read by; ``where``: what errors call it."""
+
+    where: str
+    section: Mapping[str, Any]
+    leaf: Leaf
+    nominal: float
+
+    def level(self, key: str, default: float | None = None) -> float:
+        """Return a value [SI]; a share with a sign, ``+10 %``, is a change of the nominal one."""
+        if key not in self.section and default is not None:
+            return default
+        text = self._given(key)
+        share = share_of(text)
+        if share is None:
+            return self._number(key, text)
+        self._refuse_share(key, text)
+        return (1.0 + share) * self.nominal
+
+    def width(self, key: str, of: float) -> float:
+        """Return a width [SI] > 0; a share is of another value."""
+        text = self._given(key)
+        if isinstance(text, str) and text.strip().endswith("%"):
+            self._refuse_share(key, text)
+            width = abs(of) * parse(text, "1", f"{self.where}.{key}")
+        else:
+            width = self._number(key, text, difference_unit(self.leaf.unit.symbol))
+        if not width > 0.0 or not math.isfinite(width):
+            raise ParameterError(
+                f"{self.where}.{key} = {quoted(text)}: a width > 0 is wanted"
+                + ("; a share of 0 is none: give an amount" if not of else "")
+            )
+        return width
+
+    def amount(self, value: float) -> str:
+        """Return a value with its unit."""
+        return shown(value, self.leaf.unit.symbol)
+
+    def _refuse_share(self, key: str, text: str) -> None:
+        refuse_share_of_temperature(f"{self.where}.{key}", text, self.leaf.unit.symbol)
+
+    def _given(self, key: str) -> Any:
+        if key not in self.section:
+            raise ParameterError(f"{self.where} of kind {self.section['kind']} needs {key!r}")
+        return self.section[key]
+
+    def breadth(self, value: float) -> str:
+        """Return a width with its unit."""
+        return shown(value, difference_unit(self.leaf.unit.symbol))
+
+    def _number(self, key: str, value: Any, symbol: str = "") -> float:
+        unit = self.leaf.unit
+        where = f"{self.where}.{key}"
+        return float(written(value, symbol or unit.symbol, where, unit.nominal))
+
+    def refused(self, why: str) -> ParameterError:
+        """Return the error of a section that contradicts itself."""
+        return ParameterError(f"{self.where} (kind {self.section['kind']}): {why}")
+
+
+def _frozen(
+    entry: _Entry, law: Law, text: str, low: float = -math.inf, high: float = math.inf
+) -> Distribution:
+    """Return a distribution by its law; that of a tail has no end, wherever its law ends."""
+    return Distribution(str(entry.section["kind"]), text, law.ppf, low, high, law.cdf, law.sf)
+
+
+def _uniform(entry: _Entry) -> Distribution:
+    low, high = entry.level("low"), entry.level("high")
+    if not low < high:
+        raise entry.refused(f"low = {entry.amount(low)} must be below high = {entry.amount(high)}")
+    text = f"uniform, {entry.amount(low)} to {entry.amount(high)}"
+    return _frozen(entry, Uniform(low, high - low), text, low, high)
+
+
+def _tolerance(entry: _Entry) -> Distribution:
+    width = entry.width("tolerance", entry.nominal)
+    low, high = entry.nominal - width, entry.nominal + width
+    shape = entry.section.get("shape", "uniform")
+    text = f"{entry.amount(entry.nominal)} +- {entry.breadth(width)}"
+    if shape == "uniform":
+        return _frozen(entry, Uniform(low, high - low), f"{text}, uniform", low, high)
+    if shape != "normal":
+        raise unknown_name(f"shape of {entry.where}", str(shape), ("uniform", "normal"))
+    law = truncated_normal(-3.0, 3.0, entry.nominal, width / 3.0)
+    return _frozen(entry, law, f"{text}, normal with 3 sd at the ends", low, high)
+
+
+def _normal(entry: _Entry) -> Distribution:
+    mean = entry.level("mean", entry.nominal)
+    sd = entry.width("sd", mean)
+    text = f"normal, mean {entry.amount(mean)}, sd {entry.breadth(sd)}"
+    low = entry.level("low", -math.inf)
+    high = entry.level("high", math.inf)
+    if math.isinf(low) and math.isinf(high):
+        return _frozen(entry, Normal(mean, sd), text)
+    if not low < high:
+        raise entry.refused(f"low = {entry.amount(low)} must be below high = {entry.amount(high)}")
+    law = Normal(mean, sd)  # the difference of the smaller ones, for their digits
+    kept = law.sf(low) - law.sf(high) if low > mean else law.cdf(high) - law.cdf(low)
+    if kept < NEVER:
+        raise entry.refused(
+            f"what lies within low and high has a probability of {kept:.2g} of {text}: nothing of "
+            "it is left; give other ends, or another mean"
+        )
+    cut = truncated_normal((low - mean) / sd, (high - mean) / sd, mean, sd)
+    sides = [
+        f"{word} {entry.amount(x)}" for word, x in (("from", low), ("to", high)) if math.isfinite(x)
+    ]
+    return _frozen(entry, cut, f"{text}, truncated {' '.join(sides)}", low, high)
+
+
+def _lognormal(entry: _Entry) -> Distribution:
+    median = entry.level("median", entry.nominal)
+    if not median > 0.0:
+        raise entry.refused(f"the median {entry.amount(median)} must be above zero")
+    variation = entry.width("sd", median) / median
+    sigma = math.sqrt(math.log1p(variation**2))
+    text = f"log-normal, median {entry.amount(median)}, sd {100.0 * variation:.3g} %"
+    return _frozen(entry, LogNormal(sigma, median), text)  # ends at zero as where it has no end
+
+
+def _triangular(entry: _Entry) -> Distribution:
+    low, high = entry.level("low"), entry.level("high")
+    mode = entry.level("mode", entry.nominal)
+    ends = f"{entry.amount(low)}, {entry.amount(mode)}, {entry.amount(high)}"
+    if not low <= mode <= high or not low < high:
+        raise entry.refused(f"low, mode and high must rise, got {ends}")
+    law = Triangular((mode - low) / (high - low), low, high - low)
+    return _frozen(entry, law, f"triangular, {ends}", low, high)
+
+
+def _discrete(entry: _Entry) -> Distribution:
+    values = entry.section.get("values")
+    if not isinstance(values, list) or not values:
+        raise entry.refused("it needs values = [...]")
+    each = [replace(entry, section={"values": value}).level("values") for value in values]
+    read = whole(entry.where, each, entry.leaf)
+    weights = weights_of(entry.where, entry.section, len(read))
+    texts = list(map(entry.amount, read))
+    require_several(entry.where, read, texts)
+    return replace(among(read, weights, ", ".join(texts)), low=min(read), high=max(read))
+
+
+_KINDS: dict[str, tuple[tuple[str, ...], Callable[[_Entry], Distribution]]] = {
+    "tolerance": (("tolerance", "shape"), _tolerance),
+    "uniform": (("low", "high"), _uniform),
+    "normal": (("mean", "sd", "low", "high"), _normal),
+    "log-normal": (("median", "sd"), _lognormal),
+    "triangular": (("low", "mode", "high"), _triangular),
+    DISCRETE: (KEYS, _discrete),
+}
+ENTRY_KEYS = frozenset({"kind", "together"}).union(*(keys for keys, _ in _KINDS.values()))
+"""all keys that a section of a quantity may have"""

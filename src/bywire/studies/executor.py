@@ -25,10 +25,10 @@ from bywire.core.unneeded import allow_dask
 from bywire.core.workers import worker_count
 from bywire.data.file_format import library
 from bywire.simulation.engine import CUDA
-from bywire.studies.chunk import Columns, PlacedChunk, computed_chunk, computed_chunks, number_of
 from bywire.studies.plan import StudyPlan
+from bywire.studies.store import Columns, PlacedChunk, computed_chunk, computed_chunks, number_of
 
-Chunks = Iterable[int | PlacedChunk]
+_Chunks = Iterable[int | PlacedChunk]
 T = TypeVar("T")
 
 
@@ -57,7 +57,7 @@ class Beside(Generic[T]):
 class Compute(Protocol):
     """What computes chunks batch by batch."""
 
-    def __call__(self, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
+    def __call__(self, chunks: _Chunks) -> Iterator[tuple[int, Columns]]:
         """Yield number and columns of each chunk as soon as it is there, in any order."""
         ...
 
@@ -70,9 +70,9 @@ class Compute(Protocol):
 class Apart:
     """Computes chunks by a function, and what stands beside them at once."""
 
-    chunks: Callable[[Chunks], Iterator[tuple[int, Columns]]]
+    chunks: Callable[[_Chunks], Iterator[tuple[int, Columns]]]
 
-    def __call__(self, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
+    def __call__(self, chunks: _Chunks) -> Iterator[tuple[int, Columns]]:
         """Yield chunks; see `Compute`."""
         return self.chunks(chunks)
 
@@ -181,7 +181,7 @@ def _timed(chunks: Sequence[int | PlacedChunk], plan: StudyPlan) -> _Task:
 
 
 def _of_cluster(
-    client: Any, plan: StudyPlan, workers: int, chunks: Chunks
+    client: Any, plan: StudyPlan, workers: int, chunks: _Chunks
 ) -> Iterator[tuple[int, Columns]]:
     """Yield what a cluster has finished, with few tasks in flight.
 
@@ -241,7 +241,7 @@ class _InPool:
     pool: ProcessPoolExecutor
     ahead: int
 
-    def __call__(self, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
+    def __call__(self, chunks: _Chunks) -> Iterator[tuple[int, Columns]]:
         begun = as_completed(self.pool, _computed, chunks, self.ahead)
         return (computed for _, computed in begun)
 
@@ -261,7 +261,7 @@ class InProcess:
     def __init__(self, together: int = 1) -> None:
         self.together = together
 
-    def _computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
+    def _computed(self, plan: StudyPlan, chunks: _Chunks) -> Iterator[tuple[int, Columns]]:
         left = iter(chunks)
         while several := list(islice(left, self.together)):
             yield from computed_chunks(plan, several)

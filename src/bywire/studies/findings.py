@@ -18,11 +18,10 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Limit
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
-from bywire.studies.chunk import CASE, FAILURE, WARNINGS
-from bywire.studies.laws import ranked
+from bywire.studies.distribution import ranked
 from bywire.studies.plan import StudyPlan, Varied
-from bywire.studies.rare_failures import RareFailure
 from bywire.studies.sensitivity import Sensitivity, sensitivity
+from bywire.studies.sought_cases import RareFailure, WorstCase
 from bywire.studies.statistics import (
     FailureProbability,
     Influence,
@@ -34,7 +33,7 @@ from bywire.studies.statistics import (
     share,
     spread_of,
 )
-from bywire.studies.worst_case import WorstCase
+from bywire.studies.store import CASE, FAILURE, WARNINGS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -277,7 +276,7 @@ class Findings:
     plan
         The study.
     cases
-        A row for each case that was computed; see `bywire.studies.chunk.computed_chunk`.
+        A row for each case that was computed; see `bywire.studies.store.computed_chunk`.
     nominal
         Key figures of the bench itself, with their error from the step.
     rare

@@ -8,16 +8,15 @@ from dataclasses import dataclass
 from functools import partial
 
 from bywire.bench import running
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.core.typing import Progress
-from bywire.simulation.cuda_device import find_device
+from bywire.simulation.cuda import find_device
 from bywire.simulation.engine import CUDA
 from bywire.studies.designs import WORST
 from bywire.studies.executor import executor_of, require_workers
 from bywire.studies.plan import CHUNK, StudyPlan
-from bywire.studies.rare_failures import rare_failures
+from bywire.studies.sought_cases import rare_failures, worst_cases
 from bywire.studies.store import Origin, StudyStore
-from bywire.studies.worst_case import worst_cases
 
 
 @dataclass(frozen=True)

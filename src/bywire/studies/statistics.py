@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from bywire.core.typing import Array
-from bywire.studies.laws import binomial_ranks, normal_quantile, ranked
+from bywire.studies.distribution import binomial_ranks, normal_quantile, ranked
 
 Outcome = Literal["met", "missed", "undecided"]
 

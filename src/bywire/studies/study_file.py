@@ -13,7 +13,7 @@ from pydantic import Field
 
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
-from bywire.bench.bench_source import names_experiment
+from bywire.bench.bench_file import names_experiment
 from bywire.bench.requirements import Limit, read_limit
 from bywire.core.callers import option
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
@@ -50,7 +50,7 @@ class CorrelationSection(Section):
     value: Annotated[float, Unit("1"), Field(gt=-1, lt=1), _CORRELATION]
 
 
-def in_order(
+def _in_order(
     varied: Sequence[Varied], correlations: Mapping[tuple[str, str], float]
 ) -> tuple[Varied, ...]:
     """Return what varies; single values that are correlated rise, however the file lists them."""
@@ -63,7 +63,7 @@ def in_order(
     )
 
 
-def read_correlations(
+def _read_correlations(
     sections: Sequence[CorrelationSection],
     varied: Sequence[Varied],
     known: Mapping[tuple[str, str], float],
@@ -115,7 +115,7 @@ _SHARE = re.compile(r"0?\.\d+")
 _DEMAND = "99 %"
 
 
-def read_demands(bench: Bench, section: Mapping[str, Any]) -> Iterator[Limit]:
+def _read_demands(bench: Bench, section: Mapping[str, Any]) -> Iterator[Limit]:
     """Yield what is required: by the study, and by its bench of what the study says nothing of.
 
     Raises
@@ -154,7 +154,7 @@ def _probability(kpi: str, text: str, given: str) -> float:
 _DEPENDENT = "has cases that share values and are not independent"
 
 
-def require_agreement(plan: StudyPlan) -> None:
+def _require_agreement(plan: StudyPlan) -> None:
     """Refuse probabilities and correlations of designs without independent cases.
 
     Raises
@@ -240,7 +240,7 @@ class DesignSection(Section):
     time: Annotated[float | None, Unit("s"), Field(gt=0)] = None
 
 
-def read_design(section: DesignSection) -> dict[str, Any]:
+def _read_design(section: DesignSection) -> dict[str, Any]:
     """Return what the section says, by the fields of a `StudyPlan`.
 
     Raises
@@ -333,23 +333,23 @@ def _plan(content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]) 
     _require_no_bench(content)
     study = StudyFile.read({"name": file.stem, **content}, "a study file")
     bench = read_bench(study.bench, study.set, file.parent, overrides)
-    demands = tuple(read_demands(bench, study.requirements))
+    demands = tuple(_read_demands(bench, study.requirements))
     limits = {demand.figure: demand.text for demand in demands}
     bench = replace(bench, requirements=limits, name=bench.name or study.name)
     varied, measured = read_all_varied(bench, study.vary, study.measured, file.parent)
     if not varied:
         raise ParameterError("[vary] is empty: say what varies, such as \"motor.R_m\" = '+-10 %'")
-    correlations = {**measured, **read_correlations(study.correlation, varied, measured)}
+    correlations = {**measured, **_read_correlations(study.correlation, varied, measured)}
     plan = StudyPlan(
         study.name,
         bench,
-        in_order(varied, correlations),
+        _in_order(varied, correlations),
         demands=demands,
         correlations=correlations,
         tested=StudiedBench(study.bench, {**bench_file.flattened(study.set), **overrides}),
-        **read_design(study.design),
+        **_read_design(study.design),
     )
-    require_agreement(plan)
+    _require_agreement(plan)
     return plan
 
 

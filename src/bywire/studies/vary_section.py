@@ -13,16 +13,23 @@ from typing import Annotated, Any
 import numpy as np
 
 from bywire.bench.bench import Bench
+from bywire.bench.changes import OPTION
 from bywire.bench.ensemble import varied_choices, varied_leaf
-from bywire.bench.option_names import OPTION
 from bywire.core.errors import FileError, InputError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import leaf_fields
 from bywire.core.section import Hint, Name, Names, Section
-from bywire.studies.distribution import choice_text, read_choice
-from bywire.studies.distribution_section import ENTRY_KEYS, read_distribution, require_following
+from bywire.studies.distribution import (
+    ENTRY_KEYS,
+    choice_text,
+    read_choice,
+    read_distribution,
+    require_following,
+)
 from bywire.studies.plan import Varied
 
-ESTIMATE = "estimate.json"
+# --- What varies as it was measured
+
+_ESTIMATE = "estimate.json"
 """file of an identification's folder that holds its estimates"""
 _LARGEST = 20_000_000  # bytes of a file that is read
 _TRUNCATE = "cut it off, with truncate = true"
@@ -75,7 +82,7 @@ class Measured:
         )
 
 
-def varied_as_measured(
+def _varied_as_measured(
     bench: Bench, section: MeasuredSection, folder: Path
 ) -> tuple[tuple[Varied, ...], dict[tuple[str, str], float]]:
     """Return parameters that vary as they were measured, and the correlations of their estimates.
@@ -97,7 +104,7 @@ def varied_as_measured(
     InputError
         For a section that does not fit, and estimates that leave the admissible range.
     """
-    measured = read_measured(folder / section.file)
+    measured = _read_measured(folder / section.file)
     leaves, values = leaf_fields(type(bench.par)), bench.par.flat()
     of = [name for name in measured.values if name in leaves] if section.of is None else section.of
     if not of:
@@ -130,7 +137,7 @@ def _text(value: float, unit: str) -> str:
     return repr(value) if unit == "1" else f"{value!r} {unit}"
 
 
-def read_measured(path: Path) -> Measured:
+def _read_measured(path: Path) -> Measured:
     """Read what an identification estimated.
 
     Parameters
@@ -143,7 +150,7 @@ def read_measured(path: Path) -> Measured:
     FileError
         When there is none, or it is damaged.
     """
-    file = path / ESTIMATE if path.is_dir() else path
+    file = path / _ESTIMATE if path.is_dir() else path
     try:
         data = file.read_bytes()
     except (OSError, ValueError) as error:
@@ -231,7 +238,7 @@ def read_all_varied(
     measured: tuple[Varied, ...] = ()
     correlations: Mapping[tuple[str, str], float] = {}
     if estimates is not None:
-        measured, correlations = varied_as_measured(bench, estimates, folder)
+        measured, correlations = _varied_as_measured(bench, estimates, folder)
     varied = tuple(read_varied(bench, section))
     places: dict[str, str] = {}
     for title, each in (("[measured]", measured), ("[vary]", varied)):

@@ -1,1 +1,1 @@
-"""Choosing gains and sizes: requirements and demands in, designs and what they give out."""
+"""Design of gains and sizes from requirements and demands."""

@@ -1,4 +1,4 @@
-r"""What gains are worth on the nonlinear bench: sines by amplitude, and the brake's step.
+r"""Figures of gains on the nonlinear bench: sines by amplitude, and the brake's step.
 
 Many sets of gains run side by side, in the lanes of one ensemble. A set is measured in stages,
 and left where what is known of it already says that it is not wanted.
@@ -30,7 +30,7 @@ from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.sweep import Sweep, common_interval, complex_values, nyquist
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import as_run
-from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.families import evaluate
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array, Complex
@@ -76,7 +76,7 @@ class Small:
 
 
 class Sines:
-    """What several sets of gains make of sines, measured at the frequencies that are asked for.
+    """Responses of several sets of gains to sines, measured on demand.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class Sines:
         self._settled[at] = responses["settled"].values > 0
 
     def first_look(self, k: int) -> tuple[Small, ...]:
-        """Return what the frequencies next to the target say of a set: its gain there."""
+        """Return the figures of a set from the frequencies next to the target: its gain there."""
         f, unknown = self._f[self.near], (math.nan,) * 3
         return tuple(
             Small(
@@ -227,7 +227,7 @@ def loop_gain(
 def laws_of(
     loop: Loop, par: ParameterSet, value: float, frequencies: Array
 ) -> tuple[Complex, Complex] | None:
-    """Return what a loop's laws make of set point and measured value; None where not known."""
+    """Return the controller's response to set point and measured value; None if not known."""
     if loop.laws is None:
         return None
     with taking(loop.side):
@@ -245,7 +245,7 @@ STEP_FIGURES = ("overshoot", "settling_time", "steady_state_error")
 
 @dataclass(frozen=True)
 class BenchFigures:
-    """One set of gains on the nonlinear bench, or what is known of it so far.
+    """Figures of one set of gains on the nonlinear bench, as far as they are known.
 
     Parameters
     ----------
@@ -310,7 +310,7 @@ def wanted_figures(
     *,
     rough: bool = False,
 ) -> tuple[BenchFigures | None, ...]:
-    """Return the figures of those of several sets of gains that are worth to be measured.
+    """Return the figures of several sets of gains, measured as far as they are promising.
 
     The step is cheap and comes first; then the sines next to the target, of which only the
     smallest gain is known so far; then all others.

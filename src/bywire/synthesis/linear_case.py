@@ -1,11 +1,12 @@
-"""The set of models that a design must serve: the nominal one, and what may come instead."""
+"""Requirements on a loop, and the linear models for which a design must meet them."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -14,14 +15,141 @@ from bywire.analysis.crossings import DROP
 from bywire.analysis.linear.corners import CornerError
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop
-from bywire.analysis.loop_figures import LOOP_FIGURES, LoopFigures
+from bywire.analysis.loop_figures import LOOP_FIGURES, LoopFigure, LoopFigures
 from bywire.analysis.margins import NO_LOOP
-from bywire.bench.requirements import Limit
-from bywire.core.errors import InputError, ParameterError
+from bywire.bench.requirements import Limit, parted
+from bywire.core import units
+from bywire.core.errors import (
+    InputError,
+    ParameterError,
+    UnitError,
+    not_valid,
+    quoted,
+    unknown_name,
+)
 from bywire.core.interrupts import interrupts_deferred
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.units import shown
-from bywire.synthesis.requirement import share_left
+
+_ZERO = 1e-3
+"""What counts as zero where the limit is zero; all figures that can be zero are in %."""
+
+STEADY = 0.05
+"""Steady-state error that counts as none where zero is required [%]; converters round."""
+
+_BY_WORD: Mapping[str, LoopFigure] = {
+    **{figure.margin: figure for figure in LOOP_FIGURES.values() if figure.margin},
+    **LOOP_FIGURES,
+}
+"""figures by their names in requirements: their own, and those of `bywire margins --json`"""
+
+
+def share_left(limit: Limit, value: float) -> float:
+    """Return how far a value is on the right side, as a share of the limit; NaN is not."""
+    bound = limit.bound or (STEADY if limit.figure == "steady_state_error" else _ZERO)
+    share = (bound - value if limit.is_upper else value - bound) / bound
+    return -math.inf if math.isnan(share) else share
+
+
+def read(texts: Sequence[str]) -> tuple[Limit, ...]:
+    """Return requirements written as text.
+
+    Parameters
+    ----------
+    texts
+        Such as ``"bandwidth >= 10 Hz"``; blanks and hyphens in a figure's name are let pass, and
+        so are the names of `bywire.margins`, such as ``phase``.
+
+    Raises
+    ------
+    UnknownNameError
+        When a figure is unknown.
+    ParameterError
+        When a text cannot be read, a limit is beyond what any loop can have, or two texts
+        contradict each other.
+    UnitError
+        When a limit's unit measures something else.
+    """
+    if not texts:
+        raise ParameterError(
+            "a design needs a requirement, for instance 'bandwidth >= 10 Hz'", name="requirement"
+        )
+    requirements = tuple(_read(text) for text in texts)
+    for first, second in combinations(requirements, 2):
+        _require_compatible(first, second)
+    return requirements
+
+
+def _read(text: str) -> Limit:
+    word, compare, written = parted(text) if isinstance(text, str) else ("", None, "")
+    if not word or compare is None or not written:
+        raise ParameterError(
+            f"requirement {quoted(text)} cannot be read: write for instance 'bandwidth >= 10 Hz'",
+            name="requirement",
+            value=text,
+            valid="'bandwidth >= 10 Hz'",
+        )
+    word = re.sub(r"[ -]+", "_", word)
+    if word not in _BY_WORD:
+        raise unknown_name("figure of a loop", word, LOOP_FIGURES)
+    figure, is_least = _BY_WORD[word], compare in (">=", ">")
+    bound = _bound(written, figure)
+    # A limit at the end of what is possible demands nothing, or what no loop has.
+    possible = figure.low <= bound <= figure.high and not (is_least and bound >= figure.high)
+    if not possible or not math.isfinite(bound) or (is_least and bound <= 0):
+        low, high = figure.low, figure.high
+        reach = f"above {low:g}" if high == math.inf else f"{low:g} to {high:g}"
+        raise ParameterError(
+            f"requirement {quoted(text)}: every loop has a {figure.name} of {reach} {figure.unit}; "
+            "require a value in between",
+            name=figure.name,
+            value=text,
+            valid=f"{reach} {figure.unit}",
+        )
+    return Limit(figure.name, compare, bound, figure.unit, f"{compare} {written}")
+
+
+def _bound(text: str, figure: LoopFigure) -> float:
+    name = f"requirement {figure.name}"
+    if figure.in_decibel and text.endswith("dB"):
+        return float(10.0 ** (units.parse(text.removesuffix("dB").strip(), "1", name) / 20.0))
+    if figure.unit == "%":
+        if not text.endswith("%") and not re.fullmatch(r"0+\.?0*", text):
+            raise not_valid(
+                name, quoted(text), "a limit in percent such as '<= 15 %'", kind=UnitError
+            )
+        return 100.0 * units.parse(text, "1", name)
+    if figure.unit == "deg":
+        if re.fullmatch(r"[-+\d.eE]+", text):
+            raise UnitError(
+                f"{name} = {quoted(text)} has no unit: write '{text} deg'",
+                name=name,
+                value=text,
+                valid=f"{text} deg",
+            )
+        return math.degrees(units.parse(text.replace("°", "deg"), "rad", name))
+    return units.parse(text, figure.unit, name)
+
+
+def _require_compatible(first: Limit, second: Limit) -> None:
+    if first.figure != second.figure:
+        return
+    if first.is_upper == second.is_upper:
+        raise ParameterError(
+            f"{first.figure} is required twice, {str(first)!r} and {str(second)!r}: "
+            "leave one of them out",
+            name=first.figure,
+        )
+    low, high = (second, first) if first.is_upper else (first, second)
+    if low.bound > high.bound:
+        raise ParameterError(
+            f"{str(low)!r} and {str(high)!r} contradict each other: no loop meets both; "
+            "change one of the limits",
+            name=low.figure,
+        )
+
+
+# --- Models
 
 NOMINAL = "nominal"
 """label of the model at the operating point itself"""
@@ -35,7 +163,7 @@ class LinearCase:
     Parameters
     ----------
     label
-        What distinguishes it, for instance ``"motor.R_m = 0.2"``.
+        Label of the case, for instance ``"motor.R_m = 0.2"``.
     build
         ``build(gains) -> (loop gain, closed loop)`` for gains by dotted name, both sampled alike.
     changes, at
@@ -74,7 +202,7 @@ def room(figures: LoopFigures, requirement: Limit) -> float:
 
 
 def slack(figures: LoopFigures, requirement: Limit) -> float:
-    """Return how far a requirement is met, as a share of its limit: what a search climbs.
+    """Return the slack of a requirement, as a share of its limit: the objective of the search.
 
     For a bandwidth it is the room of the closed loop's magnitude above -3 dB up to the limit:
     the frequency itself jumps where a dip touches that level.
@@ -104,7 +232,7 @@ def cases_of(
     Raises
     ------
     UnknownNameError
-        When there is no such number.
+        When the parameter is unknown.
     ParameterError
         When a tunable is among them, there are too many combinations, or one does not exist.
     """
@@ -114,7 +242,11 @@ def cases_of(
     combinations = list(product(*over.values())) if over else []
     if len(combinations) > _MOST:
         raise ParameterError(
-            f"the ranges have {len(combinations)} combinations: {_MOST} at most, take fewer values"
+            f"the ranges have {len(combinations)} combinations, more than {_MOST}: take fewer "
+            "values",
+            name="over",
+            value=str(len(combinations)),
+            valid=f"<= {_MOST}",
         )
     cases = [case_of(loop, NOMINAL, par, {}, value)]
     for combination in combinations:
@@ -126,9 +258,9 @@ def cases_of(
 
 
 def require_given(loop: Loop, name: str) -> None:
-    """Refuse what the design chooses, of what varies."""
+    """Reject a varied parameter that the design chooses."""
     if name in loop.tunables or _scheduled(loop, name):
-        raise ParameterError(f"{name} is what the design chooses: it cannot also vary")
+        raise ParameterError(f"the design chooses {name}, which cannot also vary", name=name)
 
 
 def _shown(loop: Loop, par: ParameterSet, name: str, value: float) -> str:
@@ -157,7 +289,7 @@ def existing_case(
     try:
         loop.point(par.replace(changes), at)
     except InputError as error:
-        raise ParameterError(f"{label}: {error}") from None
+        raise error.reworded(f"{label}: {error}") from None
     return case_of(loop, label, par, changes, at)
 
 

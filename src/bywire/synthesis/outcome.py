@@ -1,4 +1,4 @@
-"""What the design of a loop or gain schedule gives, and how probably it meets requirements."""
+"""Results of the design of a loop or gain schedule, with probabilities of the requirements."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ import numpy as np
 from bywire.bench.requirements import Limit
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.typing import Progress, silent
-from bywire.synthesis.linear_case import LinearCase, room, values_of
-from bywire.synthesis.requirement import share_left
+from bywire.synthesis.linear_case import LinearCase, room, share_left, values_of
 
 Status = Literal["met", "infeasible", "interrupted"]
 MISSED = -1e-3
@@ -41,7 +40,7 @@ class Binding:
 
 @dataclass(frozen=True)
 class Conflict:
-    """What one requirement allows of another.
+    """Best value of one requirement that another allows.
 
     Parameters
     ----------
@@ -66,7 +65,7 @@ class Conflict:
 
 @dataclass(frozen=True)
 class Design:
-    """Gains and what they give.
+    """Designed gains and their figures.
 
     Parameters
     ----------
@@ -81,7 +80,7 @@ class Design:
     binding
         What leaves no room, the worst first.
     conflicts
-        For infeasible requirements, what each binding one allows of the others.
+        For infeasible requirements, the best values of the others that each binding one allows.
     slack
         The worst normalized slack.
     evaluations
@@ -105,7 +104,7 @@ class Design:
 
     @property
     def binds(self) -> bool:
-        """Whether what is worst off leaves no room worth having."""
+        """Whether the worst requirement has almost no slack."""
         return self.slack < ROOMY
 
 
@@ -171,7 +170,7 @@ class Across:
 
 @dataclass(frozen=True)
 class ScheduleDesign:
-    """A gain schedule and what it gives.
+    """Designed gain schedule and its figures.
 
     Parameters
     ----------
@@ -199,7 +198,7 @@ class ScheduleDesign:
 
     @property
     def worst(self) -> Across:
-        """Where the scheduled loop is worst off."""
+        """Worst point of the scheduled loop."""
         return min(self.across, key=lambda point: point.slack)
 
     @property

@@ -1,4 +1,4 @@
-"""Gain schedules: every region designed, then seen as one, and retuned on the nonlinear bench."""
+"""Design of gain schedules: region by region, then jointly retuned on the nonlinear bench."""
 
 from __future__ import annotations
 
@@ -17,12 +17,10 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Progress
 from bywire.core.units import shown
-from bywire.synthesis.bench_tuning import GENERATIONS, Tuning
-from bywire.synthesis.designer import design
+from bywire.synthesis.designer import design, suffixed
 from bywire.synthesis.linear_case import LinearCase, cases_of, room, values_of
-from bywire.synthesis.optimizer import suffixed
 from bywire.synthesis.outcome import Across, Design, ScheduleDesign
-from bywire.synthesis.verification import Trial, Verification, verify
+from bywire.synthesis.verification import GENERATIONS, Trial, Tuning, Verification, verify
 
 _FINE = 4000  # points of the grid for what is reported
 _ACROSS = 15
@@ -35,11 +33,12 @@ def scheduled(loop: Loop) -> LoopSchedule:
     Raises
     ------
     ParameterError
-        When it has none.
+        When the loop has no schedule.
     """
     if loop.schedule is None:
         raise ParameterError(
-            f"loop {loop.name!r} has no gain schedule: leave out {option('schedule', True)}"
+            f"loop {loop.name!r} has no gain schedule: leave out {option('schedule', True)}",
+            name="schedule",
         )
     return loop.schedule
 
@@ -59,7 +58,7 @@ def points_by_region(
     Raises
     ------
     ParameterError
-        When a region has none.
+        When a region has no point.
     """
     schedule, at = scheduled(loop), loop.at
     by_region: dict[str, list[float]] = {name: [] for name in schedule.regions}
@@ -71,9 +70,11 @@ def points_by_region(
             borders = " and ".join(shown(leaves[each], at.unit) for each in schedule.borders)
             given = ", ".join(shown(each, at.unit) for each in points or schedule.points)
             raise ParameterError(
-                f"no operating point lies in the region {name!r}: the borders are {borders}, the "
+                f"no operating point is in the region {name!r}: the borders are {borders}, the "
                 f"points {given}; give one {at.name} in each region with {option('at')}, or move "
-                f"the borders ({', '.join(schedule.borders)})"
+                f"the borders ({', '.join(schedule.borders)})",
+                name=at.name,
+                value=given,
             )
     return {name: tuple(sorted(inside)) for name, inside in by_region.items()}
 
@@ -117,7 +118,9 @@ def design_schedule(
     """
     schedule = scheduled(loop)
     if not any(tunables.values()):
-        raise ParameterError("nothing is left to tune in any region: set fewer gains")
+        raise ParameterError(
+            "there is nothing to tune in any region: set fewer gains", name="overrides"
+        )
     order = [schedule.main, *(name for name in schedule.regions if name != schedule.main)]
     order = [name for name in order if tunables[name]]
     gains: dict[str, float] = {}
@@ -215,8 +218,8 @@ def _ranges(
 ) -> dict[str, Sequence[float]]:
     if loop.at.name in over:
         raise ParameterError(
-            f"{loop.at.name} is what the schedule follows: give its operating points with "
-            f"{option('at')}"
+            f"the schedule follows {loop.at.name}: give its operating points with {option('at')}",
+            name=loop.at.name,
         )
     return {loop.at.name: points, **over} if len(points) > 1 or over else {}
 

@@ -25,7 +25,7 @@ class Mark:
     Parameters
     ----------
     label
-        What the legend says.
+        Text of the legend.
     x, y
         Where it lies, SI.
     """
@@ -37,14 +37,14 @@ class Mark:
 
 @dataclass(frozen=True)
 class Map:
-    """How a variable of a study's dataset is shown over two of its dimensions.
+    """Map of a variable of a study's dataset over two of its dimensions.
 
     Parameters
     ----------
     values, x, y
         Names of the variable and of its coordinates.
     caption
-        What the figure shows, one sentence.
+        Caption of the figure, one sentence.
     marks
         Designs to mark; the first is the optimum.
     limits
@@ -84,24 +84,24 @@ class Cut:
 
 @dataclass(frozen=True)
 class Findings:
-    """What a study found.
+    """Findings of a study.
 
     Parameters
     ----------
     data
         All designs; variables with ``units`` and ``long_name``.
     kpis
-        The optimum and what it is compared with.
+        The optimum, and the design for comparison.
     assumptions
-        What is kept equal, and what is left out, a sentence each.
+        Constraints and neglected effects, a sentence each.
     maps
         Name -> map, in the order in which they are shown.
     cuts
         Tables.
     warnings
-        What the user should know.
+        Warnings.
     limits
-        What limits the best design, a sentence each.
+        Limits of the best design, a sentence each.
     """
 
     data: xr.Dataset
@@ -120,7 +120,7 @@ class Study:
     Parameters
     ----------
     name
-        What the command line calls it.
+        Name on the command line.
     assembly
         Name of the brake that it sizes.
     summary
@@ -128,11 +128,11 @@ class Study:
     options
         Class of its options, each with unit and range.
     defaults
-        Options unless others are given.
+        Default options.
     compute
         ``compute(par, options, progress) -> Findings``.
     ruled
-        Parameters, or groups of them, without effect on the study -> what rules them instead.
+        Parameters, or groups of them, without effect on the study -> advice on what to set.
     """
 
     name: str
@@ -144,17 +144,19 @@ class Study:
     ruled: Mapping[str, str] = field(default_factory=dict)
 
     def require_effect(self, names: Iterable[str]) -> None:
-        """Refuse to set parameters that would change nothing.
+        """Reject changes of parameters without effect.
 
         Raises
         ------
         ParameterError
-            With what to set instead.
+            With advice on what to set instead.
         """
         for name in names:
             for ruled, instead in self.ruled.items():
                 if name == ruled or name.startswith(f"{ruled}."):
-                    raise ParameterError(f"{name} has no effect on study {self.name!r}: {instead}")
+                    raise ParameterError(
+                        f"{name} has no effect on study {self.name!r}: {instead}", name=name
+                    )
 
 
 @checked
@@ -173,7 +175,7 @@ def variables(
 
 @checked
 def require_ranges(options: ParameterSet, ranges: Iterable[tuple[str, str, str]]) -> None:
-    """Refuse options of which a lower end is not below the upper one.
+    """Reject options whose lower end is not below the upper end.
 
     Parameters
     ----------

@@ -1,9 +1,24 @@
-"""A linear design on the nonlinear bench, and gains retuned there where it falls short."""
+"""Gains on the nonlinear bench, where friction and dither change the loop: judged and retuned.
+
+Differential evolution of a library, every generation one ensemble: what the linear model cannot
+know (friction under dither, converter, limits) is measured. The search takes up a candidate only
+where its worst slack is not below that of the member whose place it would take. A worst slack is
+a minimum, so whatever is measured first bounds it, the linear models' figures before all:
+candidates whose bound is too low are measured no further, which changes no step of the search.
+Those that may come near the best so far are measured in any case, for they make the edge that is
+shown.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import OptimizeResult, differential_evolution
+from scipy.stats import qmc
 
 from bywire.analysis.loop import Loop
 from bywire.bench.bench import Bench
@@ -11,21 +26,403 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Limit
 from bywire.bench.running import run
 from bywire.core.errors import ParameterError
+from bywire.core.interrupts import interrupt_heard
 from bywire.core.parameters import ParameterSet
-from bywire.core.typing import Progress
-from bywire.synthesis.bench_figures import BenchFigures, Worth, has_step, wanted_figures
-from bywire.synthesis.bench_tuning import (
-    GENERATIONS,
-    Candidate,
-    Tuning,
-    judged,
-    linear_slacks,
-    standing,
-    tune,
+from bywire.core.typing import Array, Progress
+from bywire.synthesis.bench_figures import (
+    STEP_FIGURES,
+    BenchFigures,
+    Worth,
+    has_step,
+    wanted_figures,
 )
-from bywire.synthesis.designer import bench_floors, largest_error, linear_floors
-from bywire.synthesis.linear_case import NOMINAL, LinearCase, values_of
-from bywire.synthesis.optimizer import Problem, Report, stage
+from bywire.synthesis.designer import (
+    Problem,
+    Report,
+    bench_floors,
+    largest_error,
+    linear_floors,
+    stage,
+)
+from bywire.synthesis.linear_case import NOMINAL, LinearCase, share_left, values_of
+
+_LEAST = -3.0
+MEASURED = frozenset({"bandwidth", "crossover", *STEP_FIGURES})
+"""figures that the bench alone decides on, where it shows them"""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Set of gains with its results.
+
+    Parameters
+    ----------
+    gains
+        By dotted name [SI].
+    figures
+        On the bench at the nominal point.
+    slacks
+        By requirement's text: share of the limit, worst amplitude and worst trial.
+    corners
+        Figures of further trials, by label.
+    rooms
+        The same as ``slacks``, but of a bandwidth by its frequency: what is shown. Those that are
+        not named are as ``slacks`` has them.
+    shown
+        By requirement's text: in how many sines and steps the bench shows its figure, and in how
+        many of them it might; without any, the linear model alone decides.
+    """
+
+    gains: Mapping[str, float]
+    figures: BenchFigures
+    slacks: Mapping[str, float]
+    corners: Mapping[str, BenchFigures] = field(default_factory=dict)
+    rooms: Mapping[str, float] = field(default_factory=dict)
+    shown: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+
+    @property
+    def slack(self) -> float:
+        """The worst slack."""
+        return min(self.slacks.values())
+
+    def room(self, text: str) -> float:
+        """Return the distance of a requirement's figure from its limit, as a share of it."""
+        return self.rooms.get(text, self.slacks[text])
+
+    def standing(self, enough: float) -> tuple[float, float]:
+        """Return the objective of gains, the larger the better.
+
+        Where a requirement is missed, how far the figures are off; else the worst slack, and
+        from a slack that is enough on the worst bandwidth.
+        """
+        if self.slack < 0.0:
+            return min(-1e-12, *(self.room(text) for text in self.slacks)), self.slack
+        return min(self.slack, enough), min(self.rooms.values(), default=0.0)
+
+
+def bench_slacks(
+    requirements: Sequence[Limit], figures: BenchFigures, linear: Mapping[str, float]
+) -> dict[str, float]:
+    """Return how far each requirement is met on the bench.
+
+    Bandwidth counts at the worst amplitude, by the room of the gain above -3 dB; a phase margin
+    in the linear model (what large motion comes near) and in each describing function; figures
+    of the step where the experiment has one; the rest is the linear model's alone.
+
+    Parameters
+    ----------
+    requirements
+        Requirements.
+    figures
+        Figures on the bench.
+    linear
+        Slack in the linear models by requirement's text.
+    """
+    slacks = {}
+    for wanted in requirements:
+        slack = _on_bench(wanted, figures)
+        # What the bench does not show, the linear model says; of a phase margin the worse counts.
+        if math.isinf(slack) or wanted.figure == "phase_margin":
+            slack = min(slack, linear[str(wanted)])
+        slacks[str(wanted)] = max(slack, _LEAST)
+    return slacks
+
+
+def ceiling(
+    requirements: Sequence[Limit],
+    known: Sequence[BenchFigures],
+    linear: Mapping[str, float],
+) -> float:
+    """Return an upper bound of the worst slack, whatever the missing measurements.
+
+    Parameters
+    ----------
+    requirements, linear
+        As in `bench_slacks`.
+    known
+        What is known of some trials; figures that are still unknown are NaN, or not there.
+    """
+    highest = math.inf
+    for wanted in requirements:
+        highest = min([highest, *(_on_bench(wanted, figures) for figures in known)])
+        if wanted.figure not in MEASURED:
+            highest = min(highest, linear[str(wanted)])
+    return max(highest, _LEAST)
+
+
+def judged(
+    requirements: Sequence[Limit],
+    gains: Mapping[str, float],
+    trials: Mapping[str, BenchFigures],
+    linear: Mapping[str, float],
+) -> Candidate:
+    """Return gains with what they showed, judged by the worst of several trials.
+
+    Parameters
+    ----------
+    requirements, linear
+        As in `bench_slacks`.
+    gains
+        By dotted name [SI].
+    trials
+        Figures by the trial's label, that of the nominal point among them.
+    """
+    # A trial without a step has the parameters of the nominal one: so is its step.
+    nominal = trials[NOMINAL]
+    each = [replace(figures, step=figures.step or nominal.step) for figures in trials.values()]
+    rows = [bench_slacks(requirements, figures, linear) for figures in each]
+    slacks = {str(wanted): min(row[str(wanted)] for row in rows) for wanted in requirements}
+    corners = {label: figures for label, figures in trials.items() if label != NOMINAL}
+    rooms = {
+        str(wanted): _room(wanted, each, slacks[str(wanted)])
+        for wanted in requirements
+        if wanted.figure == "bandwidth" and not wanted.is_upper
+    }
+    shown = {str(wanted): shown_on_bench(wanted, each) for wanted in requirements}
+    return Candidate(dict(gains), nominal, slacks, corners, rooms, shown)
+
+
+def shown_on_bench(wanted: Limit, trials: Sequence[BenchFigures]) -> tuple[int, int]:
+    """Return in how many sines and steps the bench shows a figure, and in how many it might."""
+    sines = [s for figures in trials for s in figures.small]
+    if wanted.figure == "bandwidth" and not wanted.is_upper:
+        return len(sines), len(sines)
+    if wanted.figure in ("bandwidth", "crossover", "phase_margin"):
+        name = "bandwidth" if wanted.figure == "bandwidth" else "crossover"
+        return sum(not math.isnan(getattr(s, name)) for s in sines), len(sines)
+    steps = sum(bool(figures.step) for figures in trials) if wanted.figure in STEP_FIGURES else 0
+    return steps, steps
+
+
+def _room(wanted: Limit, rows: Sequence[BenchFigures], slack: float) -> float:
+    """Return the distance of the worst bandwidth from its limit, of the same sign as its slack."""
+    values = [s.bandwidth for row in rows for s in row.small]
+    if not values:
+        return slack
+    room = share_left(wanted, min(values))
+    return max(room, 0.0) if slack >= 0.0 else min(room, slack * 1e-3)
+
+
+def _on_bench(wanted: Limit, figures: BenchFigures) -> float:
+    """Return the slack of what the bench measures; infinity for what it does not."""
+    if wanted.figure == "bandwidth" and not wanted.is_upper:
+        return min((s.least / math.sqrt(0.5) - 1.0 for s in figures.small), default=math.inf)
+    if wanted.figure == "phase_margin":
+        seen = [s for s in figures.small if not math.isnan(s.crossover)]
+        return min((share_left(wanted, s.phase_margin) for s in seen), default=math.inf)
+    if wanted.figure in ("bandwidth", "crossover"):
+        values = [getattr(s, wanted.figure) for s in figures.small]
+        return min((share_left(wanted, v) for v in values if not math.isnan(v)), default=math.inf)
+    if wanted.figure not in STEP_FIGURES or not figures.step:
+        return math.inf
+    return share_left(wanted, figures.step[wanted.figure])
+
+
+def linear_slacks(problem: Problem, gains: Mapping[str, float]) -> dict[str, float]:
+    """Return the slack of every requirement for the worst model, by its text."""
+    slacks = problem.slacks(problem.point(gains), range(len(problem.cases))).min(axis=0)
+    return {str(wanted): float(s) for wanted, s in zip(problem.requirements, slacks, strict=True)}
+
+
+# --- Tuning
+
+Promising = Callable[[int, Sequence[BenchFigures]], bool]
+Measure = Callable[
+    [Mapping[str, Sequence[float]], Promising], Sequence[Mapping[str, BenchFigures] | None]
+]
+"""``measure(gains, worth)``: figures by label of several sets, None of those that were left where
+``worth(k, known figures)`` was false"""
+
+_ENOUGH = 0.02  # worst slack at which the search ends
+_NEAR = 0.03  # of the best worst slack: what is measured in full wherever the search stands
+_MEMBERS = 36
+GENERATIONS = 60
+"""of a search, at most"""
+_REACH = 0.5  # of the linear ranges (logarithmic), around the linear design
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Outcome of a tuning.
+
+    Parameters
+    ----------
+    best
+        The candidate with the largest worst slack; among those with enough of it, the one with
+        the largest worst bandwidth, and where requirements are missed, the one whose figures
+        are nearest.
+    tried
+        All candidates that were measured in full, in the order in which they ran.
+    interrupted
+        Whether the user ended it.
+    untold
+        Candidates besides, judged by a part of the trials only.
+    """
+
+    best: Candidate
+    tried: tuple[Candidate, ...]
+    interrupted: bool
+    untold: int = 0
+
+    @property
+    def count(self) -> int:
+        """Candidates that were judged."""
+        return len(self.tried) + self.untold
+
+    def curve(self, first: str, second: str) -> list[tuple[float, float]]:
+        """Return the edge of what was reached in two figures while the rest was met.
+
+        Parameters
+        ----------
+        first, second
+            Texts of two requirements.
+
+        Returns
+        -------
+        list of (float, float)
+            Pairs of distances from the limits, none better in both than another, by the first.
+        """
+        pairs = sorted(
+            (
+                (c.room(first), c.room(second))
+                for c in self.tried
+                if all(s >= 0.0 for text, s in c.slacks.items() if text not in (first, second))
+            ),
+            reverse=True,
+        )
+        edge: list[tuple[float, float]] = []
+        for room_1, room_2 in pairs:
+            if not edge or room_2 > edge[-1][1]:
+                edge.append((room_1, room_2))
+        return edge[::-1]
+
+
+def tune(
+    problem: Problem,
+    start: Mapping[str, float],
+    measure: Measure,
+    *,
+    seed: int = 0,
+    generations: int = GENERATIONS,
+    progress: Progress | None = None,
+) -> Tuning:
+    """Search gains around a linear design that meet the requirements on the bench.
+
+    Parameters
+    ----------
+    problem
+        Requirements, tunables, and the linear models: all of them must stay stable.
+    start
+        The linear design's gains, one of the first generation.
+    measure
+        See `Measure`.
+    seed
+        Of the search.
+    generations
+        At most; it ends when the worst slack is 2 %.
+    progress
+        Called with a label and the finished share.
+    """
+    center, n = problem.point(start), len(problem.tunables)
+    low, high = np.clip(center - _REACH, 0.0, 1.0), np.clip(center + _REACH, 0.0, 1.0)
+    first = low + (high - low) * qmc.LatinHypercube(n, rng=np.random.default_rng(seed)).random(
+        _MEMBERS
+    )
+    first[0] = center  # the linear design itself: the search cannot end worse than it
+    tried: list[Candidate] = []
+    count, left = [0], [0]
+    to_beat = np.full(_MEMBERS, -np.inf)
+
+    def cost(points: Array) -> Array:
+        rows = [problem.gains(z) for z in np.atleast_2d(points.T)]
+        new = _candidates(problem, rows, measure, to_beat)
+        tried.extend(each for each in new if isinstance(each, Candidate))
+        left[0] += sum(isinstance(each, float) for each in new)
+        return -np.array([each if isinstance(each, float) else each.slack for each in new])
+
+    def passed(intermediate_result: OptimizeResult) -> bool:
+        count[0] += 1
+        if progress is not None:
+            progress("tuning on the bench", count[0] / generations)
+        members = -intermediate_result.population_energies
+        to_beat[:] = np.minimum(members, members.max() - _NEAR)
+        return bool(intermediate_result.fun <= -_ENOUGH)
+
+    interrupted = False
+    try:
+        evolution: Any = differential_evolution  # its stubs know no cost of many points at once
+        evolution(
+            cost,
+            list(zip(low, high, strict=True)),
+            init=first,
+            maxiter=generations,
+            vectorized=True,
+            updating="deferred",
+            polish=False,
+            tol=1e-6,
+            rng=np.random.default_rng(seed),
+            callback=passed,
+        )
+    except KeyboardInterrupt:
+        interrupt_heard()
+        interrupted = True
+        if not tried:
+            raise
+    return Tuning(max(tried, key=standing), tuple(tried), interrupted, left[0])
+
+
+def standing(candidate: Candidate) -> tuple[float, float]:
+    """Return what a search prefers gains by, see `Candidate.standing`."""
+    return candidate.standing(_ENOUGH)
+
+
+def _candidates(
+    problem: Problem,
+    rows: Sequence[Mapping[str, float]],
+    measure: Measure,
+    to_beat: Array,
+) -> list[Candidate | float]:
+    """Return candidates, or what the slack of those that were left cannot exceed.
+
+    Those that a linear model says are unstable are not run.
+
+    Parameters
+    ----------
+    problem, measure
+        As in `tune`.
+    rows
+        Gains of each candidate.
+    to_beat
+        Worst slack of each below which it is left.
+    """
+    linear = [linear_slacks(problem, row) for row in rows]
+    bounds = [ceiling(problem.requirements, (), slacks) for slacks in linear]
+    stable = [min(slacks.values()) > -10.0 for slacks in linear]
+    tried = [k for k in range(len(rows)) if stable[k] and bounds[k] >= to_beat[k]]
+
+    def worth(j: int, known: Sequence[BenchFigures]) -> bool:
+        k = tried[j]
+        bounds[k] = ceiling(problem.requirements, known, linear[k])
+        return bool(bounds[k] >= to_beat[k])
+
+    nothing: Mapping[str, BenchFigures] = {NOMINAL: BenchFigures((), {})}
+    figures: dict[int, Mapping[str, BenchFigures] | None] = {
+        k: nothing for k in range(len(rows)) if not stable[k]
+    }
+    if tried:
+        sets = {name: [rows[k][name] for k in tried] for name in rows[0]}
+        figures |= dict(zip(tried, measure(sets, worth), strict=True))
+    candidates: list[Candidate | float] = []
+    for k, row in enumerate(rows):
+        known = figures.get(k)
+        left = float(bounds[k])
+        candidates.append(
+            left if known is None else judged(problem.requirements, row, known, linear[k])
+        )
+    return candidates
+
+
+# --- Verification
 
 MOST = 8
 """corners that are tried, at most"""
@@ -306,7 +703,7 @@ def verify(
         What retuned gains keep of the linear design's figures besides the requirements; by default
         what `floors.bench_floors` says of ``gains``.
     seed, generations
-        Of the search, see `bench_tuning.tune`; no generation: only try.
+        Of the search, see `tune`; no generation: only try.
     progress
         Called with a label and the finished share.
 
@@ -316,7 +713,9 @@ def verify(
         When no amplitude is given.
     """
     if not trial.amplitudes:
-        raise ParameterError(f"loop {trial.loop.name!r}: no amplitude is given to try it with")
+        raise ParameterError(
+            f"loop {trial.loop.name!r} needs an amplitude for the bench", name="amplitude"
+        )
     problem = Problem(tunables, tuple(requirements), tuple(cases))
     floors = tuple(kept or ())
     target = _target(requirements, cases[0], gains)

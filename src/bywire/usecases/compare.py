@@ -85,21 +85,6 @@ def compare(
     KeyboardInterrupt
         When interrupted: half a run compares with nothing.
     """
-    from bywire.api.compared_run import kept
-    from bywire.api.comparison import (
-        Comparison,
-        is_folder,
-        require_comparable,
-        resolved,
-        told_apart,
-    )
+    from bywire.api.comparison import compared
 
-    require_comparable(runs, overrides)
-    places = [k for k, each in enumerate(runs) if is_folder(each)]
-    # Folders first: what they lack is said before anything is computed.
-    read = {k: kept(Path(str(runs[k]))) for k in places}
-    shown = [
-        read.get(k) or resolved(each, overrides, progress, estimate_error)
-        for k, each in enumerate(runs)
-    ]
-    return Comparison(tuple(told_apart(shown)), is_full)
+    return compared(runs, overrides, is_full, progress, estimate_error)

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from bywire.core.blas import on_one_thread
-from bywire.core.callers import option
 from bywire.usecases.asks import At, Changes, LoopName, ParameterSetName, Side
 from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
 
@@ -143,31 +142,15 @@ def design(
     InputError
         For names that are unknown, values out of range, and requirements that make no sense.
     """
-    from bywire.api.design import (
-        LoopDesign,
-        designed_by_region,
-        for_ecu,
-        left_to_choose,
-        narrowed,
-        requirements_of,
-        trial_of,
-        tunables_of,
-    )
-    from bywire.api.design_drawn import drawn_models, probability_of, probability_wanted
-    from bywire.api.loop_case import loop_case, over_range
+    from bywire.api.design import designed_at_point, designed_by_region, requirements_of
+    from bywire.api.loop_case import loop_case
     from bywire.core.arguments import whole_number
     from bywire.core.errors import ParameterError
-    from bywire.synthesis import designer
-    from bywire.synthesis.linear_case import cases_of
-    from bywire.synthesis.verification import verify
 
     whole_number("seed", seed, 0, 2**63 - 1)
     if schedule and vary:
         raise ParameterError("schedule and vary: gains by region are not chosen for drawn models")
-    if probability_wanted(probability) is not None and not vary:
-        raise ParameterError(
-            f"probability needs drawn models: name a study file, {option('vary')} FILE"
-        )
+    sizes = None if linear_only else amplitudes
     if schedule:
         return designed_by_region(
             loop,
@@ -176,26 +159,22 @@ def design(
             overrides,
             requirements_of(requirements, require),
             over,
-            None if linear_only else amplitudes,
+            sizes,
             free_derivative,
             seed,
             progress,
             side,
         )
-    case = loop_case(loop, parameters, at, overrides, side)
-    wanted = requirements_of(requirements, require)
-    case, overrides, limits = for_ecu(case, overrides, free_derivative)
-    tunables = left_to_choose(loop, narrowed(tunables_of(case), limits), overrides)
-    ranges = dict(over_range(text, case)[::2] for text in over)
-    models = drawn_models(case, vary, drawn) if vary else None
-    cases = cases_of(case.loop, case.par, case.value, ranges)
-    cases += () if models is None else models.cases
-    trial = None if linear_only else trial_of(case, overrides, amplitudes)
-    start = {name: case.par.leaves()[name] for name in tunables}
-    tried = None
-    designed = designer.design(tunables, wanted, cases, start, seed=seed, progress=progress)
-    if trial is not None and designed.status == "met":
-        tried = verify(designed.gains, wanted, tunables, cases, trial, seed=seed, progress=progress)
-    final = designed.gains if tried is None else tried.final.gains
-    told = None if models is None else probability_of(models, wanted, final, probability, progress)
-    return LoopDesign(case, overrides, wanted, limits, tried, designed, told)
+    return designed_at_point(
+        loop_case(loop, parameters, at, overrides, side),
+        overrides,
+        requirements_of(requirements, require),
+        over,
+        sizes,
+        free_derivative,
+        vary,
+        drawn,
+        probability,
+        seed,
+        progress,
+    )

@@ -6,7 +6,7 @@ from bywire.usecases.asks import BenchName, ExportFolder, LastBenchChanges
 from bywire.usecases.declare import NOTHING, Ask, Command, use_case
 
 if TYPE_CHECKING:
-    from bywire.api.export_controller import ControllerExport
+    from bywire.api.exports import ControllerExport
 
 Precision = Annotated[str, Ask("Numbers of the C: double, or single.")]
 Vectors = Annotated[int, Ask("Test vectors of each task.")]
@@ -83,10 +83,8 @@ def export_controller(
     import os
     from dataclasses import replace
 
-    from bywire.api.export_controller import ControllerExport, check_controller
-    from bywire.api.export_folder import export_folder
-    from bywire.bench.bench import Bench
-    from bywire.bench.bench_file import read
+    from bywire.api.exports import ControllerExport, check_controller, export_folder
+    from bywire.api.run import bench_of
     from bywire.core.arguments import whole_number
     from bywire.core.catalog import PARAMETER_SETS
     from bywire.core.errors import unknown_name
@@ -102,10 +100,7 @@ def export_controller(
     whole_number("vectors", vectors, 1, 100_000)
     if name:
         checked_name(name)
-    if not isinstance(bench, Bench):
-        bench = read(bench, overrides)
-    elif overrides:
-        bench = bench.with_overrides(overrides)
+    bench = bench_of(bench, overrides)
     case = cases_of(replace(bench, faults=()))[0]
     made = program(case.model, case.par, precision, name)
     cited = PARAMETER_SETS.find(bench.parameters).values

@@ -7,7 +7,7 @@ from bywire.usecases.asks import BenchName, ExportFolder, LastBenchChanges, Need
 from bywire.usecases.declare import NOTHING, Ask, Command, use_case
 
 if TYPE_CHECKING:
-    from bywire.api.export_fmu import ExportedFmu
+    from bywire.api.exports import ExportedFmu
     from bywire.core.typing import Progress
 
 Part = Annotated[str, Ask("brake, plant or ecu.", shown_default="brake; plant for model-exchange")]
@@ -70,15 +70,12 @@ def export_fmu(
     CompilerError
         When there is no compiler for a system, or it fails.
     """
-    from bywire.api.export_fmu import ExportedFmu
-    from bywire.api.export_folder import export_folder
-    from bywire.bench import bench_file
-    from bywire.bench.bench import Bench
+    from bywire.api.exports import ExportedFmu, export_folder
+    from bywire.api.run import bench_of
     from bywire.core.errors import ParameterError, quoted, unknown_name
     from bywire.core.typing import silent
-    from bywire.export.fmu.archive import unit_of, write_unit
-    from bywire.export.fmu.binaries import PLATFORMS, this_platform
-    from bywire.export.interface import KINDS, PARTS
+    from bywire.export.exported import KINDS, PARTS, exported
+    from bywire.export.fmu.archive import PLATFORMS, this_platform, unit_of, write_unit
 
     if kind not in KINDS:
         raise unknown_name("kind", kind, KINDS)
@@ -96,13 +93,7 @@ def export_fmu(
     for each in systems:
         if each not in PLATFORMS:
             raise unknown_name("target", each, PLATFORMS)
-    if not isinstance(bench, Bench):
-        bench = bench_file.read(bench, overrides)
-    elif overrides:
-        bench = bench.with_overrides(overrides)
-    from bywire.export.exported import exported
-
-    unit = unit_of(exported(bench, case), part, fmi, kind)
+    unit = unit_of(exported(bench_of(bench, overrides), case), part, fmi, kind)
     with export_folder(out) as folder:
         path = folder / f"{unit.identifier}.fmu"
         compilers = write_unit(unit, path, systems, progress or silent)

@@ -6,7 +6,7 @@ from bywire.usecases.asks import BenchName, ExportFolder, LastBenchChanges, Need
 from bywire.usecases.declare import NOTHING, Command, use_case
 
 if TYPE_CHECKING:
-    from bywire.api.export_wasm import ExportedWasm
+    from bywire.api.exports import ExportedWasm
 
 
 @use_case(Command("export wasm", writes=""))
@@ -45,20 +45,13 @@ def export_wasm(
     """
     import os
 
-    from bywire.api.export_folder import export_folder
-    from bywire.api.export_wasm import ExportedWasm
-    from bywire.bench import bench_file
-    from bywire.bench.bench import Bench
+    from bywire.api.exports import ExportedWasm, export_folder
+    from bywire.api.run import bench_of
     from bywire.core.scratch import scratch_folder
-
-    if not isinstance(bench, Bench):
-        bench = bench_file.read(bench, overrides)
-    elif overrides:
-        bench = bench.with_overrides(overrides)
-    from bywire.export.exported import exported
-    from bywire.export.interface import identifier_of
+    from bywire.export.exported import exported, identifier_of
     from bywire.export.wasm.module import module_files
 
+    bench = bench_of(bench, overrides)
     made = exported(bench, case)
     contents = module_files(made, identifier_of(bench.name or bench.experiment))
     with export_folder(out) as folder, scratch_folder(folder) as scratch:  # all, or none

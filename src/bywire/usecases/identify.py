@@ -302,24 +302,9 @@ def identify(
     >>> list(found.tables()["Seal friction"]["parameter"])
     ['A', 'F_0', 'f']
     """
-    from bywire.api import identification
-    from bywire.api.identification import Identification
-    from bywire.api.identify import (
-        STARTS,
-        Source,
-        begun_at,
-        choose,
-        columns_of,
-        data_of,
-        far_off,
-        require_one_source,
-        search,
-        start_of,
-    )
+    from bywire.api.identification import Source, choose, identified
     from bywire.data.file_format import no_progress
     from bywire.identification.fitting.question import Question
-    from bywire.identification.method import Effort
-    from bywire.identification.trust import put_in
 
     question = Question() if question is None else question
     sources = [measurements] if isinstance(measurements, Source) else list(measurements)
@@ -335,38 +320,15 @@ def identify(
         time=time,
         progress=shown,
     )
-    named = columns_of(chosen.method, question, time)
-    require_one_source(chosen, sources, synthetic, mapping, time)
-    place = None if folder is None else Path(folder)
-    if place is not None:
-        identification.require_own(place, method)
-    data, source = data_of(chosen, sources, mapping, named, synthetic, shown)
-    files = tuple(
-        Path(each) for each in (*sources, question.holdout) if isinstance(each, str | Path)
-    )
-    if place is not None:
-        identification.remove(place, files)
-    start = start_of(chosen, synthetic)
-    store = None if place is None else place / STARTS
-    effort = Effort(starts=starts, seed=seed, store=store, progress=shown)
-    identified = search(chosen, start, data.data, effort)
-    notes = [*data.notes]
-    if chosen.par is not None:
-        notes += far_off(identified.parameters, chosen.par.leaves())
-    truth: Mapping[str, float] = {}
-    if synthetic is not None:
-        try:
-            truth = put_in(chosen.method, chosen.par, chosen.options)
-        except ParameterError as error:
-            notes.append(str(error))
-    return Identification(
+    return identified(
         chosen,
-        identified,
-        data.data,
-        source,
-        begun_at(chosen, start, identified),
-        truth,
-        tuple(notes),
-        synthetic is not None,
-        files,
+        question,
+        sources,
+        mapping=mapping,
+        time=time,
+        synthetic=synthetic,
+        folder=None if folder is None else Path(folder),
+        starts=starts,
+        seed=seed,
+        progress=shown,
     )

@@ -3,14 +3,12 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bywire.core.callers import option
-from bywire.core.errors import ParameterError
 from bywire.usecases.asks import At, Changes, ParameterSetName, Side
 from bywire.usecases.declare import NOTHING, Ask, Form, use_case
 
 if TYPE_CHECKING:
-    from bywire.api.linearize import LinearizedLoop
-    from bywire.api.linearize_plant import LinearizedPlant, PlantLocus
+    from bywire.api.linearize import LinearizedLoop, LinearizedPlant, PlantCase, PlantLocus
+    from bywire.api.loop_case import LoopCase
 
 LoopOrPlant = Annotated[
     str, Ask("Loop or plant, see 'bywire list'.", "Loop", name="loop", known=("loops", "plants"))
@@ -40,12 +38,13 @@ def _read(
     friction: str,
     speed: str,
     side: str,
-) -> None:
+) -> "LoopCase | PlantCase":
     from bywire.api.linearize import linear_case, locus_range
 
     case = linear_case(name, parameters, at, overrides, friction, speed, side)
     if locus:
         locus_range(case, locus)
+    return case
 
 
 @use_case(
@@ -117,21 +116,7 @@ def linearize(
     SolverError
         When the motion under dither does not repeat itself.
     """
-    from bywire.analysis.linear.plant import PLANTS
-    from bywire.api.linearize import linear_loop_case, linearized_loop
-    from bywire.api.linearize_plant import linearize_plant, plant_locus
+    from bywire.api.linearize import linearized
 
-    if name in PLANTS.all():
-        if dither:
-            raise ParameterError(
-                f"{option('dither', True)} is for loops: leave it out, or name a loop"
-            )
-        if locus and reduce:
-            raise ParameterError(
-                f"{option('reduce')} and {option('locus')} exclude each other: ask for one of them"
-            )
-        if locus:
-            return plant_locus(name, parameters, at, overrides, friction, speed, locus, side)
-        return linearize_plant(name, parameters, at, overrides, friction, speed, reduce, side)
-    case = linear_loop_case(name, parameters, at, overrides, friction, speed, side)
-    return linearized_loop(case, locus, reduce, dither)
+    case = _read(name, parameters, at, overrides, locus, friction, speed, side)
+    return linearized(case, locus, reduce, dither)

@@ -8,7 +8,7 @@ from bywire.usecases.asks import BenchName, LastBenchChanges, NeededCase
 from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
 
 if TYPE_CHECKING:
-    from bywire.api.page import BenchPage
+    from bywire.api.exports import BenchPage
 
 PageFile = Annotated[str | Path, Ask("File of the page (.html).", is_flag=True)]
 Sliders = Annotated[
@@ -65,24 +65,19 @@ def page(
     """
     import gzip
 
-    from bywire.api.page import BenchPage
-    from bywire.bench import bench_file
-    from bywire.bench.bench import Bench
+    from bywire.api.exports import BenchPage
+    from bywire.api.run import bench_of
     from bywire.bench.running import run
     from bywire.core.errors import ParameterError, unknown_name
     from bywire.core.parameters import leaf_fields
-    from bywire.export.exported import exported, start_source
-    from bywire.export.interface import interface
+    from bywire.export.exported import exported, interface, start_source
     from bywire.report.drawing import write_bytes
     from bywire.report.live_page.content import page_text
     from bywire.report.time_traces import shown_panels
 
     if Path(out).suffix.lower() not in (".html", ".htm"):
         raise ParameterError(f"out = {str(out)!r} is no page: give a file that ends in .html")
-    if not isinstance(bench, Bench):
-        bench = bench_file.read(bench, overrides)
-    elif overrides:
-        bench = bench.with_overrides(overrides)
+    bench = bench_of(bench, overrides)
     made = exported(bench, case)
     _, reads = start_source(made)
     used = [each.name for each in interface(made, "brake", reads).of("parameter")]

@@ -63,7 +63,7 @@ def resume_study(
     """
     from pathlib import Path
 
-    from bywire.api.run_study import completed, kept_plan, with_engine
+    from bywire.api.study_run import completed, kept_plan, with_engine
     from bywire.studies.store import StudyStore, require_extensible, with_cases
 
     store = StudyStore(Path(folder))

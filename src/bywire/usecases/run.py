@@ -126,25 +126,13 @@ def run(
     RunError
         When a run fails.
     """
-    from dataclasses import fields
+    from bywire.api.run import bench_of, faulty, require_scene, run_once
 
-    from bywire.api.run import BenchResult, faulty
-    from bywire.bench import bench_file, running
-    from bywire.bench.bench import Bench
-
-    if not isinstance(bench, Bench):
-        bench = bench_file.read(bench, overrides)
-    elif overrides:
-        bench = bench.with_overrides(overrides)
-    bench = faulty(bench, faults)
+    bench = faulty(bench_of(bench, overrides), faults)
     if animate:
-        from bywire.api.animation import require_scene
-
         require_scene(bench, over)
     if over:
         from bywire.api.run_over import run_over
 
         return run_over(bench, over, progress, engine, estimate_error)
-    result = running.run(bench, progress, engine, estimate_error)
-    given = {each.name: getattr(result, each.name) for each in fields(result)}
-    return BenchResult(**given, animated=animate)
+    return run_once(bench, progress, engine, estimate_error, animate)

@@ -109,7 +109,7 @@ def run_study(
     KeyboardInterrupt
         When interrupted; finished chunks stay.
     """
-    from bywire.api.run_study import completed, with_engine
+    from bywire.api.study_run import completed, with_engine
     from bywire.studies.meant_study import require_study_file
     from bywire.studies.store import Origin, StudyStore, with_cases
     from bywire.studies.study_file import read_study

@@ -37,6 +37,6 @@ def study_report(folder: StudyFolder) -> "StudyRun":
     InputError
         When the folder holds no study, its file is gone, or says something else by now.
     """
-    from bywire.api.run_study import kept_study
+    from bywire.api.study_run import kept_study
 
     return kept_study(folder)

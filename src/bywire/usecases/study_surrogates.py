@@ -50,10 +50,10 @@ def study_surrogates(
         have shown, or between those of a quantity that has single ones, too few cases, designs that
         do not show what lies between their points, and structural choices among what varies.
     """
-    from bywire.api.run_study import kept_study
+    from bywire.api.study_run import kept_study
     from bywire.api.study_surrogate import StudySurrogates
     from bywire.api.study_tables import shown_figures
-    from bywire.bench.relative_changes import share_of
+    from bywire.bench.changes import share_of
     from bywire.core.errors import ParameterError, unknown_name
     from bywire.core.values import number
     from bywire.studies.surrogate import Surrogate, require_fittable, surrogate_of

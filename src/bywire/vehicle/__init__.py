@@ -1,9 +1,19 @@
-"""Vehicles around any brake: what they share, and what is said of their stops."""
+"""Vehicles around any brake: bodies, slip control, ideal stops, and animations."""
 
-from bywire.vehicle.corner import Corner, CornerParameters
-from bywire.vehicle.hot_brakes import HotBrakes, cold_start
-from bywire.vehicle.hot_corner import HotCorner, HotCornerParameters, warm_disc
-from bywire.vehicle.two_wheeler import TwoWheeler, VehicleParameters, rolling_start
+from bywire.vehicle.corner import (
+    Corner,
+    CornerParameters,
+    HotCorner,
+    HotCornerParameters,
+    warm_disc,
+)
+from bywire.vehicle.two_wheeler import (
+    HotBrakes,
+    TwoWheeler,
+    VehicleParameters,
+    cold_start,
+    rolling_start,
+)
 
 __all__ = [
     "Corner",

@@ -1,7 +1,7 @@
-"""A car's corner around any brake with a disc: body, tyre and road.
+"""A car's corner around any brake with a disc: body, tyre, road, and the heat of the disc.
 
 A corner inherits from `Corner` and from the assembly of its brake, whose disc turns with the wheel.
-It says in ``wheel`` how fast that turns, and lets `tyre_torque` turn it.
+Its method ``wheel`` returns the speed of the disc, on which it applies `tyre_torque`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.parts import Integral, Part, Shown, Wire
 from bywire.core.quantities import Length
 from bywire.core.signals import Role
-from bywire.plant import corner_body, road, tyre
-from bywire.vehicle.two_wheeler import BOOK, shown_slip
+from bywire.plant import corner_body, disc_heat, road, tyre
+from bywire.vehicle.two_wheeler import BOOK, HEAT_BOOK, heat_sink, shown_slip
 
 
 class CornerParameters(ParameterSet):
@@ -35,12 +35,8 @@ class WheelSpeed(NamedTuple):
     xe: float
 
 
-def _sink(label: str) -> Role:
-    return Role("sink", label, book=BOOK)
-
-
 class Corner(Assembly[ParT, MemoryT]):
-    """Body and tyre of a corner; parameters stand in ``corner``."""
+    """Body and tyre of a corner; their parameters are in ``corner``."""
 
     corner = Part(corner_body, par="corner.body", outside=True, state={"v": "v_x"})
     tyre = Part(tyre, par="corner.tyre")
@@ -60,7 +56,7 @@ class Corner(Assembly[ParT, MemoryT]):
     E_body = Shown("J", "energy of the body", role=Role("sink", "body", book=BOOK, returns="any"))
 
     def wheel(self, w: Self) -> WheelSpeed:
-        """Return how fast the wheel turns."""
+        """Return the speed of the wheel."""
         raise NotImplementedError
 
     def tyre_torque(self, w: Self) -> float:
@@ -78,7 +74,7 @@ class Corner(Assembly[ParT, MemoryT]):
         return par.r * w.F_x
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return where the vehicle's energy goes."""
+        """Return the powers of the vehicle's energy balance."""
         body = w.corner.par
         return {
             **super().power(w),
@@ -88,7 +84,7 @@ class Corner(Assembly[ParT, MemoryT]):
         }
 
     def record(self, w: Self) -> dict[str, float]:
-        """Return what is recorded beside states, wires and losses."""
+        """Return the recorded signals other than states, wires and losses."""
         return {
             **super().record(w),
             "v_tread": w.tyre.u.v_wheel,
@@ -102,3 +98,76 @@ class Corner(Assembly[ParT, MemoryT]):
 def rolling_states(v: float) -> dict[str, Any]:
     """Return the states of the corner's parts at a speed [m/s]."""
     return {"corner": corner_body.State(s=0.0, v=v), "tyre": tyre.State(0.0)}
+
+
+# --- A corner whose brake warms up and fades
+
+
+class HotCornerParameters(CornerParameters):
+    """A corner whose brake may warm up."""
+
+    heat: disc_heat.Parameters
+
+
+class HotCorner(Corner[ParT, MemoryT]):
+    """A corner whose friction heats the disc, so that its pads may fade.
+
+    A corner inherits from it instead of `Corner`, has parameters ``corner.heat``, and multiplies
+    the friction of its pads by `pads_friction`. Its method ``brake_torque`` returns the torque that
+    its brake can hold.
+    """
+
+    disc_heat = Part(
+        disc_heat, par="corner.heat", fixed=disc_heat.State._fields, outside=True, loss="E_air"
+    )
+
+    E_friction = Shown(
+        "J", "friction of the brake that warms up", role=Role("source", "brake", book=HEAT_BOOK)
+    )
+    E_discs = Shown("J", "heat in the disc", role=heat_sink("disc"))
+    E_pads = Shown("J", "heat in the pads", role=heat_sink("pads"))
+    E_fluid = Shown("J", "heat in the caliper", role=heat_sink("caliper"))
+    E_brake = Shown(
+        "J",
+        "energy that the brake takes from the wheel",
+        role=Role("sink", "brake", book=BOOK, returns="any"),
+    )
+
+    def braked(self, w: Self) -> float:
+        """Return the energy that the brake has taken from the wheel [J]."""
+        raise NotImplementedError
+
+    def brake_torque(self, w: Self) -> float:
+        """Return the torque that the brake can hold at the wheel [N m], >= 0."""
+        raise NotImplementedError
+
+    def pads_friction(self, w: Self) -> float:
+        """Return the friction of the pads over that of cold ones."""
+        return disc_heat.friction(w.disc_heat.xe.T_disc, w.disc_heat.par)
+
+    def wire(self, w: Self) -> None:
+        """Connect the brake's heat: limit of the friction times speed, 0 where the wheel stands."""
+        super().wire(w)
+        torque = self.brake_torque(w)
+        w.disc_heat.u = disc_heat.Input(
+            P=torque * ops.fabs(self.wheel(w).x),
+            v=w.corner.xe.v,
+            pressed=ops.where(torque > 0, 1.0, 0.0),
+        )
+
+    def record(self, w: Self) -> dict[str, float]:
+        """Return the heat in the bodies, and its source."""
+        heat = disc_heat.stored(w.disc_heat.x, w.disc_heat.par)
+        return {
+            **super().record(w),
+            "E_friction": 0.0 if w.disc_heat.par.law == "off" else self.braked(w),
+            "E_brake": self.braked(w),
+            "E_discs": heat.discs,
+            "E_pads": heat.pads,
+            "E_fluid": heat.fluid,
+        }
+
+
+def warm_disc(T: float, par: disc_heat.Parameters) -> disc_heat.State:
+    """Return the brake with its disc at a temperature [K], the rest as warm as the air."""
+    return disc_heat.State(T, par.T_a, par.T_a)

@@ -1,7 +1,7 @@
 """Slip control of a car's corner: it lowers the moment that is demanded of any brake.
 
-The laws speak of pressure. A brake that follows a moment has none: its demand is handed to them as
-the pressure of a brake with ``slip.k_hat``, and what they leave of it is a moment again.
+The laws use pressures. For a brake that follows a moment, its demand is converted to the pressure
+of a brake with ``slip.k_hat``, and the lowered pressure is converted back.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ MomentRate = Annotated[float, Unit("N*m/s", 1e4), Field(gt=0, allow_inf_nan=Fals
 class Parameters(ParameterSet):
     """Sensors and laws of one wheel.
 
-    ``abs``: ``"pi"`` holds a slip, ``"rules"`` build, dump and hold by thresholds, ``"off"`` leaves
-    the demand as it is. ``sees``: speed and slip are ``"estimated"`` from pulses and an
+    ``abs``: ``"pi"`` holds a slip, ``"rules"`` build, dump and hold by thresholds, ``"off"`` passes
+    the demand unchanged. ``sees``: speed and slip are ``"estimated"`` from pulses and an
     accelerometer, or ``"known"``, for comparison.
     """
 
@@ -38,7 +38,7 @@ class Parameters(ParameterSet):
     M_rate: MomentRate
     """fastest build-up of a demand"""
     M_least: SomeMoment
-    """what slip control leaves at least, so that the pads stay on the disc"""
+    """least moment under slip control, so that the pads stay on the disc"""
     encoder: wheel_encoder.Parameters
     tau_a: TimeConstant
     """time constant of the accelerometer's filter"""
@@ -49,7 +49,7 @@ class Parameters(ParameterSet):
 
 
 class Memory(NamedTuple):
-    """What slip control holds between its ticks."""
+    """Memory of slip control between its ticks."""
 
     M_left: Annotated[float, Signal("N*m", "moment that slip control left", 300.0)]
     M_most: Annotated[float, Signal("N*m", "moment demand, build-up limited", 300.0)]
@@ -73,7 +73,7 @@ class Memory(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """What there is to be seen at a tick of vehicle and wheel, of the slope, and of the brake."""
+    """Readings at a tick, of vehicle, wheel, slope and brake."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v_wheel: Annotated[float, Signal("m/s", "speed of the tread", 20.0)]
@@ -84,7 +84,7 @@ class Readings(NamedTuple):
 
 
 def awake(v: float, par: Parameters) -> dict[str, float]:
-    """Return the memory of slip control that has seen a corner roll at a speed [m/s]."""
+    """Return the memory of slip control on a corner that rolls at a speed [m/s]."""
     omega = v / par.slip.r_hat
     seen = zeros(Memory)._replace(
         v_hat=v, v_last=v, tread_hat=v, omega_hat=omega, edge=-omega * par.T_s
@@ -99,7 +99,7 @@ def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
     """
     before, m = m, _measured(r, m, par)
     k = par.slip.k_hat
-    # While a gap is crossed nothing is built up, and the law's integral waits for the pads, too.
+    # While the pads cross a gap the demand does not build up, and the law's integral waits.
     risen = ops.where(r.touches > 0.5, m.M_most + par.M_rate * par.T_s, par.M_least)
     m = m._replace(M_most=ops.fmin(M_set, risen))
     p_most, p_before = m.M_most / k, ops.where(r.touches > 0.5, before.M_most, 0.0) / k
@@ -125,8 +125,8 @@ def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
         rules, out = abs_rules.output(rules, view, par.T_s, par.rules)  # type: ignore[assignment]
         m = m._replace(**{f"{name}_x": value for name, value in rules._asdict().items()})
     left = ops.fmax(k * out.p, ops.fmin(par.M_least, m.M_most))
-    # Near standstill slip tells of a car that rocks on its tyre: the motors would follow it
-    # against a brake that the standing disc holds. What was left stays, unless less is demanded.
+    # Near standstill, slip is a car that rocks on its tyre: the motors would follow it against a
+    # brake that the standing disc holds. The lowered moment stays, unless the demand is lower.
     holds = ops.where(m.v_hat < par.vehicle_speed.v_still, before.abs, 0.0)
     kept = ops.fmin(before.M_left, m.M_most)
     left = ops.where(holds > 0.5, kept, left)

@@ -25,15 +25,15 @@ def peak_adhesion(par: VehicleParameters) -> tuple[float, float]:
 
 
 def ideal_deceleration(par: VehicleParameters, *, front_only: bool = False) -> float:
-    r"""Return the largest deceleration, air drag apart [m/s^2].
+    r"""Return the largest deceleration without air drag [m/s^2].
 
     Both wheels at their peak, as long as the rear wheel stays on the ground,
     :math:`a \le g\, l_f/h`:
 
     .. math:: a = g \frac{\mu_f^* (1 - l_f/L) + \mu_r^* l_f/L}{1 - (\mu_f^* - \mu_r^*) h/L}
 
-    which is :math:`\mu^* g` for tyres of one curve; of the front wheel alone with
-    :math:`\mu_r^* = 0`. On a slope, with its share of the weight.
+    which is :math:`\mu^* g` for tyres of one curve. With :math:`\mu_r^* = 0` it is that of the
+    front wheel alone. On a slope, its share of the weight is added.
     """
     body, (mu, rear) = par.body, peak_adhesion(par)
     slope = road.slope(0.0, par.road)

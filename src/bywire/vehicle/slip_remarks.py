@@ -1,4 +1,4 @@
-"""What a user should know of slip control that holds one slip, on the road that it met."""
+"""Remarks on slip control that holds one slip, on the surfaces of the road."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bywire.plant import adhesion, road
 from bywire.vehicle.surfaces import surface_name
 
 FAR = 2.0
-"""slip of the largest adhesion over the slip held from which a stop is remarkable"""
+"""least ratio of the slip of the largest adhesion to the slip held that deserves a remark"""
 
 
 def far_from_peak(
@@ -20,31 +20,31 @@ def far_from_peak(
     curve: adhesion.Parameters,
     ways: road.Parameters,
 ) -> list[str]:
-    """Return on which surfaces slip control holds far less slip than they hold most at.
+    """Return remarks on surfaces whose largest adhesion needs far more slip than the slip held.
 
     Parameters
     ----------
     place
-        Of the wheel along the road [m], row by row.
+        Place of the wheel along the road [m], row by row.
     acts
         Whether slip control acts, above 0.5.
     slip_set
         Slip that it holds.
     parameter
-        What that is called, for instance ``"ecu.slip.slip_set"``.
+        Name of that parameter, for instance ``"ecu.slip.slip_set"``.
     curve, ways
-        Of tyre and road.
+        Parameters of tyre and road.
 
     Returns
     -------
     list of str
-        A text for each surface on which it acted, of those whose peak is beyond `FAR` times the
-        slip that is held.
+        A remark for each surface on which it acted and whose peak is beyond `FAR` times the slip
+        that is held.
     """
-    met = place[acts > 0.5]
-    is_further = cast("Array", road.share(cast("Any", met), ways)) > 0.5
+    places = place[acts > 0.5]
+    is_further = cast("Array", road.share(cast("Any", places), ways)) > 0.5
     texts: dict[str, None] = {}
-    for x in (*met[~is_further][:1], *met[is_further][:1]):
+    for x in (*places[~is_further][:1], *places[is_further][:1]):
         ground = road.surface(float(x), ways)
         peak = float(adhesion.peak_slip(ground, curve))
         if not peak > FAR * slip_set:
@@ -53,8 +53,8 @@ def far_from_peak(
         name = surface_name(float(x), ways)
         surface = "the road" if name == "own" else name
         texts[
-            f"slip control holds a slip of {slip_set:.3g} ({parameter}), but {surface} holds most "
-            f"at {peak:.3g}: {100.0 * held / most:.0f} % of that is used; a larger set slip, or "
-            "rules (abs=rules), brake harder there"
+            f"slip control holds a slip of {slip_set:.3g} ({parameter}), but {surface} has its "
+            f"largest adhesion at {peak:.3g}: {100.0 * held / most:.0f} % of it is used; a larger "
+            "set slip, or rules (abs=rules), brake harder there"
         ] = None
     return list(texts)

@@ -1,4 +1,4 @@
-"""A stop as a moving picture: wheels that turn and stand, marks on the road, what acts."""
+"""Animation of a stop: wheels, marks on the road, forces, and dials."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bywire.core.typing import Array
 from bywire.plant import road
 from bywire.report import style
 from bywire.report.animation.scene import Dial, Move, Scene, frames_of, over_frames
-from bywire.report.decimation import phases
+from bywire.report.channel import phases
 from bywire.vehicle.surfaces import surface_name
 
 SCALE = 100.0
@@ -32,23 +32,23 @@ TINTS = {
 """color of each surface"""
 _WIDTH, _HEIGHT, _CONTACT = 720.0, 300.0, (500.0, 225.0)
 _LOADED = 1.0  # N: a wheel off the ground leaves no mark
-_POST = 5.0  # m between posts beside the road
+_POST = 5.0  # m between posts along the road
 _ARROW = 100.0  # length for a force as large as the weight
 _SPOKES = 5
 
 
 @dataclass(frozen=True)
 class Wheel:
-    """A wheel, and the signals that tell of it.
+    """A wheel, and its signals.
 
     Parameters
     ----------
     behind
-        How far it stands behind the first contact [m].
+        Distance behind the first contact [m].
     r
         Radius [m].
     omega, sliding, load, force
-        Signals of its speed, whether its tyre slides, load and braking force.
+        Signals of its speed, sliding of its tyre, load and braking force.
     """
 
     behind: float
@@ -79,7 +79,7 @@ def stop_scene(
     ways
         The road.
     wheels
-        The first one is where the vehicle touches the road in front.
+        The first one is the front contact of the vehicle.
     body
         SVG markup of the body, its origin at the first contact, y downward.
     dials

@@ -7,9 +7,9 @@ from bywire.plant.road import SURFACES, SurfaceName
 
 
 def laid(prefix: str, first: SurfaceName, further: SurfaceName | None = None) -> dict[str, float]:
-    """Return the parameters of the road below a prefix, of some surface and of a further one.
+    """Return the parameters of a road, below a prefix, of a surface and of a further one.
 
-    The further one is the first, unless given; own ones stay as they are.
+    The further one is the first, unless given; ``"own"`` changes none.
     """
     names = {"first": first, "further": first if further is None else further}
     return {
@@ -21,6 +21,6 @@ def laid(prefix: str, first: SurfaceName, further: SurfaceName | None = None) ->
 
 
 def surface_name(place: float, ways: road.Parameters) -> str:
-    """Return what the surface at a place [m] is called, the factor on its adhesion apart."""
+    """Return the name of the surface at a place [m], whatever the factor on its adhesion."""
     numbers = adhesion.surface_of(ways.further if road.share(place, ways) > 0.5 else ways.first)
     return next((name for name, known in SURFACES.items() if known == numbers), "own")

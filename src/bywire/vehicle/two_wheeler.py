@@ -1,8 +1,8 @@
-"""A two-wheeler on a straight road, around brakes of any kind.
+"""A two-wheeler on a straight road, around brakes of any kind, which may warm up and fade.
 
-A vehicle with brakes inherits from `TwoWheeler` and from the assemblies of its brakes, and says in
-``brake_torques`` what these can hold at each wheel. Standstill is no special case: brake and
-rolling resistance are one dry friction on each wheel, the tyre is a spring, and the road is felt
+A vehicle with brakes inherits from `TwoWheeler` and from the assemblies of its brakes. Its method
+``brake_torques`` returns the torques that they can hold. Standstill is not a special case: brake
+and rolling resistance are one dry friction on each wheel, the tyre is a spring, and the road acts
 at every speed.
 """
 
@@ -16,10 +16,10 @@ from bywire.core.model import Bounds
 from bywire.core.parameters import ParameterSet
 from bywire.core.parts import Integral, Part, Shown, Wire
 from bywire.core.signals import Role
-from bywire.plant import ground_support, road, road_wheel, two_wheeler_body, tyre
+from bywire.plant import disc_heat, ground_support, road, road_wheel, two_wheeler_body, tyre
 
 BOOK = "vehicle"
-_CRAWL = 0.05  # of the tyre's low speed: below, a slip is no longer told from none
+_CRAWL = 0.05  # share of the tyre's low speed below which slip fades to zero
 
 
 class VehicleParameters(ParameterSet):
@@ -44,7 +44,7 @@ def _tyre(label: str) -> Role:
 
 
 class TwoWheeler(Assembly[ParT, MemoryT]):
-    """Body, two wheels on their tyres, and a road; parameters stand in ``vehicle``."""
+    """Body, two wheels on their tyres, and a road; their parameters are in ``vehicle``."""
 
     frictions: ClassVar[tuple[str, ...]] = ("omega_f", "omega_r")
 
@@ -94,11 +94,11 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     )
 
     def brake_torques(self, w: Self) -> tuple[float, float]:
-        """Return what the front and the rear brake can hold [N m], >= 0."""
+        """Return the torques that the front and the rear brake can hold [N m], >= 0."""
         raise NotImplementedError
 
     def wire(self, w: Self) -> None:
-        """Say what wheels, tyres and body feel."""
+        """Connect wheels, tyres and body."""
         super().wire(w)
         par = w.body.par
         w.T_f, w.T_r = self.brake_torques(w)
@@ -122,7 +122,7 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
         return (*super().friction(w), (-front, front), (-rear, rear))
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return where the vehicle's energy goes."""
+        """Return the powers of the vehicle's energy balance."""
         rolling, brakes = [], []
         for wheel, name, (_, most) in zip(
             (w.front, w.rear), TwoWheeler.frictions, _resistances(w), strict=True
@@ -145,7 +145,7 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
         }
 
     def record(self, w: Self) -> dict[str, float]:
-        """Return what is recorded beside states, wires and losses."""
+        """Return the recorded signals other than states, wires and losses."""
         force = two_wheeler_body.balance(w.body.x, w.body.u, w.body.par).v
         kinetic = (
             two_wheeler_body.energy(w.body.x, w.body.par)
@@ -180,7 +180,7 @@ def rolling_start(v: float, par: VehicleParameters) -> dict[str, Any]:
 
 
 def _felt(w: Any, wheel: Any, rubber: Any, place: float) -> tyre.Input:
-    """Return what a tyre feels, but for its load."""
+    """Return the input of a tyre, without its load."""
     ground, speed, tread = road.surface(place, w.road.par), w.body.x.v, wheel.par
     seen = tyre.Contact(w.body.xe.v, road_wheel.tread_speed(wheel.xe, tread), *ground)
     limits = tyre.limits(seen, rubber.par)
@@ -190,7 +190,7 @@ def _felt(w: Any, wheel: Any, rubber: Any, place: float) -> tyre.Input:
 
 
 def shown_slip(u: tyre.Input, par: tyre.Parameters) -> float:
-    """Return the slip as recordings show it: fading where nothing moves any more."""
+    """Return the slip as recordings show it: it fades to zero at standstill."""
     least = _CRAWL * par.v_low
     faster = ops.fmax(ops.fmax(ops.fabs(u.v), ops.fabs(u.v_wheel)), least)
     return (u.v - u.v_wheel) / faster
@@ -213,8 +213,87 @@ def _loads(w: Any, cosine: float, front: tyre.Input, rear: tyre.Input) -> two_wh
 
 
 def _resistances(w: Any) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return for each wheel what its brake and its rolling resistance can hold [N m]."""
+    """Return the torques that brake and rolling resistance of each wheel can hold [N m]."""
     return (
         (w.T_f, road_wheel.rolling_resistance(w.N_f, w.front.par)),
         (w.T_r, road_wheel.rolling_resistance(w.N_r, w.rear.par)),
     )
+
+
+# --- Brakes that warm up and fade
+
+HEAT_BOOK = "heat"
+_SLOW = disc_heat.State._fields
+
+
+def heat_sink(label: str) -> Role:
+    """Return the role of a body that holds heat."""
+    return Role("sink", label, book=HEAT_BOOK, returns="any")
+
+
+class HotBrakes(TwoWheeler[ParT, MemoryT]):
+    """A two-wheeler whose friction heats the discs of both wheels, so that its pads may fade.
+
+    A vehicle inherits from it instead of `TwoWheeler` and has parameters ``front.heat`` and
+    ``rear.heat``. Its method ``cold_torques`` returns the torques that cold brakes hold. A brake
+    may stay cold (``front.heat.law = "off"``): its heat is then not computed.
+    """
+
+    front_heat = Part(
+        disc_heat, par="front.heat", suffix="_f", fixed=_SLOW, outside=True, loss="E_air"
+    )
+    rear_heat = Part(
+        disc_heat, par="rear.heat", suffix="_r", fixed=_SLOW, outside=True, loss="E_air"
+    )
+
+    E_friction = Shown(
+        "J", "friction of the brakes that warm up", role=Role("source", "brakes", book=HEAT_BOOK)
+    )
+    E_discs = Shown("J", "heat in the discs", role=heat_sink("discs"))
+    E_pads = Shown("J", "heat in the pads", role=heat_sink("pads"))
+    E_fluid = Shown("J", "heat in calipers and fluid", role=heat_sink("calipers and fluid"))
+
+    def cold_torques(self, w: Self) -> tuple[float, float]:
+        """Return the torques that the cold front and rear brake can hold [N m], >= 0."""
+        raise NotImplementedError
+
+    def brake_torques(self, w: Self) -> tuple[float, float]:
+        """Return the torques that they can hold at the temperature of their discs."""
+        front, rear = self.cold_torques(w)
+        return (
+            front * disc_heat.friction(w.front_heat.xe.T_disc, w.front_heat.par),
+            rear * disc_heat.friction(w.rear_heat.xe.T_disc, w.rear_heat.par),
+        )
+
+    def wire(self, w: Self) -> None:
+        """Connect the brakes' heat: limit of the friction times speed, 0 where a wheel stands."""
+        super().wire(w)
+        for heat, wheel, torque in (
+            (w.front_heat, w.front, w.T_f),
+            (w.rear_heat, w.rear, w.T_r),
+        ):
+            heat.u = disc_heat.Input(
+                P=torque * ops.fabs(wheel.x.omega),
+                v=w.body.xe.v,
+                pressed=ops.where(torque > 0, 1.0, 0.0),
+            )
+
+    def record(self, w: Self) -> dict[str, float]:
+        """Return the heat in the bodies, and its source."""
+        every = ((w.front_heat, w.flow.E_brake_f), (w.rear_heat, w.flow.E_brake_r))
+        each = [disc_heat.stored(heat.x, heat.par) for heat, _ in every]
+        return {
+            **super().record(w),
+            "E_friction": sum((taken for heat, taken in every if heat.par.law != "off"), start=0.0),
+            "E_discs": each[0].discs + each[1].discs,
+            "E_pads": each[0].pads + each[1].pads,
+            "E_fluid": each[0].fluid + each[1].fluid,
+        }
+
+
+def cold_start(front: disc_heat.Parameters, rear: disc_heat.Parameters) -> dict[str, Any]:
+    """Return the states of both brakes as warm as the air, by their parts."""
+    return {
+        part: disc_heat.State(par.T_a, par.T_a, par.T_a)
+        for part, par in (("front_heat", front), ("rear_heat", rear))
+    }

@@ -13,9 +13,8 @@ from bywire.analysis.loop import LOOPS
 from bywire.analysis.margins import margins
 from bywire.brakes.motorcycle.linear import PressureLoop
 from bywire.brakes.wedge.laws import moment_control
-from bywire.brakes.wedge.model import WedgeBrake, state_at
+from bywire.brakes.wedge.model import WedgeBrake, force_for, memory_at, state_at, travel_for
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.start import force_for, memory_at, travel_for
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.core.model import Task

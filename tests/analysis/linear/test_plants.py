@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.linear.plant import PLANTS
+from bywire.analysis.loop import PLANTS
 from bywire.analysis.reduction import reduction_error
 from bywire.brakes.motorcycle.linear import theoretical, two_pole, two_pole_error, with_slow_pair
 from bywire.brakes.motorcycle.paper.facts import FACTS, table4_model
 from bywire.brakes.motorcycle.trim import holding_current, travel_at
 from bywire.brakes.wedge.elements import wedge
-from bywire.brakes.wedge.linear import (
-    MECHANICAL,
+from bywire.brakes.wedge.model import WedgeBrake, force_for
+from bywire.brakes.wedge.plants import (
+    MECHANICAL_STATES,
     SMOOTH,
     full,
     mechanical,
@@ -24,8 +25,6 @@ from bywire.brakes.wedge.linear import (
     rigid,
     rigid_rate,
 )
-from bywire.brakes.wedge.model import WedgeBrake
-from bywire.brakes.wedge.start import force_for
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.plant import roller_screw
@@ -91,7 +90,7 @@ def test_poles_of_the_simplified_wedges(mu_B: float) -> None:
 def test_the_error_of_a_simplified_plant_is_told_and_small() -> None:
     plant, par = of("wedge-mechanical")
     model, exact = plant.model(par, plant.usual), plant.whole(par, plant.usual)
-    assert model.states == MECHANICAL
+    assert model.states == MECHANICAL_STATES
     error = reduction_error(exact, model, 10.0)
     assert error.relative < 0.03
     # At the end of its band the drives' lag is left: demand filter and current loop.

@@ -12,7 +12,7 @@ from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.reduction import reduce, reduction_error, residualized
 from bywire.brakes.motorcycle.linear import linear_model
-from bywire.brakes.wedge.linear import full
+from bywire.brakes.wedge.plants import full
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 

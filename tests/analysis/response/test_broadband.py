@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.response.broadband import Broadband, broadband_response
-from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.frequency_response import (
+    Broadband,
+    broadband_response,
+    frequency_response,
+)
 from bywire.analysis.response.sweep import Sweep
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.api.described import faults
+from bywire.api.things import faults
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import bench_text, load, read
-from bywire.bench.faults.course import AT_ZERO
+from bywire.bench.faults.fault_section import AT_ZERO
 from bywire.bench.faults.modes import modes_of
 from bywire.bench.running import run
 from bywire.core.catalog import PARAMETER_SETS
@@ -97,19 +97,19 @@ def test_a_bench_file_with_faults_is_read_and_written_and_read_again(tmp_path):
         ({"fault": "motor.hot", "value": "2 bar"}, "wrong unit"),
         ({"fault": "motor.hot", "value": -1}, "fault motor.hot: motor"),
         ({"fault": "battery.lost", "value": 3}, "battery.lost takes no value"),
-        ({"fault": "pressure.dropout", "value": 1.5}, "from 0 to 1 is wanted"),
-        ({"fault": "bridge.late", "value": 2.5}, "a whole number from 1 to 1000 is wanted"),
+        ({"fault": "pressure.dropout", "value": 1.5}, "a number from 0 to 1"),
+        ({"fault": "bridge.late", "value": 2.5}, "a whole number from 1 to 1000"),
         ({"fault": "motor.hot", "onset": "1 s"}, "begins at 1 s, but the run ends at 0.06 s"),
         ({"fault": "motor.hot", "onzet": "1 s"}, "unknown key in \\[\\[faults\\]\\], number 1"),
         ({"fault": "motor.hot", "ramp": "1 ms", "every": "1 ms"}, "not both"),
         ({"fault": "motor.hot", "seed": -1}, "a whole number >= 0"),
         ({"value": 3}, "names no fault"),
-        ({"fault": "motor.hot", "onset": "-2 s", "lasts": "1 s"}, "is over at -1 s, but the run"),
+        ({"fault": "motor.hot", "onset": "-2 s", "lasts": "1 s"}, "ends at -1 s, but the run"),
         ({"fault": "motor.hot", "every": "1 us"}, "more than 10000 times until 0.06 s"),
-        ({"fault": "motor.hot", "share": "50 %"}, "give every, in which it comes back"),
+        ({"fault": "motor.hot", "share": "50 %"}, "give every"),
         ({"fault": "motor.hot", "onset": "-1e300 s"}, "it must be >= -1e\\+06 s"),
-        ({"fault": "pressure.noise", "value": "-1 bar"}, "a number from 0 to inf is wanted"),
-        ({"fault": "motor.hot", "set": {"motor.R_m": "+1%"}}, "neither fault nor value beside it"),
+        ({"fault": "pressure.noise", "value": "-1 bar"}, "a number from 0 to inf"),
+        ({"fault": "motor.hot", "set": {"motor.R_m": "+1%"}}, "neither fault nor value"),
         ({"set": {"motor.R": 3}}, "unknown parameter of faults\\[1\\] 'motor.R'"),
         ({"set": {"ecu.T_s": "2 ms"}, "onset": "20 ms"}, "alters a sample time"),
         ({"fault": "fluid.air", "value": "9 ml"}, "fluid.V_air"),

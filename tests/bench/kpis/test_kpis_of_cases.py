@@ -20,11 +20,9 @@ from bywire.bench.kpis import (
     step_response,
     vehicle_stop,
 )
-from bywire.bench.kpis.cases import FamilyJudge, evaluate_cases
+from bywire.bench.kpis.families import FAMILIES, FamilyJudge, evaluate, evaluate_cases
 from bywire.bench.kpis.loop_family import NO_NUMBER
-from bywire.bench.kpis.loops import moving_average
-from bywire.bench.kpis.registry import FAMILIES, evaluate
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis.samples import moving_average, smoothed
 from bywire.bench.rows import Rows
 from bywire.simulation.compiler import find_compiler
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.bench.kpis import effort, hysteresis, occupation, registry, release, warming
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis import effort, families, hysteresis, occupation, release, warming
+from bywire.bench.kpis.samples import smoothed
 
 LAG = 0.3
 
@@ -17,7 +17,7 @@ def loop(t, i, p, smoothing=0.0):
         {"i": ("time", i, {"units": "A"}), "p_mc": ("time", p, {"units": "Pa"})},
         {"time": ("time", t)},
     )
-    return registry.evaluate("hysteresis", recording, hysteresis.Setting("i", "p_mc", smoothing))
+    return families.evaluate("hysteresis", recording, hysteresis.Setting("i", "p_mc", smoothing))
 
 
 @pytest.mark.parametrize("start", [0.0, 1.0, 4.0])
@@ -72,7 +72,7 @@ def test_effort_of_a_sine():
     i = -3 * np.sin(2 * math.pi * t)
     power = 1 + 2 * t
     recording = xr.Dataset({"i": ("time", i), "P_el": ("time", power)}, {"time": ("time", t)})
-    found = registry.evaluate("effort", recording, effort.Setting())
+    found = families.evaluate("effort", recording, effort.Setting())
     expected = {
         "peak_current": 3,
         "mean_current": 6 / math.pi,
@@ -82,9 +82,9 @@ def test_effort_of_a_sine():
     }
     assert {k: v.value for k, v in found.items()} == pytest.approx(expected, rel=1e-6)
     recording["E_source"] = ("time", 5 + 7 * t)  # integrated within the samples: it counts
-    found = registry.evaluate("effort", recording, effort.Setting())
+    found = families.evaluate("effort", recording, effort.Setting())
     assert found["energy"].value == pytest.approx(7)
-    empty = registry.evaluate(
+    empty = families.evaluate(
         "effort", recording.drop_vars(["i", "P_el", "E_source"]), effort.Setting()
     )
     assert all(math.isnan(kpi.value) and "recorded" in kpi.note for kpi in empty.values())
@@ -96,12 +96,12 @@ def test_occupation_of_modes():
         {"stuck": ("time", [1.0, 1.0, 0.0, 0.0]), "sat_duty": ("time", [0.0, 0.5, 0.0, 0.0])},
         {"time": ("time", t)},
     )
-    found = registry.evaluate("occupation", recording, occupation.Setting())
+    found = families.evaluate("occupation", recording, occupation.Setting())
     assert found["share_stuck"].value == pytest.approx(1.5 / 4)
     assert "not recorded" in found["share_sat_current"].note
     assert "other values than 0 and 1" in found["share_sat_duty"].note
     recording["t_stuck"] = ("time", [0.0, 1.0, 1.2, 1.2])
-    found = registry.evaluate("occupation", recording, occupation.Setting())
+    found = families.evaluate("occupation", recording, occupation.Setting())
     assert found["share_stuck"].value == pytest.approx(0.3)
 
 
@@ -115,9 +115,10 @@ def test_moving_average_of_a_period_is_exact_on_ramps_and_blind_to_ripple():
 
 
 def test_every_figure_is_declared_for_listings():
-    found = registry.definitions()
-    families = registry.FAMILIES.all().values()
-    assert set(found) == {name for family in families for name in family.measures}
+    found = families.definitions()
+    known = families.FAMILIES.all().values()
+    assert set(found) == {name for family in known for name in family.measures}
+
     assert {"rise_time", "energy", "share_stuck", "loop_area"} <= set(found)
     for figure in found.values():
         assert figure.definition.endswith(".")
@@ -129,7 +130,7 @@ def test_time_to_empty_lies_between_the_rows():
     t = np.arange(0.0, 2.0, 1e-2)
     p = ("time", np.exp(-t / 0.4), {"units": "Pa"})
     recording = xr.Dataset({"p": p}, {"time": ("time", t)})
-    found = registry.evaluate("release", recording, release.Setting("p", 0.1))
+    found = families.evaluate("release", recording, release.Setting("p", 0.1))
     exact = 0.4 * math.log(10.0)
     assert found["time_to_empty"].value == pytest.approx(exact, abs=1e-2**2 / 8 / 0.4)
     assert abs(np.min(np.abs(t - exact))) > 1e-3
@@ -143,7 +144,7 @@ def test_of_several_windings_the_hottest_counts():
         "T_winding_2": ("time", np.where(t < 4.05, 380.0, 310.0), {"units": "K"}),
         "derated": ("time", np.where((t > 0.95) & (t < 4.05), 1.0, 0.0), {"units": "1"}),
     }
-    found = registry.evaluate("warming", xr.Dataset(rows, {"time": t}), warming.Setting("p"))
+    found = families.evaluate("warming", xr.Dataset(rows, {"time": t}), warming.Setting("p"))
     assert found["peak_winding"].value == pytest.approx(400.0)
     assert found["final_winding"].value == pytest.approx(400.0)
     assert found["derated_after"].value == pytest.approx(1.0)
@@ -151,6 +152,25 @@ def test_of_several_windings_the_hottest_counts():
     assert found["final_output"].value == pytest.approx(2e6 - 9.5e5, rel=1e-9)
     assert found["final_output"].unit == "Pa"
     bare = xr.Dataset({"p": rows["p"]}, {"time": t})
-    none = registry.evaluate("warming", bare, warming.Setting("p"))
+    none = families.evaluate("warming", bare, warming.Setting("p"))
     assert math.isnan(none["peak_winding"].value)
     assert math.isnan(none["time_derated"].value)
+
+
+def narrowing(width: float, closed_from: float) -> hysteresis.Loop:
+    """Return a loop that narrows linearly to nothing at a level."""
+    up = np.linspace(0.0, 10.0, 101)
+    half = 0.5 * width * np.clip(1.0 - up / closed_from, 0.0, None)
+    y = np.concatenate((up, up[::-1][1:]))
+    x = np.concatenate((up + half, (up - half)[::-1][1:]))
+    return hysteresis.Loop(np.arange(y.size, dtype=float), x, y)
+
+
+def test_widths_and_the_level_from_which_a_loop_is_closed() -> None:
+    loop, levels = narrowing(2.0, 5.0), np.arange(0.5, 9.9, 0.1)
+    expected = 2.0 * np.clip(1.0 - levels / 5.0, 0.0, None)
+    np.testing.assert_allclose(hysteresis.widths(loop, levels), expected, atol=1e-9)
+    assert hysteresis.closed_above(loop, 0.4, levels) == pytest.approx(4.0, abs=0.11)
+    assert hysteresis.closed_above(loop, 3.0, levels) == pytest.approx(levels[0])
+    assert math.isnan(hysteresis.closed_above(loop, -1.0, levels))
+    assert np.isnan(hysteresis.widths(loop, np.array([11.0]))[0])

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bywire.bench.kpis.cases import evaluate_cases
-from bywire.bench.kpis.registry import FAMILIES, evaluate
+from bywire.bench.kpis.families import FAMILIES, evaluate, evaluate_cases
 from bywire.bench.rows import Rows
 from bywire.core.errors import ModelError
 from systems.loading import loaded

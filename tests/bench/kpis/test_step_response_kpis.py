@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from bywire.bench.kpis import hysteresis, release, sine_sweep, static_gain, step_response, tracking
-from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.families import evaluate
 from bywire.bench.kpis.step_response import Setting
 from bywire.bench.requirements import judge, read_limits
 from bywire.core.errors import ParameterError, UnknownNameError

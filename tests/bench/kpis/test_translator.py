@@ -33,7 +33,7 @@ from math import isfinite, sqrt
 from typing import NamedTuple
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import Samples, integral, moving_average
+from bywire.bench.kpis.samples import Samples, integral, moving_average
 
 LEVEL = 0.5
 WORDS = "its words"

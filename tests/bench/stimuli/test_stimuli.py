@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from bywire.bench.stimuli import registry
+from bywire.bench import stimulus
 from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError
 
 CHIRP = {
@@ -27,11 +27,11 @@ RAMP = {
 
 
 def sampled(kind, values, t, unit="A"):
-    return registry.create(kind, values, unit).sample(np.asarray(t, dtype=float))
+    return stimulus.create(kind, values, unit).sample(np.asarray(t, dtype=float))
 
 
 def test_every_kind_is_found_and_described():
-    found = registry.STIMULI.all()
+    found = stimulus.STIMULI.all()
     assert set(found) == {"chirp", "multisine", "ramp", "sine", "step", "table"}
     assert all(entry.summary for entry in found.values())
 
@@ -119,7 +119,7 @@ def test_table_between_and_outside_its_nodes():
 )
 def test_wrong_values_are_refused(kind, changes, error, text):
     with pytest.raises(error, match=text):
-        registry.create(kind, RAMP | changes, "A")
+        stimulus.create(kind, RAMP | changes, "A")
 
 
 @pytest.mark.parametrize(
@@ -138,4 +138,4 @@ def test_wrong_values_are_refused(kind, changes, error, text):
 )
 def test_contradictions_are_refused(kind, values, text):
     with pytest.raises(InputError, match=text):
-        registry.create(kind, values, "1")
+        stimulus.create(kind, values, "1")

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from benchmarks.peers.hand_code import WITHOUT_SUMS, Call
 from benchmarks.wedge import wedge_brake
 from benchmarks.wedge.hand_wedge import SUBJECT, HandWrittenWedge
-from bywire.brakes.wedge.model import WedgeBrake, state_at
+from bywire.brakes.wedge.model import WedgeBrake, memory_at, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.start import memory_at
 from bywire.core.catalog import parameters
 from bywire.simulation.compiler import SINGLE, find_compiler
 from bywire.simulation.run import Run, Trajectory, simulate

@@ -27,7 +27,7 @@ from bywire.brakes.motorcycle.studies import dither
 from bywire.control.dither import breakaway_current
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
-from bywire.report.contour import contour
+from bywire.report.range_figures import contour
 from raising import raises
 
 PAR = PARAMETER_SETS.find("dardanelli2010").parameters()

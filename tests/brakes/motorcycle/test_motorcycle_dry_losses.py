@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from bywire.bench.energy_ledger import energy_residual
 from bywire.bench.experiment import as_run
-from bywire.bench.recording import energy_residual, record
+from bywire.bench.recording import record
 from bywire.brakes.motorcycle.case import Signals, case_from_rest
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.simulation.run import simulate

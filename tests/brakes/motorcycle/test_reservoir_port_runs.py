@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import bywire
-from bywire.bench.recording import energy_residual
+from bywire.bench.energy_ledger import energy_residual
 from bywire.plant import reservoir_port
 from run_once import run_once
 

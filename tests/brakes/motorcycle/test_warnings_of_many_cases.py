@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.bench.ensemble import changed
+from bywire.bench.ensemble import changed, key_figures_of
 from bywire.bench.rows import Rows
-from bywire.bench.side_by_side import key_figures_of
 from bywire.brakes.motorcycle import watch
 from bywire.core import watching
 from bywire.core.catalog import PARAMETER_SETS

@@ -5,7 +5,7 @@ import pytest
 
 import bywire
 from bywire.analysis.linear.linearize import linearize
-from bywire.brakes.two_wheeler.loops.slip import point
+from bywire.brakes.two_wheeler.loops import point
 from bywire.control import slip_pi
 from bywire.plant import brake_disc
 
@@ -57,11 +57,11 @@ def test_a_gain_that_follows_the_speed_keeps_the_gain_margin():
 
 
 @pytest.mark.parametrize(
-    ("changes", "v", "said"),
-    [({"slip.slip_set": 0.2}, 20.0, "peak at 0.131"), ({}, -1.0, "must be > 0 m/s")],
+    ("changes", "v", "valid"),
+    [({"slip.slip_set": 0.2}, 20.0, "slip.slip_set.*< 0.131"), ({}, -1.0, "speed.*> 0 m/s")],
 )
-def test_points_that_do_not_stay_are_refused(changes, v, said):
-    with pytest.raises(bywire.BywireError, match=said):
+def test_points_that_do_not_stay_are_refused(changes, v, valid):
+    with pytest.raises(bywire.BywireError, match=valid):
         point(bywire.parameters("front600").replace(changes), v)
 
 

@@ -9,8 +9,8 @@ import pytest
 import bywire
 from bywire.bench.experiment import as_run
 from bywire.bench.kpis.vehicle_stop import standstill
-from bywire.brakes.two_wheeler.experiments import straight_stop
-from bywire.simulation.run_group import simulate_group
+from bywire.brakes.two_wheeler.experiments.straight_stop import STRAIGHT_STOP
+from bywire.simulation.ensemble import simulate_group
 
 OFF = {"ecu.abs": "off", "ecu.lift": "off", "ecu.p_rate": "1e7 bar/s"}
 KNOWN = {"ecu.sees": "known", "sensors.encoder.law": "ideal"}
@@ -47,10 +47,10 @@ def test_rules_change_nothing_else_until_a_threshold_is_met_a_tick_sooner():
 def distances(step: float, turned: np.ndarray) -> np.ndarray:
     """Return how far stops by rules take whose pulse wheels start turned by angles, (n, 2)."""
     par = bywire.parameters("sport600").replace(RULES)
-    options = straight_stop.EXPERIMENT.defaults.replace(
+    options = STRAIGHT_STOP.defaults.replace(
         {"surface": "wet-asphalt", "v_0": 30.0, "duration": 7.0}
     )
-    run = as_run(straight_stop.cases(par, options)[0], step)
+    run = as_run(STRAIGHT_STOP.cases(par, options, None)[0], step)
     pulse, T = 2.0 * math.pi / par.sensors.encoder.pulses, par.ecu.T_s
     omega_f, omega_r = run.state.omega_f, run.state.omega_r
     runs = [

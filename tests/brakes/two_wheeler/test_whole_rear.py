@@ -7,9 +7,9 @@ import pytest
 
 import bywire
 from bywire.bench.energy_ledger import actuator_ledger, further_ledgers
+from bywire.bench.ensemble import key_figures_of
 from bywire.bench.experiment import Case, as_run
 from bywire.bench.faults.modes import modes_of
-from bywire.bench.side_by_side import key_figures_of
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear
 from bywire.campaigns.residual import NEVER, residuals_of

@@ -10,8 +10,7 @@ from wedge_runs import FRICTIONLESS, IDEAL, TAN_ALPHA, brake, drive, residual
 
 from bywire.bench import bench_file
 from bywire.brakes.wedge.elements.wedge_caliper import compliance, normal_force, travel
-from bywire.brakes.wedge.model import WedgeBrake, state_at
-from bywire.brakes.wedge.start import memory_at, travel_for
+from bywire.brakes.wedge.model import WedgeBrake, memory_at, state_at, travel_for
 from bywire.core.errors import ParameterError
 from bywire.simulation.run import Run, simulate
 

@@ -9,7 +9,7 @@ import pytest
 from wedge_runs import TAN_ALPHA
 
 import bywire
-from bywire.brakes.wedge.series import tag
+from bywire.brakes.wedge.case import tag
 from bywire.core.errors import UnknownNameError
 from run_once import run_once
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.bench.ensemble import changed
-from bywire.bench.side_by_side import key_figures_of
+from bywire.bench.ensemble import changed, key_figures_of
 from bywire.brakes.wedge.life import WEDGE_PADS
 from bywire.life.life_file import read_life
 from bywire.life.projection import one_by_one, projected

@@ -14,9 +14,8 @@ from bywire.analysis.linear.sampled_loops import closed_loop
 from bywire.bench.experiment import Case, as_run
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws import moment_control
-from bywire.brakes.wedge.model import WedgeBrake, state_at
+from bywire.brakes.wedge.model import WedgeBrake, force_for, memory_at, state_at, travel_for
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.start import force_for, memory_at, travel_for
 from bywire.core.catalog import parameters
 from bywire.plant import roller_screw
 from bywire.simulation.run import simulate

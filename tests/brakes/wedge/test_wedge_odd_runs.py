@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.brakes.wedge.watch import watch
+from bywire.brakes.wedge.model import warnings_of
 from bywire.core.errors import InputError
 from bywire.report.answer import AnswerWarning
 from run_once import run_once
@@ -146,7 +146,7 @@ def test_what_begins_before_the_recording_is_not_dated():
     assert text.startswith("the wedge reached its end stop before the recording starts, x = 2")
     par = bywire.parameters("roberts2003").replace({"command.mode": "moment"})
     later = result.recordings["run"].assign(F_end=lambda r: r["F_end"].where(r["time"] > -0.05, 0))
-    assert "end stop at t = -0.049 s" in watch(later, par)[0]
+    assert "end stop at t = -0.049 s" in warnings_of(later, par)[0]
 
 
 def test_preload_has_no_negative_zero():

@@ -10,8 +10,7 @@ from wedge_runs import FRICTIONLESS, TAN_ALPHA, brake, drive
 
 from bywire.analysis.linear.linearize import linearize
 from bywire.brakes.wedge.elements import brake_heart
-from bywire.brakes.wedge.model import WedgeBrake, state_at
-from bywire.brakes.wedge.start import memory_at, travel_for
+from bywire.brakes.wedge.model import WedgeBrake, memory_at, state_at, travel_for
 from bywire.plant import roller_screw
 
 # A current loop of the usual gains acts on the shaft like 2.5 % more inertia.

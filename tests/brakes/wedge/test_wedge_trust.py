@@ -11,8 +11,7 @@ from wedge_runs import FRICTIONLESS, IDEAL, TAN_ALPHA, brake, drive
 
 import bywire
 from bywire.brakes.wedge.elements import brake_heart
-from bywire.brakes.wedge.model import WedgeBrake, state_at
-from bywire.brakes.wedge.start import memory_at
+from bywire.brakes.wedge.model import WedgeBrake, memory_at, state_at
 from bywire.core.signals import zeros
 from bywire.plant import roller_screw
 from bywire.simulation.engine import prepare

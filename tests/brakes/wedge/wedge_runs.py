@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.brakes.wedge.model import WedgeBrake, state_at
+from bywire.brakes.wedge.model import WedgeBrake, memory_at, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.start import memory_at
 from bywire.core.catalog import parameters
 from bywire.simulation.run import Run, Trajectory, simulate
 

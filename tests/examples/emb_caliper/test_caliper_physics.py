@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import bywire as toolkit
+from bywire.bench.energy_ledger import energy_residual
 from bywire.bench.experiment import as_run
-from bywire.bench.recording import energy_residual
 from bywire.core.errors import ParameterError
 
 F = 20e3

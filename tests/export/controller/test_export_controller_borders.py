@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bywire.core import ops
-from bywire.export.controller.borders import Borders, Traced
+from bywire.export.controller.vectors import Borders, Traced
 
 
 class Memory(NamedTuple):

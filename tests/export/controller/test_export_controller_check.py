@@ -12,8 +12,8 @@ import pytest
 from exported_ecu import BRAKES, bench_of, needs_compiler
 from typer.testing import CliRunner
 
-from bywire.api import export_controller as controller_check
-from bywire.api.export_controller import ControllerCheck, figures_of
+from bywire.api import exports as controller_check
+from bywire.api.exports import ControllerCheck, figures_of
 from bywire.cli.app import app
 from bywire.core.errors import CompilerError
 from bywire.export.controller.target import trial

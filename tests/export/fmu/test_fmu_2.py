@@ -10,10 +10,10 @@ from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 import bywire
-from bywire.api.export_fmu import ExportedFmu
+from bywire.api.exports import ExportedFmu
 from bywire.bench.running import run_of
 from bywire.core.errors import CompilerError, FileError, ParameterError, UnknownNameError
-from bywire.export.fmu import binaries
+from bywire.export.fmu import archive
 from bywire.usecases.export_fmu import export_fmu
 from export.fmu.clients import Client
 
@@ -298,7 +298,7 @@ def test_what_cannot_be_exported_is_said(tmp_path: Path, monkeypatch: pytest.Mon
     failing = [{"fault": "motor.demagnetized", "onset": "50 ms"}]
     with pytest.raises(ParameterError, match=r"leave out its \[\[faults\]\]"):
         export_fmu(bywire.Bench("hard-braking", "dardanelli2010", faults=failing), tmp_path)
-    monkeypatch.setattr(binaries, "find_compiler", lambda: None)
+    monkeypatch.setattr(archive, "find_compiler", lambda: None)
     with pytest.raises(CompilerError):
         export_fmu(MOTORCYCLE, tmp_path / "a" / "folder")
     with pytest.raises(FileError, match="null character; make room there, or name another folder"):

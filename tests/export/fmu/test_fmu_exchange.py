@@ -12,7 +12,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 import bywire
-from bywire.api.export_fmu import ExportedFmu
+from bywire.api.exports import ExportedFmu
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.usecases.export_fmu import export_fmu
 from export.fmu.clients import Client

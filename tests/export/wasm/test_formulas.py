@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 from bywire.core.errors import CompilerError
-from bywire.export.wasm import formulas
-from bywire.export.wasm.formulas import OPERATIONS, Formula, table
+from bywire.export.wasm import module
+from bywire.export.wasm.module import OPERATIONS, Formula, table
 from bywire.simulation.graph import BOOLEAN, Graph, Node, Operation
 
 NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(NODE is None, reason="there is no node to run the formulas in")
-COMPILER = Path(formulas.__file__).with_name("formulas.mjs")
+COMPILER = Path(module.__file__).with_name("formulas.mjs")
 DRIVER = """
 import { readFileSync } from "node:fs";
 const { area, loop, turns } = JSON.parse(readFileSync("task.json"));
@@ -157,7 +157,7 @@ def test_a_loop_ends_where_its_first_result_is_up(tmp_path: Path, turns: int, le
 
 
 def test_more_than_the_table_can_tell_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(formulas, "_MOST", 40)
+    monkeypatch.setattr(module, "_MOST", 40)
     graph = Graph()
     x = total = graph.leaf("x", 0)
     for _ in range(40):

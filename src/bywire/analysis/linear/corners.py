@@ -91,7 +91,10 @@ def read_sides(text: str) -> Sides:
         if side not in (ABOVE, BELOW) or (equals and not (name and line.isdecimal())):
             raise ParameterError(
                 f"side = {quoted(part)}: write 'above' or 'below', or name operations by file and "
-                "line, for instance 'valve.py:42=below, above'"
+                "line, for instance 'valve.py:42=below, above'",
+                name="side",
+                value=part,
+                valid="'above' or 'below'",
             )
         if equals:
             places[place.replace("\\", "/")] = side
@@ -121,7 +124,7 @@ def taking(side: str) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class Jacobians:
-    """What is linearized, as numbers at one point.
+    """Jacobians of a model at one point.
 
     Parameters
     ----------
@@ -140,7 +143,7 @@ class Jacobians:
 
 @dataclass(frozen=True, eq=False)
 class Linearization:
-    """A linear model that is made at an operating point, or anywhere near it.
+    """Linear model as a function of the point at which it is computed.
 
     Parameters
     ----------
@@ -314,20 +317,20 @@ class _Corner:
         self.known: dict[bytes, Jacobians] = {}
 
     def moved(self, direction: Array) -> SmoothPoint:
-        """Return the point beside the operating point."""
+        """Return the point next to the operating point."""
         by = np.zeros(self.of.free.size)
         by[self.of.free] = REACH * direction * self.usual
         return self.of.point.moved(by)
 
     def jacobians(self, direction: Array) -> Jacobians:
-        """Return the numbers of the linear model beside the operating point."""
+        """Return the numbers of the linear model next to the operating point."""
         key = direction.tobytes()
         if key not in self.known:
             self.known[key] = self.of.jacobians(self.moved(direction))
         return self.known[key]
 
     def models(self, direction: Array) -> tuple[LinearModel, ...]:
-        """Return the linear models beside the operating point."""
+        """Return the linear models next to the operating point."""
         return self.of.models(self.moved(direction))
 
     def is_near(self) -> bool:
@@ -506,7 +509,7 @@ def _direction(rows: Sequence[tuple[Array, float, float]], generic: Array) -> Ar
 
 
 def _apart(one: LinearModel, other: LinearModel) -> tuple[Array, Array]:
-    """Return how far responses are apart, and what counts as equal; matrices without an answer."""
+    """Return the difference of responses and its tolerance; of matrices without a response."""
     if not one.inputs or not one.outputs:
         a, b = (np.hstack([model.A, model.B]) for model in (one, other))
         return np.abs(a - b), _EQUAL * np.maximum(np.abs(a), np.abs(b))
@@ -525,7 +528,7 @@ def _apart(one: LinearModel, other: LinearModel) -> tuple[Array, Array]:
 
 
 def _felt(model: LinearModel) -> tuple[str, ...]:
-    """Return the states that an output feels, sooner or later; all where there is no output."""
+    """Return the states that influence an output; all states without outputs."""
     if not model.outputs:
         return model.states
     reached = np.asarray(model.C.any(axis=0))
@@ -701,17 +704,17 @@ class _Number:
             return self._chain(elementary.cos(a), -elementary.sin(a))
         if name == "arctan":
             return self._chain(float(np.arctan(a)), 1.0 / (1.0 + a * a))
-        raise TypeError(f"ops.{name} has no slope: give it one in _Number._bywire_op")
+        raise TypeError(f"ops.{name} has no slope: define it in _Number._bywire_op")
 
 
 class _Choice:
-    """Outcome of a comparison: chooses in ``ops.where``, refuses to steer an ``if``."""
+    """Result of a comparison: valid in ``ops.where``, rejected in an ``if``."""
 
     def __init__(self, holds: bool) -> None:
         self.holds = bool(holds)
 
     def __bool__(self) -> bool:
-        raise TypeError("the flow of an equation must not hang on a value: use ops.where")
+        raise TypeError("an equation must not branch on a value: use ops.where")
 
     def __and__(self, other: Any) -> _Choice:
         return _Choice(self.holds and _holds(other))

@@ -60,7 +60,7 @@ def linearize(
     inputs
         Fields of Memory that drive the continuous part, for instance ``("i_source",)``.
     outputs
-        Fields of Output or State; where both have one of that name, what is recorded.
+        Fields of Output or State; if both have the name, that of Output.
     friction
         ``"removed"``: as if there were none. ``"sliding"``: for motion about steady sliding, the
         force of the sliding direction with its slope; every friction's velocity must be nonzero.
@@ -104,7 +104,7 @@ def smooth_point(
     at: tuple[NamedTuple, NamedTuple, NamedTuple | None],
     friction: Friction | Mapping[str, Friction] = "removed",
 ) -> SmoothPoint:
-    """Return an operating point with its closed contacts and what dry friction does there.
+    """Return an operating point with its closed contacts and the treatment of dry friction.
 
     Parameters
     ----------
@@ -220,7 +220,10 @@ def _direction(name: str, state: NamedTuple) -> float:
     if speed == 0.0:
         raise ParameterError(
             f"{name} = 0: friction at rest has no slope; give a sliding speed, or use "
-            "friction='removed'"
+            "friction='removed'",
+            name=name,
+            value="0",
+            valid="a sliding speed",
         )
     return speed
 
@@ -228,7 +231,12 @@ def _direction(name: str, state: NamedTuple) -> float:
 def _require_rest(name: str, state: NamedTuple) -> None:
     speed = float(getattr(state, name))
     if speed != 0.0:
-        raise ParameterError(f"{name} = {speed:g}: what moves is not stuck; use friction='sliding'")
+        raise ParameterError(
+            f"{name} = {speed:g}: a moving state is not stuck; use friction='sliding'",
+            name=name,
+            value=f"{speed:g}",
+            valid="0",
+        )
 
 
 def _stiffness(
@@ -295,7 +303,7 @@ def _subsets(n: int) -> tuple[NDArray[np.intp], ...]:
 
 
 def require_outputs(model: Model, outputs: Sequence[str]) -> None:
-    """Refuse names that are neither outputs nor states.
+    """Reject names that are neither outputs nor states.
 
     Raises
     ------
@@ -388,7 +396,8 @@ def equilibrium(
         name = model.State._fields[still[int(np.argmax(np.abs(left)))]]
         raise ParameterError(
             f"{model.name}: no equilibrium was found near the operating point: {name} does not "
-            "come to rest; choose another point"
+            "come to rest; choose another point",
+            name=name,
         )
     return state, memory
 

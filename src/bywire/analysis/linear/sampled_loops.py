@@ -119,7 +119,7 @@ def sampled_models(
     """
     tasks = model.tasks(par)
     if not tasks:
-        raise ParameterError(f"{model.name} has no controller: linearize() is what it takes")
+        raise ParameterError(f"{model.name} has no controller: use linearize()", name=model.name)
     for name in inputs:
         if name not in model.Stimulus._fields:
             raise unknown_name("signal of the stimulus", name, model.Stimulus._fields)
@@ -164,7 +164,7 @@ def _named(names: Sequence[str], chosen: NDArray[np.bool_]) -> frozenset[str]:
 
 
 def frames_of(periods: Sequence[float]) -> tuple[float, list[int]]:
-    """Return the longest time that divides all periods, and how often each holds it."""
+    """Return the longest time that divides all periods, and its multiple in each period."""
     # 0.2 ms and 1 ms are no multiples as floats: the nearest ratios of whole numbers are.
     exact = [Fraction(period).limit_denominator(10**9) for period in periods]
     whole = math.lcm(*(period.denominator for period in exact))
@@ -181,7 +181,7 @@ def _ticks(point: SmoothPoint, inputs: Sequence[str], kept: Sequence[str]) -> tu
 
 
 def stepped(model: LinearModel, period: float, step: float) -> LinearModel:
-    r"""Return what the midpoint rule makes of a continuous model with held inputs.
+    r"""Return the model that the midpoint rule gives for a continuous one with held inputs.
 
     .. math:: \begin{pmatrix} x_{k+1} \\ u \end{pmatrix} =
         \left[(I - \tfrac{h}{2} W)^{-1} (I + \tfrac{h}{2} W)\right]^{T/h}
@@ -209,7 +209,10 @@ def stepped(model: LinearModel, period: float, step: float) -> LinearModel:
     if count < 1 or abs(count * step - period) > _WHOLE * step:
         raise StepError(
             f"step = {step * 1e6:g} us does not divide the sample time of {period * 1e6:g} us: "
-            f"take for instance {period * 1e6 / max(count, 1):.12g} us"
+            f"take for instance {period * 1e6 / max(count, 1):.12g} us",
+            name="step",
+            value=f"{step * 1e6:g} us",
+            valid=f"{period * 1e6 / max(count, 1):.12g} us",
         )
     n, m = model.B.shape
     W = np.zeros((n + m, n + m))
@@ -288,7 +291,7 @@ def closed_loop(
 
 
 def closed_again(model: Model, system: SampledSystem, inputs: Sequence[str]) -> LinearModel:
-    """Return `closed_loop` of a system that was made for the same inputs."""
+    """Return `closed_loop` of a system with the same inputs."""
     plant, fields = system.plant, model.Memory._fields
     size = len(plant.states) + len(fields)
     A, B = np.eye(size), np.zeros((size, len(inputs)))
@@ -367,7 +370,7 @@ def open_loop(
 
 
 def cut_open(model: Model, system: SampledSystem, cut: str) -> LinearModel:
-    """Return `open_loop` of a system that was made for any inputs and outputs."""
+    """Return `open_loop` of a system with any inputs and outputs."""
     fields, states = model.Memory._fields, system.plant.states
     if _is_without_gain(system, cut):
         return _nothing(model, cut, system.common * system.frame)
@@ -386,7 +389,7 @@ def cut_open(model: Model, system: SampledSystem, cut: str) -> LinearModel:
             tick = [X, M, np.zeros((len(fields), 1))]
         F, G = system.step(tick)
         A, B = F @ A, F @ B + G
-    # Minus: what comes back enters the closed loop with a plus, and margins count it negative.
+    # Minus: the feedback enters the closed loop with a plus, but margins assume negative feedback.
     held = signals_of(model.Memory)
     unit = (signals_of(model.State) | held)[cut].unit
     return LinearModel(
@@ -474,8 +477,10 @@ def _cut_writing(system: SampledSystem, row: int, cut: str) -> tuple[Jacobians, 
     )
     if not taken:
         raise ParameterError(
-            f"{cut} cannot be cut: neither the plant nor another controller takes it from "
-            f"{system.names[owner]}; cut a state that this controller reads"
+            f"{cut} cannot be cut: neither the plant nor another controller reads it from "
+            f"{system.names[owner]}; cut a state that this controller reads",
+            name="cut",
+            value=cut,
         )
     X, M, _ = system.in_a_row(system.due(0)[: owner + 1])
     written = np.concatenate([X[row], M[row]])[None]
@@ -492,13 +497,14 @@ def _alone(system: SampledSystem, tasks: list[int], refusal: str) -> int:
     """Return the one task of a list, which must run only once in the common period."""
     if len(tasks) != 1:
         names = ", ".join(system.names[k] for k in tasks) or "none"
-        raise ParameterError(f"{refusal}, found {names}")
+        raise ParameterError(f"{refusal}, found {names}", name="cut")
     (owner,) = tasks
     if system.every[owner] != system.common:
         often = system.common // system.every[owner]
         raise ParameterError(
             f"{refusal}, and no other may run more slowly: {system.names[owner]} runs {often} "
-            "times while the slowest one runs once"
+            "times while the slowest one runs once",
+            name="cut",
         )
     return owner
 
@@ -545,7 +551,7 @@ def analog_gain(
     kept = [name for name in whole.live if name not in locked]
     plant = whole.reduced(kept, held=bool(locked))
     if cut in locked:
-        raise ParameterError(f"{cut} cannot be cut: it is locked")
+        raise ParameterError(f"{cut} cannot be cut: it is locked", name="cut", value=cut)
     if cut not in plant.states:
         return _nothing(model, cut, 0.0)
     k = plant.states.index(cut)
@@ -557,7 +563,9 @@ def analog_gain(
         readers = {name for name, reads in zip(model.State._fields, by, strict=True) if reads}
         if readers - {cut, *locked}:  # it is read, but for gains of 0
             return _nothing(model, cut, 0.0)
-        raise ParameterError(f"{cut} cannot be cut: nothing in {model.name} reads it")
+        raise ParameterError(
+            f"{cut} cannot be cut: nothing in {model.name} reads it", name="cut", value=cut
+        )
     return replace(
         plant,
         name=f"{model.name}, cut at {cut}",

@@ -16,8 +16,8 @@ from bywire.core.ops import where
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 from bywire.core.typing import Array
-from bywire.simulation.buffered_call import BufferedCall
 from bywire.simulation.engine import structure_of
+from bywire.simulation.native import BufferedCall
 
 _BUILT: dict[tuple[object, ...], SmoothFunctions] = {}
 

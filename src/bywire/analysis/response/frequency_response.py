@@ -1,10 +1,12 @@
-"""Frequency response of a nonlinear sampled loop, sine by sine, over frequency and amplitude."""
+"""Frequency response of a nonlinear sampled loop, sine by sine or all frequencies at once."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -17,11 +19,13 @@ from bywire.analysis.response.sweep import (
     as_dataset,
     cases_of,
     interval,
+    kept,
+    line_window,
     require_measurable,
     sine_window,
     spread_of,
 )
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, not_valid
 from bywire.core.interrupts import thread_pool
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array, Complex, Progress
@@ -35,7 +39,7 @@ STILL = 1e-12
 
 
 def require_stable(closed: LinearModel) -> None:
-    """Refuse a loop whose response would grow without end.
+    """Reject an unstable loop.
 
     Raises
     ------
@@ -48,7 +52,8 @@ def require_stable(closed: LinearModel) -> None:
     rates = ", ".join(f"{math.log(abs(z)) / closed.period:.3g}" for z in outside)
     raise ParameterError(
         f"{closed.name}: the closed loop is unstable and has no frequency response; its poles "
-        f"outside the unit circle grow with {rates} 1/s"
+        f"outside the unit circle grow with {rates} 1/s",
+        name=closed.name,
     )
 
 
@@ -157,7 +162,7 @@ def _measured(repeated: Repeated, sizes: Array, periods: int, least: float) -> d
     """Return the figures of all cases at one frequency, shape (cases,) each."""
     outputs = repeated.values[:, :, 0]
     count = max(min(HARMONICS, outputs.shape[1] // (2 * periods)), 1)
-    # The window holds whole periods: harmonics are lines of its Fourier transform.
+    # The window contains whole periods: harmonics are lines of its Fourier transform.
     spectrum = np.fft.rfft(outputs, axis=1)[:, periods : count * periods + 1 : periods]
     lines = 2.0 / outputs.shape[1] * spectrum
     moves = np.ptp(outputs, axis=1) > least
@@ -175,7 +180,7 @@ def _measured(repeated: Repeated, sizes: Array, periods: int, least: float) -> d
     }
 
 
-# --- What the step does to a measured response: the same response in half steps beside it
+# --- Numerical error of a measured response, from the same response with half the step
 
 FIGURES = (
     "gain",
@@ -186,7 +191,7 @@ FIGURES = (
     "gain_margin",
     "lower_gain_margin",
 )
-"""what gets an error; phases and margins in degree"""
+"""figures with an error; phases and margins in degree"""
 
 
 def with_step_errors(response: xr.Dataset, finer: xr.Dataset, share: float) -> xr.Dataset:
@@ -244,3 +249,222 @@ def largest(response: xr.Dataset) -> str:
     phase = response["phase_step_error"].values
     degree = float(phase[np.isfinite(phase)].max())
     return f"error from the step: up to {decibel:.1g} dB and {degree:.1g}°"
+
+
+# --- All frequencies at once
+
+MOST = 12
+"""number of windows after which a response is abandoned; windows are long here"""
+
+
+@dataclass(frozen=True)
+class Broadband:
+    """Periodic excitation with many frequencies.
+
+    Parameters
+    ----------
+    kind
+        ``"multisine"``: the wanted frequencies with equal amplitudes and random phases.
+        ``"chirp"``: a sine whose frequency rises exponentially from the lowest to the highest
+        wanted one, again and again.
+    seed
+        Of the random phases.
+    realizations
+        How many multisines of other phases are averaged; a chirp is always the same.
+    """
+
+    kind: Literal["multisine", "chirp"] = "multisine"
+    seed: int = 0
+    realizations: int = 4
+
+    @property
+    def count(self) -> int:
+        """Number of different excitations."""
+        return self.realizations if self.kind == "multisine" else 1
+
+
+def broadband_response(
+    run: Run,
+    sweep: Sweep,
+    excitation: Broadband,
+    progress: Progress | None = None,
+    *,
+    points: Sequence[Run] | None = None,
+) -> xr.Dataset:
+    r"""Measure the response at all frequencies at once, for every amplitude and variant.
+
+    .. math:: G_k = \frac{\sum Y_k U_k^*}{\sum |U_k|^2}, \quad
+        \gamma_k^2 = \frac{|\sum Y_k U_k^*|^2}{\sum |U_k|^2 \sum |Y_k|^2}
+
+    over the realizations and the last windows. For a nonlinear loop G is the best linear
+    approximation for an excitation of this kind and size, which is not the response to a sine of
+    this amplitude: frequencies share what a limit leaves.
+
+    Parameters
+    ----------
+    run
+        As in ``frequency_response``.
+    sweep
+        Frequencies, rounded to multiples of one over the window's length; the amplitudes are
+        peaks of the whole excitation, in all realizations.
+    excitation
+        Its kind.
+    progress
+        Called with ``"frequency response"`` and the finished share, 0 to 1.
+    points
+        As in ``frequency_response``.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of ``frequency_response``, but ``coherence`` is the above, and ``distortion`` the
+        output's root mean square at the lines within the band that are not excited and lie nearer
+        to this frequency than to others, over that at this frequency; NaN for a chirp, which
+        excites them all. ``scatter`` is over the windows of one realization. What concerns whole
+        runs is the same at all frequencies. Attribute ``rms`` is the excitation's root mean
+        square over its amplitude, ``window`` the window's length [s].
+
+    Raises
+    ------
+    InputError
+        As in ``frequency_response``, for frequencies that do not ascend, and without realization.
+    SolverError
+        When a trajectory leaves the numbers.
+    """
+    require_measurable(run, sweep)
+    if excitation.count < 1:
+        raise not_valid("realizations", str(excitation.realizations), ">= 1")
+    if progress is not None:
+        progress("frequency response", 0.0)
+    length, lines = line_window(run, sweep)
+    windowed = replace(run, duration=length, record=interval(run))
+    shapes = _excitations(windowed, lines, excitation)
+    cases = cases_of(windowed, sweep, points)
+    repeated = _repeated_multisines(windowed, sweep, cases, shapes, lines)
+    shape = (*cases.shape, len(shapes))
+    measured = _measured_lines(
+        repeated, shapes, lines, shape, np.asarray(sweep.amplitudes, dtype=float)
+    )
+    if excitation.kind == "chirp":
+        measured["distortion"] = np.full_like(measured["distortion"], np.nan)
+    matrix = np.repeat(cases.matrix, len(shapes), axis=1)
+    shares = sweep.shares(repeated.values, matrix, list(run.par.leaves()))
+    measured |= _of_runs(repeated, shares, shape, len(lines))
+    if progress is not None:
+        progress("frequency response", 1.0)
+    done = [{k: v[:, :, j] for k, v in measured.items()} for j in range(len(lines))]
+    dataset = as_dataset(run, sweep, [k / length for k in lines], done)
+    return dataset.assign_attrs(
+        excitation=excitation.kind,
+        seed=excitation.seed,
+        realizations=excitation.count,
+        window=length,
+        rms=float(np.sqrt(np.mean(shapes**2))),
+    )
+
+
+def _excitations(windowed: Run, lines: list[int], excitation: Broadband) -> Array:
+    """Return excitations of one root mean square and peak 1, shape (realizations, samples)."""
+    t = windowed.schedule().stimulus_times[:-1]
+    if excitation.kind == "chirp":
+        return _chirp(t / windowed.duration, lines)[None]
+    draw = np.random.default_rng(excitation.seed)
+    shapes = np.empty((excitation.count, t.size))
+    for shape in shapes:
+        spectrum = np.zeros(t.size // 2 + 1, dtype=np.complex128)
+        spectrum[lines] = np.exp(2j * math.pi * draw.random(len(lines)))
+        shape[:] = np.fft.irfft(spectrum, t.size)
+    return np.asarray(shapes / np.abs(shapes).max())
+
+
+def _chirp(share: Array, lines: list[int]) -> Array:
+    """Return a sine over the window whose frequency rises; it ends where it began, with peak 1.
+
+    What lies outside the band is cut off: slow controllers would fold it back into the band.
+    """
+    ratio = max(lines[-1] / lines[0], 1.0 + 1e-9)
+    turns = lines[0] * (ratio**share - 1.0) / math.log(ratio)
+    whole = lines[0] * (ratio - 1.0) / math.log(ratio)
+    spectrum = np.fft.rfft(np.sin(2.0 * math.pi * turns * max(round(whole), 1) / whole))
+    spectrum[: lines[0]] = spectrum[lines[-1] + 1 :] = 0.0
+    cut = np.fft.irfft(spectrum, share.size)
+    return np.asarray(cut / np.abs(cut).max())
+
+
+def _repeated_multisines(
+    windowed: Run, sweep: Sweep, cases: Cases, shapes: Array, lines: list[int]
+) -> Repeated:
+    """Run all variants, amplitudes and realizations, in this order, until they repeat."""
+    columns = [windowed.model.Stimulus._fields.index(name) for name in sweep.inputs]
+    n = len(shapes)
+
+    def excited(which: NDArray[np.int64], first: int, last: int) -> Array:
+        rows = np.repeat(cases.rest[which // n, None], last - first, axis=1)
+        waves = cases.sizes[which // n, None] * shapes[which % n, first:last]
+        rows[:, :, columns] += waves[:, :, None]
+        return rows
+
+    def figures(window: Array) -> Complex:
+        return np.asarray(np.fft.rfft(window[:, :, 0], axis=1)[:, lines])
+
+    return repeat(
+        windowed,
+        np.repeat(cases.matrix, n, axis=1),
+        excited,
+        sweep.recorded,
+        figures,
+        sweep.tolerance,
+        min(sweep.most, MOST),
+        starts=[start for start in cases.starts for _ in range(n)],
+    )
+
+
+def _measured_lines(
+    repeated: Repeated, shapes: Array, lines: list[int], shape: tuple[int, int, int], sizes: Array
+) -> dict[str, Array]:
+    """Return the figures at the lines, shape (variants, amplitudes, lines) each."""
+    U = sizes[:, None, None] * np.fft.rfft(shapes, axis=1)[:, lines]
+    windows = kept(repeated.figures, repeated.repeats)
+    Y = windows.reshape(*shape, *windows.shape[1:])
+    over = (2, 3)  # realizations and windows
+    cross = np.ma.sum(Y * U[None, :, :, None].conj(), axis=over)
+    put = np.ma.sum(np.abs(U[None, :, :, None]) ** 2 * ~np.ma.getmaskarray(Y), axis=over)
+    power = np.ma.sum(np.abs(Y) ** 2, axis=over)
+    moves = (np.ptp(repeated.values[:, :, 0], axis=1) > 0).reshape(shape).any(axis=2)[:, :, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        G = np.where(moves, np.ma.filled(cross / put, np.nan), np.nan)
+        coherence = np.ma.filled(np.abs(cross) ** 2 / (put * power), np.nan)
+        _, scatter = spread_of(repeated.figures, repeated.repeats)
+        scattered = np.sqrt((scatter.reshape(*shape, -1) ** 2).mean(axis=2))
+    return {
+        "gain": np.abs(G),
+        "phase": np.degrees(np.angle(G)),
+        "distortion": np.where(moves, _distortion(repeated, lines, shape), np.nan),
+        "coherence": np.where(moves, coherence, np.nan),
+        "scatter": np.where(moves, scattered, np.nan),
+    }
+
+
+def _distortion(repeated: Repeated, lines: list[int], shape: tuple[int, int, int]) -> Array:
+    """Return the ratio of unexcited lines nearby to each excited line, from the last window."""
+    power = np.abs(np.fft.rfft(repeated.values[:, :, 0], axis=1)[:, : lines[-1] + 1]) ** 2
+    power = power.reshape(*shape, -1).mean(axis=2)
+    at = power[:, :, lines]
+    power[:, :, lines] = 0.0
+    middles = [math.ceil((a + b) / 2) for a, b in pairwise(lines)]
+    near = np.add.reduceat(power, [lines[0], *middles], axis=2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.sqrt(near / at))
+
+
+def _of_runs(
+    repeated: Repeated, shares: Mapping[str, Array], shape: tuple[int, int, int], lines: int
+) -> dict[str, Array]:
+    """Return results of whole runs: the worst of their realizations, and means of shares."""
+    known = {
+        "windows": repeated.windows.reshape(shape).max(axis=2),
+        "settled": repeated.repeats.reshape(shape).min(axis=2),
+        "unsettled_substeps": repeated.unsettled.reshape(shape).sum(axis=2),
+        **{name: share.reshape(shape).mean(axis=2) for name, share in shares.items()},
+    }
+    return {k: np.repeat(v.astype(float)[:, :, None], lines, axis=2) for k, v in known.items()}

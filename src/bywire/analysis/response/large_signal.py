@@ -84,12 +84,12 @@ def variants_over(base: Variant, name: str, values: Sequence[float]) -> list[Var
     Raises
     ------
     UnknownNameError
-        When there is no such number.
+        When the parameter is unknown.
     ParameterError
         When there is no value, or one is not valid.
     """
     if not values:
-        raise ParameterError(f"{name}: give at least one value")
+        raise ParameterError(f"{name} needs at least one value", name=name)
     cases = base.loop.varied(base.par, base.value, name, values)
     return [Variant(base.loop, *case, at) for case, at in zip(cases, values, strict=True)]
 
@@ -124,7 +124,7 @@ def width(variant: Variant, response: xr.Dataset) -> Width:
     Parameters
     ----------
     variant
-        What was measured.
+        The measured response.
     response
         Its response over ``frequency``; see ``frequency_response``.
     """

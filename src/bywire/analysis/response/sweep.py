@@ -1,4 +1,4 @@
-"""Sweeps of sines: what one asks for, its cases and windows, and its result as a dataset."""
+"""Sweeps of sines: their definition, cases and windows, harmonics, and the resulting dataset."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.loop import Saturation
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, not_valid, unknown_name
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array, Complex
 from bywire.core.units import shown
@@ -23,14 +23,49 @@ from bywire.simulation.repetition import KEPT
 from bywire.simulation.run import Run
 
 
+def amplitudes(t: Array, y: Array, f: float, count: int) -> Complex:
+    """Return the complex amplitudes of the first harmonics, sine phase.
+
+    Parameters
+    ----------
+    t, y
+        Evenly spaced times [s] and samples over whole periods, shape (n,) each.
+    f
+        Base frequency [Hz].
+    count
+        Number of harmonics.
+    """
+    order = np.arange(1, count + 1)[:, None]
+    return np.asarray(2j * np.mean(y * np.exp(-2j * math.pi * f * order * t), axis=1))
+
+
+def total_distortion(t: Array, y: Array, f: float, count: int = 9) -> float:
+    r"""Return the total harmonic distortion, a share.
+
+    .. math:: \mathrm{THD} = \sqrt{\sum_{k=2}^{n} |a_k|^2} \, / \, |a_1|
+
+    Parameters
+    ----------
+    t, y, f
+        As in `amplitudes`.
+    count
+        Highest harmonic n; below half the sampling rate.
+    """
+    size = np.abs(amplitudes(t, y, f, count))
+    return float(np.sqrt(np.sum(size[1:] ** 2)) / size[0])
+
+
+# --- Sweeps of sines
+
+
 @dataclass(frozen=True)
 class Sweep:
-    """What shakes a loop, and how its answer is judged.
+    """Excitation of a loop, and criteria for its response.
 
     Parameters
     ----------
     inputs
-        Signals of the Stimulus that are shaken together; the first gives the unit.
+        Signals of the Stimulus that are excited together; the first determines the unit.
     output
         Signal of the Output that answers.
     frequencies
@@ -53,7 +88,7 @@ class Sweep:
         A response is settled when the complex amplitude of a window differs from that of the one
         before by less than this share. An encoder's resolution alone may scatter it by 0.3 %.
     most
-        Windows after which a response is given up.
+        Number of windows after which a response is abandoned.
     """
 
     inputs: Sequence[str]
@@ -71,7 +106,7 @@ class Sweep:
 
     @property
     def recorded(self) -> tuple[str, ...]:
-        """Outputs that a run must record: the answer first, then flags, then what is limited."""
+        """Outputs that a run must record: the response, then flags, then limited signals."""
         limited = [name for limit in self.saturations for name in limit.signals]
         return (self.output, *self.flags, *limited)
 
@@ -130,7 +165,7 @@ def as_dataset(
 
 
 def _unwrapped(phase: Array) -> Array:
-    """Return phases without jumps along frequency, gaps of what sticks left out."""
+    """Return phases without jumps along frequency; gaps from stiction are left out."""
     unwrapped = phase.copy()
     for index in np.ndindex(phase.shape[:2]):
         known = np.isfinite(phase[index])
@@ -225,15 +260,23 @@ def _column(run: Run) -> Array:
 
 def _require_alike(run: Run, sweep: Sweep, points: Sequence[Run]) -> None:
     if sweep.variations:
-        raise ParameterError("variants: give variations of one point or points, not both")
+        raise ParameterError(
+            "give either variations of one point or points, not both", name="variants"
+        )
     if not points:
-        raise ParameterError("variants: give at least one operating point")
+        raise ParameterError("variants need at least one operating point", name="variants")
     structure, tasks = structure_of(run.model, run.par), run.model.tasks(run.par)
     for k, variant in enumerate(points):
         if structure_of(variant.model, variant.par) != structure:
-            raise ParameterError(f"variant {k} is another model or makes another choice")
+            raise ParameterError(
+                f"variant {k} has another model or another choice", name="variants", value=str(k)
+            )
         if [t.period for t in variant.model.tasks(variant.par)] != [t.period for t in tasks]:
-            raise ParameterError(f"variant {k} has other sample times: they cannot vary in a sweep")
+            raise ParameterError(
+                f"variant {k} has other sample times, which cannot vary in a sweep",
+                name="variants",
+                value=str(k),
+            )
 
 
 # --- Windows over which a periodic response is evaluated: how long, how far they scatter
@@ -246,7 +289,7 @@ _CLOSE = 1e-4  # share that a frequency may be off before a longer window is wor
 
 
 def require_measurable(run: Run, sweep: Sweep) -> None:
-    """Refuse unknown signals, and frequencies and amplitudes that cannot be measured.
+    """Reject unknown signals, and frequencies and amplitudes that cannot be measured.
 
     Raises
     ------
@@ -267,12 +310,15 @@ def require_measurable(run: Run, sweep: Sweep) -> None:
     for kind, values, symbol in wanted:
         if not len(values) or not all(math.isfinite(v) and v > 0 for v in values):
             given = ", ".join(shown(float(v), symbol) for v in values) or "none"
-            raise ParameterError(f"{kind} = {given}: positive numbers are wanted")
+            raise not_valid(kind, given, "positive numbers")
     limit, highest = nyquist(run), max(sweep.frequencies)
     if highest >= limit:
         raise ParameterError(
             f"frequency {highest:g} Hz is not below the Nyquist frequency of the controller, "
-            f"{limit:g} Hz: ask for lower frequencies"
+            f"{limit:g} Hz: use lower frequencies",
+            name="frequency",
+            value=f"{highest:g} Hz",
+            valid=f"< {limit:g} Hz",
         )
 
 
@@ -321,14 +367,17 @@ def sine_window(run: Run, f: float, sweep: Sweep) -> tuple[float, int]:
 
 
 def _require_short(run: Run, length: float, f: float, periods: float) -> None:
-    """Refuse a window of more samples than are held at once, before anything is computed."""
+    """Reject a window with too many samples, before anything is computed."""
     samples = length / interval(run)
     if not samples <= MOST_SAMPLES:
         lowest = periods / (MOST_SAMPLES * interval(run))
         raise ParameterError(
-            f"frequency {shown(f, 'Hz')}: its window would hold {samples:.3g} samples, and "
-            f"{MOST_SAMPLES:.0e} are taken at most: ask for frequencies from "
-            f"{shown(float(f'{lowest:.2g}'), 'Hz')} on, or a lower sample rate"
+            f"frequency {shown(f, 'Hz')}: its window would have {samples:.3g} samples, more than "
+            f"{MOST_SAMPLES:.0e}: use frequencies from {shown(float(f'{lowest:.2g}'), 'Hz')} on, "
+            "or a lower sample rate",
+            name="frequency",
+            value=shown(f, "Hz"),
+            valid=f">= {shown(float(f'{lowest:.2g}'), 'Hz')}",
         )
 
 
@@ -345,7 +394,7 @@ def line_window(run: Run, sweep: Sweep) -> tuple[float, list[int]]:
     f = list(sweep.frequencies)
     apart = [b - a for a, b in itertools.pairwise(f)]
     if any(step <= 0 for step in apart):
-        raise ParameterError(f"frequencies = {f}: write them in ascending order")
+        raise not_valid("frequencies", str(f), "in ascending order")
     common = common_interval(run, sweep.whole)
     wanted = max(max(sweep.least, _LOWEST) / f[0], sweep.shortest, *(2.0 / step for step in apart))
     # Half a line more: rounded to lines, neighbors keep one between them.
@@ -355,7 +404,7 @@ def line_window(run: Run, sweep: Sweep) -> tuple[float, list[int]]:
 
 
 def kept(figures: Complex, settled: NDArray[np.bool_]) -> np.ma.MaskedArray[Any, Any]:
-    """Return the windows that count: the last two of what repeats, else all that are kept.
+    """Return the windows that count: the last two of a repeating response, else all kept ones.
 
     Parameters
     ----------

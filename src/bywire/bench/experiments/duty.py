@@ -9,10 +9,9 @@ import numpy as np
 from pydantic import Field
 
 from bywire.bench.experiment import Experiment
-from bywire.bench.generic_experiment import Course, GenericExperiment, InputLevel, Subject
+from bywire.bench.generic_experiment import Course, GenericExperiment, InputLevel, TestedModel
 from bywire.bench.kpis import warming
-from bywire.bench.stimuli.quantities import TOLERANCE, reached
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.stimulus import TOLERANCE, Stimulus, reached
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant, Unit
 
@@ -42,7 +41,7 @@ class Options(ParameterSet):
     """time before the first application"""
 
 
-def build(subject: Subject) -> Experiment:
+def build(subject: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by how warm it gets and what is left then."""
 
     def course(options: Any, _: Mapping[str, Stimulus]) -> Course:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from bywire.bench.experiment import Experiment
-from bywire.bench.generic_experiment import GenericExperiment, Subject
+from bywire.bench.generic_experiment import GenericExperiment, TestedModel
 from bywire.bench.kpis import extremes
-from bywire.bench.stimuli.registry import wanted
+from bywire.bench.stimulus import required_stimulus
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant
 
@@ -25,10 +25,10 @@ class Options(ParameterSet):
     """time before zero, at the stimulus' first value"""
 
 
-def build(subject: Subject) -> Experiment:
+def build(subject: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by the extremes of the output."""
     return subject.experiment(
-        lambda options, stimuli: wanted(stimuli.get(""), "open-loop").sample,
+        lambda options, stimuli: required_stimulus(stimuli.get(""), "open-loop").sample,
         {"extremes": lambda options: extremes.Setting(subject.output)},
         driven_unit=lambda _: subject.units["input"],
     )

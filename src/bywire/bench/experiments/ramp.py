@@ -11,11 +11,11 @@ from bywire.bench.generic_experiment import (
     GenericExperiment,
     InputLevel,
     InputRate,
-    Subject,
+    TestedModel,
 )
 from bywire.bench.kpis import extremes, hysteresis
 from bywire.bench.stimuli import ramp
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.stimulus import Stimulus
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant
@@ -46,7 +46,7 @@ class Options(ParameterSet):
     """moving average for the loop's key figures, 0 for the raw signals"""
 
 
-def build(subject: Subject) -> Experiment:
+def build(subject: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by its loop and the extremes of the output."""
     drive, unit = subject.units["drive"], subject.units["input"]
 

@@ -13,10 +13,10 @@ from bywire.bench.generic_experiment import (
     GenericExperiment,
     InputLevel,
     OutputLevel,
-    Subject,
+    TestedModel,
 )
 from bywire.bench.kpis import release
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.stimulus import Stimulus
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant
 
@@ -44,7 +44,7 @@ class Options(ParameterSet):
     """time before the release in which the output builds up"""
 
 
-def build(subject: Subject) -> Experiment:
+def build(subject: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by the time to empty and what is left."""
 
     def course(options: Any, _: Mapping[str, Stimulus]) -> Course:

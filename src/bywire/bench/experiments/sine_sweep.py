@@ -15,10 +15,10 @@ from bywire.bench.generic_experiment import (
     GenericExperiment,
     InputAmplitude,
     InputLevel,
-    Subject,
+    TestedModel,
 )
 from bywire.bench.kpis import sine_sweep
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.stimulus import Stimulus
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, TimeConstant, Unit
@@ -56,7 +56,7 @@ class Options(ParameterSet):
     """time before the first sine, at the mean"""
 
 
-def build(subject: Subject) -> Experiment:
+def build(subject: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by gain, bandwidth and lag."""
 
     def driven(options: Any, _: Mapping[str, Stimulus]) -> Course:

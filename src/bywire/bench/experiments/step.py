@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from bywire.bench.experiment import Experiment
-from bywire.bench.generic_experiment import GenericExperiment, InputLevel, Subject
+from bywire.bench.generic_experiment import GenericExperiment, InputLevel, TestedModel
 from bywire.bench.kpis import step_response
-from bywire.bench.stimuli.quantities import reached
+from bywire.bench.stimulus import reached
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant
 
@@ -35,7 +35,7 @@ class Options(ParameterSet):
     """moving average for the step's key figures, 0 for the raw output"""
 
 
-def build(subject: Subject) -> Experiment:
+def build(subject: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by its step response."""
 
     def step(options: Any) -> step_response.Setting:

@@ -13,7 +13,7 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Experiment, Recordings
-from bywire.bench.generic_experiment import GenericExperiment, Subject, at_rest
+from bywire.bench.generic_experiment import GenericExperiment, TestedModel, at_rest
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.core.errors import ParameterError
 from bywire.core.model import Model
@@ -46,7 +46,7 @@ class Options(ParameterSet):
     """largest speed, both directions"""
 
 
-def build(subject: Subject) -> Experiment:
+def build(subject: TestedModel) -> Experiment:
     """Return the experiment of a model."""
     velocity, along = subject.names["friction"], subject.names["along"]
     force = _FORCES.get(subject.units["friction"], f"W/({subject.units['friction']})")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from bywire.bench.experiment import Experiment
-from bywire.bench.generic_experiment import GenericExperiment, Subject
+from bywire.bench.generic_experiment import GenericExperiment, TestedModel
 from bywire.bench.kpis import tracking
-from bywire.bench.stimuli.registry import wanted
+from bywire.bench.stimulus import required_stimulus
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant
@@ -30,7 +30,7 @@ class Options(ParameterSet):
     """moving average for the tracking's key figures, 0 for the raw output"""
 
 
-def build(subject: Subject) -> Experiment:
+def build(subject: TestedModel) -> Experiment:
     """Return the experiment of a model, judged by how well the output follows.
 
     Raises
@@ -48,7 +48,7 @@ def build(subject: Subject) -> Experiment:
         return tracking.Setting(subject.output, subject.input, options.smoothing)
 
     return subject.experiment(
-        lambda options, stimuli: wanted(stimuli.get(""), "tracking").sample,
+        lambda options, stimuli: required_stimulus(stimuli.get(""), "tracking").sample,
         {"tracking": followed},
         "tracking",
         followed=followed,

@@ -1,20 +1,112 @@
-"""The section ``[[faults]]`` of a bench, read: which mode, how much, and when."""
+"""Section ``[[faults]]`` of a bench: modes, values and times."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
-from bywire.bench.faults.course import AT_ZERO, Course
+import numpy as np
+from pydantic import Field, model_validator
+
+from bywire.bench.changes import settled
 from bywire.bench.faults.modes import Mode, modes_of
-from bywire.bench.relative_changes import settled
 from bywire.core.callers import option
-from bywire.core.errors import ParameterError, UnknownNameError, quoted, unknown_name
+from bywire.core.errors import ParameterError, UnknownNameError, not_valid, quoted, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import TimeConstant, Unit
+from bywire.core.typing import Array
 from bywire.core.values import number, parsed
+
+Instant = Annotated[float, Unit("s", 1.0), Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+Share = Annotated[float, Unit("1", 0.5), Field(gt=0, le=1, allow_inf_nan=False)]
+STAGES = 50  # number of steps by which a parameter follows a ramp
+MOST = 10_000
+"""largest number of periods of an intermittent fault in a run"""
+_EDGE = 1e-9  # s, within which an instant counts as reached
+
+
+class Course(ParameterSet):
+    """Times of a fault on the recording's axis, sampled at the ticks of the controllers."""
+
+    onset: Instant
+    """onset; if before the start of the run, the fault is present from the start"""
+    lasts: TimeConstant
+    """duration; 0: permanent"""
+    ramp: TimeConstant
+    """time in which it grows to its full size, and in which it disappears; 0: at once"""
+    every: TimeConstant
+    """period of an intermittent fault; 0: not intermittent"""
+    share: Share
+    """share of that period in which the fault is present"""
+
+    @model_validator(mode="after")
+    def _comes_and_goes(self) -> Course:
+        if self.every > 0 and self.ramp > 0:
+            raise ValueError("a fault either grows (ramp) or is intermittent (every), not both")
+        if self.share < 1 and not self.every > 0:
+            raise ValueError("share is that of a period: give every, the period of the fault")
+        return self
+
+    @property
+    def end(self) -> float:
+        """Time at which it begins to disappear [s]; infinite for a permanent fault."""
+        return self.onset + self.lasts if self.lasts > 0 else np.inf
+
+    @property
+    def gone(self) -> float:
+        """Time from which the fault is absent [s]."""
+        return self.end + self.ramp
+
+    def is_there(self, t: Array) -> Array:
+        """Return 1 at times [s] at which the fault is present, else 0."""
+        there = (t > self.onset - _EDGE) & (t < self.gone - _EDGE)
+        if self.every > 0:
+            phase = np.mod(t - self.onset + _EDGE, self.every)
+            there &= phase < self.share * self.every
+        return there.astype(float)
+
+    def size(self, t: Array) -> Array:
+        """Return the share of its full size, 0 to 1, at times [s]."""
+        there = self.is_there(t)
+        if not self.ramp > 0:
+            return there
+        with np.errstate(over="ignore"):  # a very short ramp: fully grown
+            grown = np.clip((t - self.onset) / self.ramp, 0.0, 1.0)
+            if np.isfinite(self.gone):
+                grown = np.minimum(grown, np.clip((self.gone - t) / self.ramp, 0.0, 1.0))
+        return there * grown
+
+    def returns(self, first: float, last: float) -> float:
+        """Return the number of periods of the fault between two times [s]."""
+        span = min(last, self.end) - max(first, self.onset)
+        return max(span / self.every, 0.0) if self.every > 0 else 0.0
+
+    def instants(self, first: float, last: float) -> list[float]:
+        """Return the times [s] at which parameters change with the fault; ramps have stages."""
+        ends = self.end
+        if self.every > 0:
+            begun = max(math.floor((first - self.onset) / self.every), 0)
+            count = math.ceil(self.returns(first, last)) + 1
+            pairs = (
+                (self.onset + k * self.every, self.onset + (k + self.share) * self.every)
+                for k in range(begun, begun + count)
+            )
+            return [min(t, ends) for pair in pairs if pair[0] < min(last, ends) for t in pair]
+        edges = [self.onset, *([ends] if np.isfinite(ends) else [])]
+        if not self.ramp > 0:
+            return edges
+        stages = np.arange(1, STAGES + 1) / STAGES * self.ramp
+        return [float(edge + stage) for edge in edges for stage in stages]
+
+
+AT_ZERO = Course(onset=0.0, lasts=0.0, ramp=0.0, every=0.0, share=1.0)
+"""permanent from time zero"""
+
+
+# --- The section
 
 _OWN = ("fault", "value", "seed", "set")
 _RANGES = {
@@ -29,18 +121,18 @@ _RANGES = {
 
 @dataclass(frozen=True)
 class Injection:
-    """A fault of a bench.
+    """Fault of a bench.
 
     Parameters
     ----------
     mode
-        What fails.
+        Failure mode.
     value
-        How much, in SI.
+        Its value in SI.
     course
-        When.
+        Its times.
     seed
-        Of its noise and of what it misses.
+        Seed of its noise and of its missed samples.
     """
 
     mode: Mode
@@ -50,28 +142,31 @@ class Injection:
 
 
 def from_text(text: str) -> dict[str, Any]:
-    """Return the section that a text such as ``pressure.stuck=20 bar@1.5 s`` stands for.
+    """Return the section for a text such as ``pressure.stuck=20 bar@1.5 s``.
 
     Raises
     ------
     ParameterError
-        When it names nothing, or a part of it is empty.
+        When the name or another part is empty.
     """
     what, at, onset = (part.strip() for part in text.partition("@"))
     name, equals, value = (part.strip() for part in what.partition("="))
     if not name or (at and not onset) or (equals and not value):
         raise ParameterError(
             f"fault {quoted(text)}: write NAME, NAME=VALUE, NAME@ONSET or NAME=VALUE@ONSET, for "
-            "instance 'pressure.stuck=20 bar@1.5 s'"
+            "instance 'pressure.stuck=20 bar@1.5 s'",
+            name="fault",
+            value=text,
+            valid="NAME=VALUE@ONSET",
         )
     given = {"value": value} if equals else {}
     return {"fault": name, **given, **({"onset": onset} if at else {})}
 
 
-def with_units_wanted(section: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a section of a file, whose plain numbers are refused where they lack a unit."""
+def numbers_as_text(section: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a section with plain numbers as texts, which are rejected where a unit is needed."""
     return {
-        key: with_units_wanted(value)
+        key: numbers_as_text(value)
         if isinstance(value, Mapping)
         else repr(value)
         if key != "seed" and type(value) in (int, float)
@@ -83,12 +178,12 @@ def with_units_wanted(section: Mapping[str, Any]) -> dict[str, Any]:
 def injections(
     sections: Sequence[Mapping[str, Any]], model: Model, par: ParameterSet
 ) -> tuple[Injection, ...]:
-    """Return what the sections say of a model with these parameters.
+    """Return the faults of a model with these parameters, from their sections.
 
     Raises
     ------
     InputError
-        When a section names no fault of the model, or values that do not fit.
+        When a section names an unknown fault, or values that are not valid.
     """
     modes = modes_of(model, par) if sections else {}
     return tuple(_read(k, section, modes, par) for k, section in enumerate(sections))
@@ -106,12 +201,13 @@ def _read(
     course = AT_ZERO.replace(parsed(Course, times, f"key of {where}"))
     seed = section.get("seed", 0)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
-        raise ParameterError(f"{where}.seed = {quoted(seed)}: a whole number >= 0 is wanted")
+        raise not_valid(f"{where}.seed", quoted(seed), "a whole number >= 0")
     name = section.get("fault", "")
     if not isinstance(name, str) or not (name or "set" in section):
         raise ParameterError(
             f"{where} names no fault: write fault = \"...\" (see 'bywire list faults'), or "
-            'set = {"motor.R_m" = "+50%"} for any parameter'
+            'set = {"motor.R_m" = "+50%"} for any parameter',
+            name=f"{where}.fault",
         )
     if "set" in section:
         return Injection(_of_parameters(where, section, par), 0.0, course, seed)
@@ -120,18 +216,22 @@ def _read(
     mode = modes[name]
     for choice, wanted in mode.lacks(par).items():
         raise ParameterError(
-            f"fault {name}: there is nothing to fail, as {choice} = {par.value(choice)!r}: set it "
-            f"to {wanted!r}, as with {option('overrides', {choice: str(wanted)})}"
+            f"fault {name} is impossible with {choice} = {par.value(choice)!r}: set it to "
+            f"{wanted!r}, for instance {option('overrides', {choice: str(wanted)})}",
+            name=choice,
+            value=repr(par.value(choice)),
+            valid=repr(wanted),
         )
     return Injection(mode, _value(where, section, mode), course, seed)
 
 
 def _of_parameters(where: str, section: Mapping[str, Any], par: ParameterSet) -> Mode:
-    """Return the mode in which parameters are set as a section says."""
+    """Return the mode that sets the parameters of a section."""
     values = section["set"]
     if not isinstance(values, Mapping) or not values or {"value", "fault"} & {*section}:
         raise ParameterError(
-            f'{where}.set: write {{"motor.R_m" = "+50%"}}, and neither fault nor value beside it'
+            f'{where}.set: write {{"motor.R_m" = "+50%"}}, and neither fault nor value with it',
+            name=f"{where}.set",
         )
     given = parsed(type(par), settled(par, values), f"parameter of {where}")
     par.replace(given)
@@ -141,7 +241,9 @@ def _of_parameters(where: str, section: Mapping[str, Any], par: ParameterSet) ->
 def _value(where: str, section: Mapping[str, Any], mode: Mode) -> float:
     if not mode.unit:
         if "value" in section:
-            raise ParameterError(f"{where}: {mode.name} takes no value: leave it out")
+            raise ParameterError(
+                f"{where}: {mode.name} takes no value: leave it out", name=f"{where}.value"
+            )
         return 0.0
     value = number(section.get("value", mode.value), mode.unit, f"{where}.value")
     require_admissible(mode, value, f"{where}.value")
@@ -149,25 +251,23 @@ def _value(where: str, section: Mapping[str, Any], mode: Mode) -> float:
 
 
 def require_admissible(mode: Mode, value: float, where: str) -> None:
-    """Refuse a value that a mode cannot have.
+    """Reject a value outside the range of a mode.
 
     Raises
     ------
     ParameterError
-        With the range; what changes parameters is checked with these.
+        With the range. The values of modes that change parameters are checked with these.
     """
     low, high = _RANGES.get(mode.falsified, (-math.inf, math.inf))
     is_whole = mode.falsified in ("late", "dropped")
     if not low <= value <= high or (is_whole and value % 1):
         kind = "a whole number" if is_whole else "a number"
-        raise ParameterError(
-            f"{where} = {value:g} of {mode.name} is not valid: {kind} from {low:g} to "
-            f"{high:g} is wanted"
-        )
+        valid = f"{kind} from {low:g} to {high:g}"
+        raise not_valid(where, f"{value:g} of {mode.name}", valid)
 
 
 def _unknown(name: str, modes: Mapping[str, Mode]) -> UnknownNameError:
-    """Return the error of a fault that the model lacks, with the modes of the place it names."""
+    """Return the error for an unknown fault, with the modes of the same place."""
     place = name.rpartition(".")[0]
     here = [each for each in modes if modes[each].place == place]
     return unknown_name("fault", name, modes, first=here)

@@ -1,4 +1,4 @@
-"""Faults put into a run: its model with taps, what falsifies its signals, other parameters."""
+"""Faults in a run: taps of its model, falsified signals, and changed parameters."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from bywire.bench.experiment import Case, FaultyCase
-from bywire.bench.faults.course import MOST, Course
-from bywire.bench.faults.fault_section import Injection, injections
+from bywire.bench.faults.fault_section import MOST, Course, Injection, injections
 from bywire.bench.faults.modes import Mode, falsify, missed
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
@@ -21,16 +20,20 @@ from bywire.simulation.tapped import Tap, Tapped, rests
 
 
 def checked_sections(sections: Any) -> list[dict[str, Any]]:
-    """Return the tables of faults as plain ones.
+    """Return the tables of faults as dictionaries.
 
     Raises
     ------
     ParameterError
-        When they are no sequence of tables.
+        When they are not a sequence of tables.
     """
     is_sequence = isinstance(sections, Sequence) and not isinstance(sections, str)
     if not is_sequence or not all(isinstance(each, Mapping) for each in sections):
-        raise ParameterError("faults: a sequence of tables is wanted, [[faults]] in a bench file")
+        raise ParameterError(
+            "faults must be a sequence of tables, [[faults]] in a bench file",
+            name="faults",
+            valid="a sequence of tables",
+        )
     return [dict(each) for each in sections]
 
 
@@ -40,12 +43,13 @@ def with_faults(cases: Sequence[Case], sections: Sequence[Mapping[str, Any]]) ->
     Raises
     ------
     InputError
-        When a section does not fit one of the models, when a fault begins after the end of every
-        run, when two contradict each other, or when the experiment makes no run.
+        When a section is not valid for one of the models, when a fault begins after the end of
+        every run, when two contradict each other, or when the experiment has no run.
     """
     if not cases:
         raise ParameterError(
-            "this experiment makes no run, so that nothing can fail in it: leave [[faults]] out"
+            "this experiment has no run in which a fault could occur: leave [[faults]] out",
+            name="faults",
         )
     read = [injections(sections, case.model, case.par) for case in cases]
     first, longest = -max(case.settle for case in cases), max(case.duration for case in cases)
@@ -55,31 +59,38 @@ def with_faults(cases: Sequence[Case], sections: Sequence[Mapping[str, Any]]) ->
 
 
 def _require_within(fault: str, course: Course, first: float, last: float) -> None:
-    """Refuse a fault that is never there, or too often, between the ends of the runs [s]."""
+    """Reject a fault that is absent, or returns too often, between the ends of the runs [s]."""
     if course.onset >= last:
         raise ParameterError(
             f"{fault} begins at {course.onset:g} s, but the run ends at {last:g} s: give an "
-            "earlier onset, or a longer run"
+            "earlier onset, or a longer run",
+            name="onset",
+            value=f"{course.onset:g} s",
+            valid=f"< {last:g} s",
         )
     if course.gone <= first:
         raise ParameterError(
-            f"{fault} is over at {course.gone:g} s, but the run starts at {first:g} s: let it "
-            "last longer, or give a later onset"
+            f"{fault} ends at {course.gone:g} s, but the run starts at {first:g} s: give a longer "
+            "duration (lasts), or a later onset",
+            name="lasts",
+            value=f"{course.lasts:g} s",
         )
     if course.returns(first, last) > MOST:
         raise ParameterError(
-            f"{fault} comes back every {course.every:g} s, more than {MOST} times until "
-            f"{last:g} s: give a longer interval, or let it last"
+            f"{fault} returns every {course.every:g} s, more than {MOST} times until {last:g} s: "
+            "give a longer period (every), or a permanent fault",
+            name="every",
+            value=f"{course.every:g} s",
         )
 
 
 def taps_of(faults: Sequence[Injection]) -> tuple[tuple[Tap, ...], tuple[str, ...]]:
-    """Return the taps that some faults take, and the tasks that miss their ticks.
+    """Return the taps that some faults need, and the tasks that miss ticks.
 
     Raises
     ------
     ParameterError
-        When one drive comes late by different numbers of ticks.
+        When faults delay one drive by different numbers of ticks.
     """
     taps: dict[str, Tap] = {}
     for fault in faults:
@@ -89,7 +100,10 @@ def taps_of(faults: Sequence[Injection]) -> tuple[tuple[Tap, ...], tuple[str, ..
             if before.late and tap.late and before.late != tap.late:
                 raise ParameterError(
                     f"fault {fault.mode.name}: {before.late} and {tap.late} ticks in one run; "
-                    "give both the same value"
+                    "give both the same value",
+                    name=fault.mode.name,
+                    value=str(tap.late),
+                    valid=str(before.late),
                 )
             taps[tap.name] = tap._replace(late=max(before.late, tap.late))
     tasks = dict.fromkeys(fault.mode.task for fault in faults if fault.mode.task)
@@ -107,12 +121,12 @@ def injected(
     Parameters
     ----------
     case
-        The run without.
+        Run without faults.
     faults
-        What fails in it; times are those of its recording.
+        Its faults; their times are on the recording's axis.
     taps, tasks
-        Taps and tasks that can miss ticks, of a model that several runs share; those of the faults
-        by default.
+        Taps, and tasks that can miss ticks, of a model that several runs share; by default those
+        that the faults need.
 
     Raises
     ------
@@ -141,7 +155,7 @@ def _falsified(
         rows: dict[str, Array] = {}
         for fault in faults:
             mode, size = fault.mode, fault.course.size(t)
-            # Of each fault its own, so that another one beside it does not change its noise.
+            # One generator for each fault: a second fault does not change the noise of the first.
             draws = np.random.default_rng((fault.seed, zlib.crc32(mode.name.encode())))
             since = t - fault.course.onset
             given: dict[str, Any] = {}
@@ -161,7 +175,7 @@ def _falsified(
 
 
 def _changes(faults: Sequence[Injection], case: Case) -> Iterator[tuple[float, ParameterSet]]:
-    """Yield when parameters change, and what they are from then on."""
+    """Yield each time at which parameters change, with the new parameters."""
     changing = [fault for fault in faults if fault.mode.changes is not None]
     instants = {t for fault in changing for t in fault.course.instants(-case.settle, case.duration)}
     times = sorted({max(t, -case.settle) for t in instants if t < case.duration})
@@ -170,7 +184,7 @@ def _changes(faults: Sequence[Injection], case: Case) -> Iterator[tuple[float, P
 
 
 def _at(faults: Sequence[Injection], t: float, par: ParameterSet) -> ParameterSet:
-    """Return the parameters at a time [s]: values between as far as a ramp has come."""
+    """Return the parameters at a time [s]; on a ramp, numbers are interpolated."""
     values: dict[str, Any] = {}
     for fault in faults:
         (size,) = fault.course.size(np.array([t]))
@@ -183,7 +197,7 @@ def _at(faults: Sequence[Injection], t: float, par: ParameterSet) -> ParameterSe
         return par.replace(values)
     except ParameterError as error:
         names = " and ".join(fault.mode.name for fault in faults)
-        raise ParameterError(f"fault {names}: {error}") from None
+        raise error.reworded(f"fault {names}: {error}") from None
 
 
 def _full(fault: Injection, par: ParameterSet) -> Mapping[str, Any]:
@@ -191,7 +205,7 @@ def _full(fault: Injection, par: ParameterSet) -> Mapping[str, Any]:
 
 
 def _require_apart(faults: Sequence[Injection], par: ParameterSet) -> None:
-    """Refuse two faults of one signal, task or parameter that are there at the same time."""
+    """Reject two faults of one signal, task or parameter at the same time."""
     for one, other in combinations(faults, 2):
         first, second = one.course, other.course
         if first.onset >= second.gone or second.onset >= first.gone:
@@ -200,12 +214,13 @@ def _require_apart(faults: Sequence[Injection], par: ParameterSet) -> None:
         if both:
             raise ParameterError(
                 f"faults {one.mode.name} and {other.mode.name} contradict each other: both change "
-                f"{min(both)} at the same time; let one end before the other begins"
+                f"{min(both)} at the same time; let one end before the other begins",
+                name=min(both),
             )
 
 
 def touched(mode: Mode, value: float, par: ParameterSet) -> set[str]:
-    """Return what a fault changes, for people: of two at one time that must not be the same."""
+    """Return what a fault changes, in words: two simultaneous faults must not share any."""
     signal = set() if mode.channel is None else {f"the signal {mode.channel.name}"}
     task = {f"the task {mode.task}"} if mode.task else set()
     return signal | task | ({*mode.changes(par, value)} if mode.changes is not None else set())

@@ -1,19 +1,19 @@
-"""What may fail in a model: the modes of its elements, signals, tasks, and those of its brake."""
+"""Failure modes of a model: of its elements, signals and tasks, and of its brake."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from bywire.bench.faults.declared import channels_of, failures_of
-from bywire.bench.stimuli.quantities import TOLERANCE
+from bywire.bench.stimulus import TOLERANCE
 from bywire.core.errors import ModelError
-from bywire.core.faults import Channel, ParameterFault
-from bywire.core.model import Model
+from bywire.core.faults import CHANNELS, FAULTS, Channel, Fault, ParameterFault
+from bywire.core.model import ASSEMBLIES, Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
@@ -24,26 +24,26 @@ Changes = Callable[[Any, float], Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class Mode:
-    """One way to fail.
+    """Failure mode.
 
     Parameters
     ----------
     name
         Place and mode, for instance ``"pressure.stuck"``.
     summary
-        What happens, in one line.
+        The effect, in one line.
     unit, value
-        SI unit of its value, and the value unless given; an empty unit: it takes none.
+        SI unit and default of its value; an empty unit if the mode takes no value.
     changes
-        ``changes(par, value)``: parameters that change, by dotted name; None of the other kinds.
+        ``changes(par, value)``: changed parameters by dotted name; None for other kinds of modes.
     channel
-        Signal that it falsifies.
+        Falsified signal.
     falsified
-        What it does there: a function of `falsify`.
+        Kind of falsification, see `falsify` and `missed`.
     task
         Controller that misses its ticks.
     needs
-        Choices of the parameters without which there is nothing to fail.
+        Choices of the parameters with which the mode exists.
     """
 
     name: str
@@ -58,15 +58,15 @@ class Mode:
 
     @property
     def place(self) -> str:
-        """What fails: the name up to the last dot."""
+        """Place of the failure: the name up to the last dot."""
         return self.name.rpartition(".")[0]
 
     def lacks(self, par: ParameterSet) -> dict[str, Any]:
-        """Return the choices that parameters lack for it to be there, by dotted name."""
+        """Return the choices that the mode needs and the parameters do not have, by dotted name."""
         return {name: wanted for name, wanted in self.needs.items() if par.value(name) != wanted}
 
     def tap(self, value: float) -> Tap | None:
-        """Return the tap that it takes; None where it falsifies no signal."""
+        """Return the tap that the mode needs; None if it falsifies no signal."""
         if self.channel is None:
             return None
         c = self.channel
@@ -106,17 +106,19 @@ _VALUES = {"factor": 0.5, "probability": 0.2, "ticks": 5.0}
 
 
 def modes_of(model: Model, par: ParameterSet) -> dict[str, Mode]:
-    """Return every way in which a model with these parameters may fail, by name.
+    """Return every failure mode of a model with these parameters, by name.
 
     Raises
     ------
     ModelError
-        When two of them have one name, or a channel names no signal of the model.
+        When two modes have the same name, or a channel names an unknown signal.
     """
     modes: dict[str, Mode] = {}
     for mode in _every(model, par):
         if mode.name in modes:
-            raise ModelError(f"{model.name}: there are two faults {mode.name!r}: rename one")
+            raise ModelError(
+                f"{model.name}: there are two faults {mode.name!r}: rename one", name=mode.name
+            )
         modes[mode.name] = mode
     return modes
 
@@ -125,7 +127,7 @@ def _every(model: Model, par: ParameterSet) -> Iterator[Mode]:
     for place, node in _groups(par):
         element = sys.modules[type(node).__module__]
         if getattr(element, "Parameters", None) is not type(node):
-            continue  # a brake's own group, whose module says what fails in the brake
+            continue  # a group of the brake itself, whose module declares the brake's faults
         for fault in getattr(element, "FAULTS", ()):
             yield _of_element(place, fault, par)
     tasks = model.tasks(par)
@@ -171,7 +173,7 @@ def _of_element(place: str, fault: ParameterFault, par: ParameterSet) -> Mode:
 
 
 def _demands(model: Model, declared: Collection[str]) -> Iterator[Channel]:
-    """Yield a channel for every demand that none is declared for."""
+    """Yield a channel for every demand without a declared channel."""
     for name, signal in signals_of(model.Stimulus).items():
         if not name.startswith("noise_") and name not in declared:
             yield Channel(name, signal.label, signal.unit, name, "demand", offset=signal.nominal)
@@ -207,18 +209,18 @@ def _identifier(name: str) -> str:
 def falsify(
     mode: Mode, value: float, size: Array, since: Array, par: Any, draws: np.random.Generator
 ) -> dict[str, Array]:
-    """Return what a falsified signal's tap gets, by kind, of the stimulus' rows.
+    """Return the inputs of a falsified signal's tap at every row of the stimulus, by kind.
 
     Parameters
     ----------
     mode, value
-        What fails, and how much, in SI.
+        Failure mode and its value in SI.
     size, since
         Share of its full size and time since its onset [s] at every row.
     par
         Parameters of the run.
     draws
-        Source of noise and of what is missed.
+        Generator of noise and missed samples.
     """
     channel = mode.channel
     assert channel is not None
@@ -247,9 +249,9 @@ def falsify(
 def missed(
     mode: Mode, value: float, size: Array, since: Array, period: float, draws: np.random.Generator
 ) -> Array:
-    """Return where a task misses its tick, and where it is dead, of the stimulus' rows.
+    """Return at which rows of the stimulus a task misses its tick, or is dead.
 
-    ``since``: time since the onset [s], at every row; ``period``: of the task [s].
+    ``since``: time since the onset [s], at every row; ``period``: period of the task [s].
     """
     if mode.falsified == "dropped":
         return np.where(np.mod(np.round(since / period), round(value)) != 0, size > 0, 0.0)
@@ -260,3 +262,76 @@ def missed(
     if mode.falsified == "missed":
         return np.where(draws.random(size.size) < value, size > 0, 0.0)
     return np.where(size > 0, 1.0, 0.0)
+
+
+# --- Faults and channels that brakes declare
+
+
+def failures_of(model: Any) -> Iterator[Fault]:
+    """Yield the declared faults of a brake, and of the assemblies within it, by their paths."""
+    for each in FAULTS.of(ASSEMBLIES.owner(model.name)).values():
+        if each.is_of(model.name):
+            yield each
+    for sub in _subs(model):
+        for each in failures_of(sub.assembly):
+            changes = partial(_changes_within, sub, each.changes)
+            summary = f"{sub.label}: {each.summary}"
+            yield replace(each, name=f"{sub.path}.{each.name}", summary=summary, changes=changes)
+
+
+def _changes_within(
+    sub: Any, changes: Callable[[Any, float], Mapping[str, Any]], par: Any, value: float
+) -> Mapping[str, Any]:
+    changed = changes(sub.parameters(par), value)
+    return {f"{sub.path}.{name}": each for name, each in changed.items()}
+
+
+def channels_of(model: Any) -> Iterator[Channel]:
+    """Yield the declared channels of a model, and of the assemblies within it, by their paths.
+
+    Raises
+    ------
+    ModelError
+        When a channel names an unknown signal.
+    """
+    yield from _own_channels(model)
+    for sub in _subs(model):
+        for channel in channels_of(sub.assembly):
+            if channel.side == "demand" and channel.signal in sub.feeds:
+                continue  # set by a task of the outer model
+            seen = None if channel.seen is None else partial(_seen_within, sub, channel.seen)
+            yield replace(
+                channel,
+                name=f"{sub.path}.{channel.name}",
+                summary=f"{sub.label}: {channel.summary}",
+                signal=sub.named(channel.signal),
+                seen=seen,
+                task=sub.named(channel.task) if channel.task else "",
+            )
+
+
+def _own_channels(model: Any) -> tuple[Channel, ...]:
+    known = CHANNELS.of(ASSEMBLIES.owner(model.name)).get(model.name)
+    channels = () if known is None else known.channels
+    for channel in channels:
+        sources = {"reading": model.State, "drive": model.Memory, "demand": model.Stimulus}
+        source = sources[channel.side]
+        if channel.signal not in source._fields:
+            raise ModelError(
+                f"{model.name}: the channel {channel.name!r} names {channel.signal!r}, which is "
+                f"not a signal: known are {', '.join(source._fields)}",
+                name=channel.name,
+                value=channel.signal,
+                valid=", ".join(source._fields),
+            )
+    return channels
+
+
+def _seen_within(sub: Any, seen: Callable[[float, Any], float], value: float, par: Any) -> float:
+    return seen(value, sub.parameters(par))
+
+
+def _subs(model: Any) -> Iterable[Any]:
+    """Return the assemblies within a model; none if it is not an assembly."""
+    held: Mapping[str, Any] = getattr(model, "subs", {})
+    return held.values()

@@ -1,11 +1,11 @@
-"""What an experiment costs: currents, powers and energy."""
+"""Effort of an experiment: currents, powers and energy."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import Samples, integral
+from bywire.bench.kpis.samples import Samples, integral
 
 
 @dataclass(frozen=True)
@@ -19,8 +19,8 @@ class Setting:
     power
         Electrical power drawn [W].
     energy
-        Energy drawn since the start [J]; where it is not recorded, the power is integrated between
-        the samples, which misses what happens between them.
+        Energy drawn since the start [J]. Without it, the power is integrated over the samples,
+        which misses changes between them.
     """
 
     current: str = "i"
@@ -73,8 +73,8 @@ def mean_power(t: Samples, energy: Samples | None, power: Samples | None) -> flo
 def energy(t: Samples, energy: Samples | None, power: Samples | None) -> float | Undefined:
     """Energy drawn from battery or source during the recording.
 
-    The recorded energy at the end less that at the beginning; where no energy is recorded, the
-    integral of the recorded power by the trapezoidal rule.
+    The recorded energy at the end minus that at the start. If no energy is recorded, the integral
+    of the recorded power by the trapezoidal rule.
     """
     return _drawn(t, energy, power)
 

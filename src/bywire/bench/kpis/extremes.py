@@ -1,11 +1,11 @@
-"""Between which values a signal stays."""
+"""Largest and smallest value of a signal."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from bywire.bench.kpis.kpi import measure
-from bywire.bench.kpis.loops import Samples
+from bywire.bench.kpis.samples import Samples
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,9 @@ r"""Hysteresis of a brake: its loop of drive (current) and response (pressure).
 
 The loop is one slow cycle of the drive, for instance the ramp of eq. (17) of Dardanelli, Alli,
 Savaresi (2010). Its *apply* branch runs from the smallest to the largest response, its *release*
-branch back. At a given response the width is the drive needed to apply less that at which the
-brake releases: twice the friction, as a current. Widths and area are positive when friction
-dissipates, negative for a loop run through the other way around.
+branch back. At a given response the width is the drive of the apply branch minus that of the
+release branch: twice the friction, as a current. Widths and area are positive when friction
+dissipates, and negative for a loop in the opposite direction.
 """
 
 from __future__ import annotations
@@ -19,18 +19,17 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.samples import defect, signal
-from bywire.bench.kpis.smoothing import smoothed, treatment
+from bywire.bench.kpis.samples import defect, signal, smoothed, treatment
 from bywire.core.typing import Array
 
-_OPEN = 0.05  # of the drive's range: more than this between both ends is no closed loop
-_LEFT = 0.01  # of the response's range: from here on a rest at the end is noted
-_LEVELS = 401  # levels at which the width is looked up, both extremes left out
+_OPEN = 0.05  # of the drive's range: largest distance between both ends of a closed loop
+_LEFT = 0.01  # of the response's range: least residual at the end that is noted
+_LEVELS = 401  # number of levels at which the width is computed, without both extremes
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What the loop is of.
+    """Signals of the loop.
 
     Parameters
     ----------
@@ -39,7 +38,7 @@ class Setting:
     smoothing
         Averaging time [s]; 0 for none.
     demand
-        Signal whose maximum divides applying from releasing in figures; empty for the drive.
+        Signal whose maximum separates apply from release in plots; empty for the drive.
     """
 
     drive: str
@@ -61,7 +60,7 @@ class Loop:
     drive_unit, response_unit
         Their SI units.
     treatment
-        How the samples were treated.
+        Note on the treatment of the samples.
     """
 
     t: Array
@@ -81,21 +80,22 @@ class Loop:
 
     @cached_property
     def defect(self) -> str:
-        """Why no figure is defined."""
+        """Reason why no figure is defined."""
         broken = defect(self.t, self.drive, self.response)
         if broken:
             return broken
         span, height = float(np.ptp(self.drive)), float(np.ptp(self.response))
         if span == 0.0 or height == 0.0:
-            return f"{'the drive' if span == 0.0 else 'the response'} is constant: no loop"
+            constant = "the drive" if span == 0.0 else "the response"
+            return f"{constant} is constant: there is no loop"
         apart = abs(float(self.drive[-1] - self.drive[0]))
         if apart > _OPEN * span:
             return (
                 f"the loop is open: the drive ends {apart:.3g} {self.drive_unit} away from its "
-                "beginning; record the way back, or smooth the dither away"
+                "start; record the way back, or smooth out the dither"
             )
         loops = _cycles(self.response)
-        return "" if loops == 1 else f"{loops} loops: cut the recording to one"
+        return "" if loops == 1 else f"there are {loops} loops: cut the recording to one loop"
 
     @property
     def is_open(self) -> bool:
@@ -104,13 +104,13 @@ class Loop:
 
     @property
     def note(self) -> str:
-        """How the samples were treated, and what response is left at the end."""
+        """Note on the treatment of the samples, and on a residual response at the end."""
         left = abs(float(self.response[-1] - self.response[0]))
         parts = [self.treatment] if self.treatment else []
         if left > _LEFT * float(np.ptp(self.response)):
             parts.append(
-                f"the response ends {left:.3g} {self.response_unit} away from its beginning; "
-                "a straight line closes the loop"
+                f"the response ends {left:.3g} {self.response_unit} away from its start; a "
+                "straight line closes the loop"
             )
         return "; ".join(parts)
 
@@ -120,7 +120,7 @@ class Loop:
         first = int(np.argmin(self.response))
         x, y = np.roll(self.drive, -first), np.roll(self.response, -first)
         top = int(np.argmax(y))
-        closing = slice(0, 1 if first else 0)  # a loop that begins at its foot may stay open there
+        closing = slice(0, 1 if first else 0)  # a loop from its minimum may stay open
         x_release, y_release = (np.append(s[top:], s[closing]) for s in (x, y))
         return (x[: top + 1], y[: top + 1]), (x_release, y_release)
 
@@ -131,7 +131,7 @@ def select(recording: xr.Dataset, setting: Setting) -> Loop:
     Raises
     ------
     UnknownNameError
-        When the recording does not hold drive or response.
+        When the recording does not contain drive or response.
     """
     t, _ = signal(recording, "time")
     x, x_unit = signal(recording, setting.drive)
@@ -144,12 +144,12 @@ def select(recording: xr.Dataset, setting: Setting) -> Loop:
 def loop_width_mid(loop: Loop) -> float | Undefined:
     """Width of the loop, as drive, at mid-height of the response's range.
 
-    Mean drive of the apply branch's crossings of that level less the mean of the release
-    branch's, each interpolated between samples. Ripple makes a branch cross several times: the
+    Mean drive of the apply branch's crossings of that level minus the mean of the release
+    branch's, each interpolated between samples. Ripple makes a branch cross several times. The
     mean over the crossings keeps its effect small; `smoothed` removes it.
     """
     middle = 0.5 * float(np.min(loop.response) + np.max(loop.response))
-    (width,) = _widths(loop, np.array([middle]))
+    width = float(widths(loop, np.array([middle]))[0])
     if math.isnan(width):
         return Undefined("the release ends above mid-height")
     return width
@@ -159,12 +159,12 @@ def loop_width_mid(loop: Loop) -> float | Undefined:
 def loop_width_max(loop: Loop) -> float | Undefined:
     """Width of the loop, as drive, where it is widest.
 
-    The width of largest magnitude at 401 levels spread evenly inside the response's range,
-    defined at each as in `loop_width_mid`, levels that the release does not reach
-    left out. Ripple widens it by up to its peak to peak value.
+    The width of largest magnitude at 401 evenly spaced levels within the response's range, each as
+    in `loop_width_mid`. Levels that the release does not reach are left out. Ripple widens it by
+    up to its peak-to-peak value.
     """
     levels = np.linspace(np.min(loop.response), np.max(loop.response), _LEVELS + 2)[1:-1]
-    reached = [width for width in _widths(loop, levels) if not math.isnan(width)]
+    reached = [width for width in widths(loop, levels).tolist() if not math.isnan(width)]
     return max(reached, key=abs) if reached else Undefined("the response never falls again")
 
 
@@ -181,15 +181,54 @@ def loop_area(loop: Loop) -> float | Undefined:
     return float(np.sum(0.5 * (x + np.roll(x, -1)) * (np.roll(y, -1) - y)))
 
 
-def _widths(loop: Loop, levels: Array) -> list[float]:
-    """Return the width of the loop at levels that rise."""
+def widths(loop: Loop, levels: Array) -> Array:
+    """Return the drive of the apply branch minus that of the release branch, per level.
+
+    Parameters
+    ----------
+    loop
+        The loop, averaged over the dither if it has one.
+    levels
+        Levels of the response, ascending, shape (n,).
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (n,); NaN where a branch does not cross the level.
+    """
     apply, release = (_mean_crossings(x, y, levels) for x, y in loop.branches)
-    return [a - b for a, b in zip(apply, release, strict=True)]
+    return np.asarray(apply - release)
 
 
-def _mean_crossings(x: Array, y: Array, levels: Array) -> list[float]:
-    """Return the mean drive where a branch crosses each level, NaN where it does not."""
-    reached = np.searchsorted(levels, y, side="right")  # how many levels a sample has reached
+def closed_above(loop: Loop, width: float, levels: Array) -> float:
+    """Return the level from which a loop is narrower than a width, up to its top.
+
+    Parameters
+    ----------
+    loop
+        The loop.
+    width
+        Largest width that counts as closed, in the unit of the drive.
+    levels
+        Levels to check, ascending; levels that the loop does not cross are left out.
+
+    Returns
+    -------
+    float
+        The lowest level above which the loop is closed: the lowest crossed level if it is closed
+        everywhere, NaN if it is open at its top.
+    """
+    gaps = widths(loop, levels)
+    crossed = np.isfinite(gaps)
+    wide = np.flatnonzero(crossed & (np.abs(gaps) > width))
+    first = wide[-1] + 1 if wide.size else 0
+    closed = np.flatnonzero(crossed[first:])
+    return float(levels[first + closed[0]]) if closed.size else math.nan
+
+
+def _mean_crossings(x: Array, y: Array, levels: Array) -> Array:
+    """Return the mean drive at the crossings of each ascending level, NaN without a crossing."""
+    reached = np.searchsorted(levels, y, side="right")  # number of levels up to each sample
     low = np.minimum(reached[1:], reached[:-1])
     count = np.abs(np.diff(reached))
     k = np.repeat(np.arange(count.size), count)
@@ -199,14 +238,15 @@ def _mean_crossings(x: Array, y: Array, levels: Array) -> list[float]:
     share = (levels[level] - y[k]) / (y[k + 1] - y[k])
     crossings = x[k] + share * (x[k + 1] - x[k])
     ends = np.searchsorted(level, np.arange(levels.size + 1))
-    return [
+    means = [
         float(np.mean(crossings[begin:end])) if end > begin else math.nan
         for begin, end in pairwise(ends.tolist())
     ]
+    return np.array(means)
 
 
 def _cycles(y: Array) -> int:
-    """Return how often the closed course rises from its lowest to its highest quarter."""
+    """Return the number of rises of a closed course from its lowest to its highest quarter."""
     low, high = np.quantile([np.min(y), np.max(y)], [0.25, 0.75])
     marks = np.where(y <= low, -1, np.where(y >= high, 1, 0))
     marks = marks[marks != 0]

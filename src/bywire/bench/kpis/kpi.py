@@ -1,14 +1,14 @@
-"""What a key figure is: a value with unit, definition and, where it is not defined, the reason.
+"""Key figures: values with unit, definition and, where undefined, the reason.
 
-A family (one file) has a data class ``Setting`` with what its figures need to know, and one
-function per figure, declared with `measure`. A figure that is not defined for a recording is NaN
-with a reason in its note, never an exception and never a number that stands for something else.
-Where the recording leaves open what the figure is (nothing moved, or it still moves at the end),
-the figure is *open*: a requirement on it is undecided, neither met nor missed.
+A family (one file) has a data class ``Setting`` with the inputs of its figures, and one function
+per figure, declared with `measure`. A figure that is undefined for a recording is NaN with a reason
+in its note, never an exception, and never a number with another meaning. If the recording does not
+determine the figure (nothing moves, or the signal still moves at the end), the figure is *open*: a
+requirement on it is undecided, neither met nor missed.
 
-A function takes samples (`bywire.bench.kpis.loop_family`), and then is the figure in C as well, for
-the many cases of a study and for pages. Or the family has a function ``select(recording,
-setting)``, whose `Data` the functions take: for figures that need NumPy or SciPy.
+The functions take samples (`bywire.bench.kpis.loop_family`), and are then translated to C as well,
+for the many cases of a study and for pages. Or the family has a function ``select(recording,
+setting)``, and its functions take the resulting `Data`: for figures that need NumPy or SciPy.
 """
 
 from __future__ import annotations
@@ -23,33 +23,33 @@ from bywire.core.errors import unknown_name
 from bywire.core.typing import Array
 from bywire.core.undefined import EqualWhereUndefined
 
-_BOUND = 3.0  # of errors that do not converge: 95 % of the true ones lie within
+_BOUND = 3.0  # factor for errors without convergence: contains 95 % of the true errors
 
 
 @dataclass(frozen=True, eq=False)
 class Kpi(EqualWhereUndefined):
-    """A key figure of a recording.
+    """Key figure of a recording.
 
     Parameters
     ----------
     name
-        What requirements and reports call it.
+        Name in requirements and reports.
     value
-        Its value in ``unit``; NaN where it is not defined.
+        Its value in ``unit``; NaN where undefined.
     unit
         SI unit, or ``"%"``.
     definition
         One line for listings.
     note
-        Why it is not defined, or how the data were treated.
+        Reason why it is undefined, or treatment of the data.
     error
-        Estimated error from the step, in ``unit``; infinite where not even half the step shows
-        how large it is, NaN where it was not estimated.
+        Estimated numerical error in ``unit``; infinite where runs in other steps do not determine
+        it, NaN where it was not estimated.
     is_open
-        Whether it is not defined because the recording leaves open what it is.
+        Whether it is undefined because the recording does not determine it.
     converges
-        Whether runs in several steps show the order of the scheme; else ``error`` is no more than
-        a scale.
+        Whether runs in several steps show the order of the scheme; otherwise ``error`` is only a
+        scale.
     """
 
     name: str
@@ -63,13 +63,13 @@ class Kpi(EqualWhereUndefined):
 
     @property
     def bound(self) -> float:
-        """How far it may be off by the step, in ``unit``: three times the error of no order."""
+        """Bound of the numerical error in ``unit``: three times the error without convergence."""
         return self.error if self.converges else _BOUND * self.error
 
 
 @dataclass(frozen=True)
 class Undefined:
-    """A key figure that these data do not define, why, and whether they leave it open."""
+    """Undefined key figure: the reason, and whether the data leave it open."""
 
     reason: str
     is_open: bool = False
@@ -81,7 +81,7 @@ class Figures:
     Parameters
     ----------
     undefined
-        Why a figure whose value is no number is not defined.
+        Reason for figures whose value is not a number.
     declared
         SI unit (or ``"%"``) and definition by name.
 
@@ -115,10 +115,10 @@ class Figures:
         Parameters
         ----------
         ending
-            What follows their names.
+            Suffix of their names.
         values
-            Value by name, in the declared unit, NaN where it is not defined; or value and note;
-            or why there is none.
+            Value by name, in the declared unit, NaN where undefined; or value and note; or an
+            `Undefined`.
         """
         unknown = values.keys() - self.declared.keys()
         if unknown:
@@ -140,18 +140,18 @@ class Figures:
 
 @dataclass(frozen=True)
 class KpiOfCases:
-    """A key figure of many cases; fields as of `Kpi`.
+    """Key figure of many cases; fields as in `Kpi`.
 
-    ``values``: shape ``(cases,)``; ``told``: ``told(case)``, the note of a case; ``opened``:
-    ``opened(case)``, whether its figure is open.
+    ``values``: shape ``(cases,)``; ``note_of``: ``note_of(case)``, the note of a case;
+    ``is_open_in``: ``is_open_in(case)``, whether its figure is open.
     """
 
     name: str
     values: Array
     unit: str
     definition: str
-    told: Callable[[Any], str]
-    opened: Callable[[Any], bool] = lambda case: False
+    note_of: Callable[[Any], str]
+    is_open_in: Callable[[Any], bool] = lambda case: False
 
     def case(self, k: Any) -> Kpi:
         """Return the figure of one case."""
@@ -160,13 +160,13 @@ class KpiOfCases:
             float(self.values[k]),
             self.unit,
             self.definition,
-            self.told(k),
-            is_open=self.opened(k),
+            self.note_of(k),
+            is_open=self.is_open_in(k),
         )
 
 
 class Data(Protocol):
-    """What a family computes its figures from."""
+    """Data from which a family computes its figures."""
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -175,35 +175,35 @@ class Data(Protocol):
 
     @property
     def defect(self) -> str:
-        """Why no figure at all is defined; empty for sound data.
+        """Reason why all figures are undefined; empty for valid data.
 
-        Data with an attribute ``is_open`` say by it whether that leaves the figures open.
+        An attribute ``is_open`` of the data says whether the figures are then open.
         """
         ...
 
     @property
     def note(self) -> str:
-        """How the data were treated; empty for raw data."""
+        """Note on the treatment of the data; empty for raw data."""
         ...
 
 
 Value = float | Undefined | Array
-"""what the function of a key figure gives"""
+"""result of the function of a key figure"""
 
 
 class Measure:
-    """A declared key figure.
+    """Declared key figure.
 
     Parameters
     ----------
     unit
         SI unit, ``"%"``, or a placeholder that the data resolve, for instance ``"level"``.
     function
-        Returns the value, or why there is none. Its name and its docstring's first line are the
+        Returns the value, or an `Undefined`. Its name and the first line of its docstring are the
         figure's name and definition.
     needs
-        Fields of the family's setting that name signals, one of which at least it needs; none
-        where the family cannot do without any of them. Of a loop over samples its signature says
+        Fields of the family's setting that name signals, of which the figure needs at least one;
+        empty if the family needs them all. For a loop over samples, its signature determines
         them: ``Samples | None``.
     """
 
@@ -218,7 +218,7 @@ class Measure:
         self.__wrapped__ = function
 
     def __call__(self, data: Data) -> Kpi:
-        """Return the figure of what a family selects; NaN with a reason where it has none."""
+        """Return the figure of a family's data; NaN with a reason where undefined."""
         value = (
             Undefined(data.defect, getattr(data, "is_open", False))
             if data.defect
@@ -227,16 +227,16 @@ class Measure:
         return self.kpi(value, data.units, data.note)
 
     def kpi(self, value: Any, units: Mapping[str, str], note: str) -> Kpi:
-        """Return the figure of a value, or of why there is none.
+        """Return the figure for a value or an `Undefined`.
 
         Parameters
         ----------
         value
-            What the function gave.
+            Result of the function.
         units
             SI unit of every placeholder.
         note
-            How the data were treated.
+            Note on the treatment of the data.
         """
         unit, is_open = units.get(self.unit, self.unit), False
         if isinstance(value, Undefined):
@@ -245,7 +245,7 @@ class Measure:
 
 
 def measure(unit: str, needs: tuple[str, ...] = ()) -> Callable[[Callable[..., Value]], Measure]:
-    """Declare a function as a key figure with a unit, and what it needs; see `Measure`."""
+    """Declare a function as a key figure with a unit and the signals that it needs."""
 
     def declare(function: Callable[..., Value]) -> Measure:
         return Measure(unit, function, needs)

@@ -1,16 +1,16 @@
-"""Key figures whose functions loop over samples: run by Python, or by the C that is made of them.
+"""Key figures whose functions loop over samples: run in Python, or translated to C.
 
-Each function names what it takes:
+The names of a function's parameters determine its arguments:
 
 * ``t``: the times [s];
-* a field of the family's ``Setting`` that names a signal: its samples, or None where the annotation
-  is ``Samples | None`` and it is not recorded;
-* ``setting``: the ``Setting``, of which it reads numbers;
-* another function of the file: what that gives, of which all figures of a case share the same.
-  Where that is undefined, the figure is.
+* a field of the family's ``Setting`` that names a signal: its samples, or None if the annotation
+  is ``Samples | None`` and the signal is not recorded;
+* ``setting``: the ``Setting``, from which the function reads numbers;
+* another function of the file: its result, which is computed once for all figures of a case. If it
+  is undefined, so is the figure.
 
-It looks at sound samples alone: numbers, two at least, over times that increase. A value that is
-not finite, and a division by zero, leave the figure undefined.
+Functions get valid samples only: at least two finite numbers over increasing times. A result that
+is not finite, and a division by zero, leave the figure undefined.
 """
 
 from __future__ import annotations
@@ -32,8 +32,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi, Measure, Undefined
-from bywire.bench.kpis.loops import Samples, defect_of_signal, defect_of_times
-from bywire.bench.kpis.samples import signal
+from bywire.bench.kpis.samples import Samples, defect_of_signal, defect_of_times, signal
 from bywire.bench.kpis.translator import (
     BOOL,
     FIGURE,
@@ -59,14 +58,14 @@ _PACKED = (FLOAT, INT, BOOL, PAIR)
 
 
 class Reason(NamedTuple):
-    """Why a figure is not defined, as C gives it a number: a text for numbers in it."""
+    """Reason why a figure is undefined: a text with places for numbers."""
 
     text: str
     is_open: bool
 
 
 class FiguresInC(NamedTuple):
-    """Figures of many cases: values, NaN where a figure has none, and why.
+    """Figures of many cases: values, NaN where undefined, and the reasons.
 
     ``values`` and ``reasons``: shape ``(figures, cases)``; ``numbers``: those in the reasons'
     texts, ``(figures, cases, 3)``.
@@ -78,7 +77,7 @@ class FiguresInC(NamedTuple):
 
 
 class LoopFamily:
-    """The functions of a family and what they take.
+    """Functions of a family, with their arguments.
 
     Parameters
     ----------
@@ -88,14 +87,14 @@ class LoopFamily:
     Raises
     ------
     ModelError
-        When a function takes what nothing gives.
+        When a function has an unknown argument.
     """
 
     def __init__(self, module: ModuleType) -> None:
         self.name = module.__name__.rpartition(".")[2]
         self.setting_class: type = module.Setting
         self.measures = {m.name: m for m in vars(module).values() if isinstance(m, Measure)}
-        self.shared: dict[str, FunctionType] = {}  # after those that they take
+        self.shared: dict[str, FunctionType] = {}  # in an order in which each follows its arguments
         self._module = module
         self._looked_at = 0  # rows of single runs
         self._optional: dict[str, bool] = {}  # signals, and whether they may be missing
@@ -112,7 +111,7 @@ class LoopFamily:
 
     @cached_property
     def signals(self) -> dict[str, bool]:
-        """Fields of the setting that name signals, in its order; whether each may be missing."""
+        """Whether the signal of each field of the setting may be missing, in the field's order."""
         names = [each.name for each in fields(self.setting_class)]
         return {name: self._optional[name] for name in names if name in self._optional}
 
@@ -143,7 +142,7 @@ class LoopFamily:
             text = _NEGATIVE_ZERO.sub("0", value.reason.replace("{level}", level))
             value = replace(value, reason=text)
         else:
-            value += 0.0  # zeros are positive, whose sign C does not keep
+            value += 0.0  # zeros are positive: C does not preserve their sign
         return figure.kpi(value, {"level": level, **further}, getattr(setting, "note", ""))
 
     # in Python
@@ -166,7 +165,7 @@ class LoopFamily:
         }
 
     def _given(self, function: Callable[..., Any], given: Mapping[str, Any]) -> Any:
-        """Return what a function gives."""
+        """Return the result of a function."""
         args = [given[name] for name in inspect.signature(function).parameters]
         undefined = next((each for each in args if isinstance(each, Undefined)), None)
         if undefined is not None:
@@ -204,7 +203,7 @@ class LoopFamily:
         Raises
         ------
         ModelError
-            When a function holds what has no translation.
+            When a function cannot be translated.
         """
         unit = self._unit
         lines = "\n".join(f"    {line}" for line in self._lines())
@@ -224,34 +223,34 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
 """
 
     def translate(self) -> None:
-        """Translate the functions, to refuse those that have no translation.
+        """Translate the functions, to reject those that cannot be translated.
 
         Raises
         ------
         ModelError
-            When a function holds what has no translation.
+            When a function cannot be translated.
         """
         assert self.c_text
 
     @cached_property
     def reasons(self) -> list[Reason]:
-        """Why figures are not defined, by the numbers of C from 1 on."""
+        """Reasons for undefined figures, in the order of their numbers in C, from 1 on."""
         self.translate()
         return [Reason(*each) for each in self._unit.reasons]
 
     @cached_property
     def room(self) -> int:
-        """Numbers for each sample that C needs to compute a case."""
+        """Size of the work array in C for one case, in numbers per sample."""
         return sum(self._unit.function(each).arrays for each in self._called)
 
     @cached_property
     def _numbers(self) -> dict[str, Kind]:
-        """The numbers of a setting by their fields."""
+        """Types of the numbers in a setting, by field."""
         kinds = fields_of(self.setting_class)
         return {name: kind for name, kind in kinds.items() if kind.inner in _PACKED}
 
     def packed(self, setting: Any) -> list[float]:
-        """Return the numbers of a setting as C takes them."""
+        """Return the numbers of a setting in the layout of C."""
         row: list[float] = []
         for name, kind in self._numbers.items():
             value = getattr(setting, name)
@@ -264,7 +263,7 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
         return row
 
     def _lines(self) -> Iterator[str]:
-        """Yield what C does for a case."""
+        """Yield the C statements for a case."""
         unit, defect = self._unit, self._unit.function(defect_of_signal).name
         yield "(void)settings, (void)signals, (void)room;"
         for place, (name, is_optional) in enumerate(self.signals.items()):
@@ -308,7 +307,7 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
         yield "}"
 
     def _call(self, function: Callable[..., Any]) -> tuple[str, str]:
-        """Return why what a function takes is undefined, and the call of it."""
+        """Return C expressions: why an argument of a function is undefined, and its call."""
         made = self._unit.function(function)
         args, none = ["room"] if made.arrays else [], "(bw_undefined){0}"
         for name in reversed(self._parameters(function)):
@@ -350,11 +349,11 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
 
     @property
     def is_compiled(self) -> bool:
-        """Whether C computes the family here."""
+        """Whether the family's C can be compiled here."""
         return self._function is not None
 
     def is_worth_c(self, rows: int) -> bool:
-        """Return whether C computes another run: after many rows it is worth being compiled."""
+        """Return whether to compute another run in C: compiling pays after many rows."""
         self._looked_at += rows
         return self._looked_at > _FEW and self.is_compiled
 
@@ -370,7 +369,7 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
         signals
             Signals in the order of ``self.signals``, shape ``(cases, n)``; None for a missing one.
         settings
-            The setting of each case.
+            Setting of each case.
         """
         cases, n = len(settings), t.size
         kept = [None if each is None else _in_rows(each) for each in signals]
@@ -395,11 +394,11 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
             numbers,
         )
         self._function(cases, n, *(each.ctypes.data for each in arrays))
-        values += 0.0  # zeros are positive, whose sign C does not keep
+        values += 0.0  # zeros are positive: C does not preserve their sign
         return FiguresInC(values, reasons, numbers)
 
     def undefined(self, reason: int, numbers: Sequence[float]) -> Undefined:
-        """Return why a figure is not defined, from what C says of it."""
+        """Return an `Undefined` for a number of a reason in C."""
         text, is_open = self.reasons[reason - 1]
         return Undefined(text.format(*numbers), is_open)
 
@@ -413,7 +412,7 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
         return list(inspect.signature(function).parameters)
 
     def _take(self, function: Callable[..., Any], *above: object) -> None:
-        """Note which signals and functions a function takes; ``above``: those that take it."""
+        """Add the signals and functions that a function takes; ``above``: its callers."""
         hints = typing.get_type_hints(function)
         settings = typing.get_type_hints(self.setting_class)
         for name in self._parameters(function):
@@ -430,7 +429,8 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
                 raise ModelError(
                     f"{self._module.__file__}: the key figure's function {function.__name__} takes "
                     f"{name!r}, which must be t, setting, a field of Setting that names a signal, "
-                    "or another function of the file"
+                    "or another function of the file",
+                    name=name,
                 )
 
 
@@ -451,6 +451,6 @@ def _compiled(text: str, entry: str) -> Any:
 
 
 def _in_rows(y: Array) -> Array:
-    """Return signals of which each case's samples stand in one piece."""
+    """Return signals in which the samples of each case are contiguous."""
     is_so = y.dtype == np.float64 and y.strides[1] == 8 and y.strides[0] % 8 == 0
     return y if is_so else np.ascontiguousarray(y, dtype=np.float64)

@@ -1,11 +1,11 @@
-"""How long a brake is in a mode: stuck, or at a limit of its controller."""
+"""Share of the time that a brake is in a mode: stuck, or at a limit of its controller."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import Samples, integral
+from bywire.bench.kpis.samples import Samples, integral
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class Setting:
 def share_stuck(t: Samples, t_stuck: Samples | None, stuck: Samples | None) -> float | Undefined:
     """Share of the time during which the shaft is stuck.
 
-    From the time stuck that the engine integrates, where it is recorded: short sticking between
-    two samples counts. Else from the samples of the mode, as `share_sat_current`.
+    From the recorded time stuck, which the engine integrates, so that short sticking between two
+    samples counts. Without it, from the samples of the mode, as in `share_sat_current`.
     """
     if t_stuck is not None:
         return (t_stuck[-1] - t_stuck[0]) / (t[-1] - t[0])

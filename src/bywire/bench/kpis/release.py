@@ -1,4 +1,4 @@
-"""Key figures of a release: when a signal has fallen for good, and what is left of it."""
+"""Key figures of a release: time until a signal stays low, and its residual level."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import Samples
+from bywire.bench.kpis.samples import Samples
 
-_ROUNDING = 1e-9  # s: of time zero
+_ROUNDING = 1e-9  # s, of time zero
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What is released.
+    """Signal of the release.
 
     Parameters
     ----------

@@ -1,13 +1,102 @@
-"""Samples of signals: how they come out of a recording, and whether they are sound."""
+"""Samples of signals: sums, moving averages, and defects that leave figures undefined.
+
+The first functions are loops that run in Python, and that `bywire.bench.kpis.translator` translates
+to C.
+"""
 
 from __future__ import annotations
+
+from bisect import bisect_right
+from math import isfinite
 
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.loops import defect_of_signal, defect_of_times
+from bywire.bench.kpis.kpi import Undefined
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
+
+Samples = list[float]
+"""samples of a signal, or their times"""
+
+
+def total(y: Samples) -> float:
+    """Sum of the samples in the order of time: Python's `sum` differs between its versions."""
+    whole = 0.0
+    for x in y:
+        whole += x
+    return whole
+
+
+def integral(t: Samples, y: Samples) -> float:
+    """Integral over time by the trapezoidal rule, exact for straight pieces."""
+    whole = 0.0
+    for k in range(1, len(t)):
+        whole += 0.5 * (y[k] + y[k - 1]) * (t[k] - t[k - 1])
+    return whole
+
+
+def value_at(t: Samples, y: Samples, instant: float) -> float:
+    """Signal at an instant, linear between samples, and constant beyond the ends."""
+    k = bisect_right(t, instant) - 1
+    if k < 0:
+        return y[0]
+    if k == len(t) - 1 or t[k] == instant:
+        return y[k]
+    return (y[k + 1] - y[k]) / (t[k + 1] - t[k]) * (instant - t[k]) + y[k]
+
+
+def moving_average(t: Samples, y: Samples, period: float) -> Samples:
+    """Centered moving average over a period, as `bywire.bench.kpis.samples.smoothed` has it."""
+    last = len(t) - 1
+    width = min(period, t[last] - t[0])
+    slope = [(y[k + 1] - y[k]) / (t[k + 1] - t[k]) for k in range(len(t) - 1)]
+    primitive = [0.0] * len(t)
+    for k in range(1, len(t)):
+        primitive[k] = primitive[k - 1] + 0.5 * (y[k] + y[k - 1]) * (t[k] - t[k - 1])
+    mean = [0.0] * len(t)
+    i = 0  # intervals that contain the two ends of the period
+    j = 0
+    for k in range(len(t)):
+        begin = min(max(t[k] - 0.5 * width, t[0]), t[last] - width)
+        end = begin + width
+        while i < last - 1 and t[i + 1] <= begin:
+            i += 1
+        while j < last - 1 and t[j + 1] <= end:
+            j += 1
+        d = begin - t[i]
+        e = end - t[j]
+        before = primitive[i] + y[i] * d + 0.5 * slope[i] * (d * d)
+        mean[k] = (primitive[j] + y[j] * e + 0.5 * slope[j] * (e * e) - before) / width
+    return mean
+
+
+def defect_of_times(t: Samples) -> Undefined | None:
+    """Reason why no figure is defined over these times; None for valid times."""
+    if len(t) < 2:
+        return Undefined(f"{len(t)} samples are too few: two at least are needed")
+    wrong = 0  # counted in vectors, without early exit: there is almost never one
+    for k in range(1, len(t)):
+        wrong += not t[k] > t[k - 1]
+    if wrong > 0 or not isfinite(t[0]) or not isfinite(t[-1]):
+        return Undefined("the times do not increase")
+    return None
+
+
+def defect_of_signal(t: Samples, y: Samples) -> Undefined | None:
+    """Reason why no figure of a signal is defined; None for a valid signal."""
+    wrong = 0
+    for x in y:
+        wrong += not isfinite(x)
+    if wrong > 0:
+        k = 0
+        while isfinite(y[k]):
+            k += 1
+        return Undefined(f"not a number at {t[k]:g} s")
+    return None
+
+
+# --- Samples of a recording
 
 
 def signal(recording: xr.Dataset, name: str) -> tuple[Array, str]:
@@ -16,14 +105,14 @@ def signal(recording: xr.Dataset, name: str) -> tuple[Array, str]:
     Returns
     -------
     values
-        Shape ``(time,)``; of the rows of many cases ``(cases, time)``.
+        Shape ``(time,)``; for the rows of many cases ``(cases, time)``.
     unit
-        SI unit, ``"1"`` where none is recorded.
+        SI unit; ``"1"`` if none is recorded.
 
     Raises
     ------
     UnknownNameError
-        When the recording does not hold the signal.
+        When the recording does not contain the signal.
     ParameterError
         When the signal has other dimensions than time.
     """
@@ -33,13 +122,16 @@ def signal(recording: xr.Dataset, name: str) -> tuple[Array, str]:
     if variable.dims != ("time",):
         raise ParameterError(
             f"signal {name!r} has the dimensions {variable.dims}: key figures need time alone; "
-            "select one case first, for instance recording.isel(case=0)"
+            "select one case first, for instance recording.isel(case=0)",
+            name=name,
+            value=str(variable.dims),
+            valid="time",
         )
     return np.asarray(variable.values, dtype=np.float64), str(variable.attrs.get("units", "1"))
 
 
 def defect(t: Array, *signals: Array) -> str:
-    """Return why samples are unusable, or an empty text.
+    """Return the reason why samples are not usable, or an empty text.
 
     Parameters
     ----------
@@ -55,3 +147,60 @@ def defect(t: Array, *signals: Array) -> str:
             return f"{values.size} values do not fit {t.size} times"
         wrong = wrong or defect_of_signal(times, values.tolist())
     return "" if wrong is None else wrong.reason
+
+
+# --- Moving average of arrays
+
+
+def smoothed(t: Array, y: Array, period: float) -> Array:
+    r"""Return the centered moving average over a period.
+
+    .. math:: \bar y(t) = \frac{1}{T} \int_{c - T/2}^{c + T/2} y \, d\tau, \quad
+              c = \min(\max(t, t_0 + T/2), t_1 - T/2)
+
+    The signal is linear between samples and integrated exactly. A ripple of this period vanishes
+    everywhere. There is no delay, but an edge is spread over half a period to both sides: it
+    shortens a dead time and lengthens a rise time by up to that. Within half a period of either
+    end the nearest full average holds, so a step should not be there.
+
+    Parameters
+    ----------
+    t
+        Times [s], increasing, shape ``(n,)``.
+    y
+        Signal, shape ``(..., n)``.
+    period
+        Averaging time T [s], at most the whole record; zero or less returns the signal itself.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape ``(..., n)``.
+    """
+    if period <= 0 or t.size < 2:
+        return y
+    width = min(period, float(t[-1] - t[0]))
+    a = np.clip(t - 0.5 * width, t[0], t[-1] - width)
+    slope = (y[..., 1:] - y[..., :-1]) / (t[1:] - t[:-1])
+    pieces = 0.5 * (y[..., 1:] + y[..., :-1]) * np.diff(t)
+    total = np.zeros(y.shape)
+    np.cumsum(pieces, axis=-1, out=total[..., 1:])
+
+    def primitive(at: Array) -> Array:
+        """Return the integral of the piecewise linear signal from ``t[0]`` to each instant."""
+        k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
+        d = at - t[k]
+        there, linear, bent = (np.take(each, k, axis=-1) for each in (total, y, slope))
+        linear *= d
+        bent *= 0.5
+        bent *= d**2
+        there += linear
+        there += bent
+        return there
+
+    return np.asarray((primitive(a + width) - primitive(a)) / width)
+
+
+def treatment(period: float) -> str:
+    """Return the note on figures of a smoothed signal; empty for the raw one."""
+    return f"of the moving average over {period:g} s" if period > 0 else ""

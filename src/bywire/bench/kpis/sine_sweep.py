@@ -1,7 +1,7 @@
-r"""Gain and phase of an output to sines of a drive, one frequency after the other.
+r"""Gain and phase of an output in response to sines of a drive, one frequency after the other.
 
 At each frequency f both signals are projected on :math:`e^{-j 2 \pi f t}` over whole periods; the
-response is the quotient. What the output answers at other frequencies is left out.
+response is the quotient. Components of the output at other frequencies do not count.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from bywire.bench.kpis.samples import defect, signal
 from bywire.core.typing import Array
 
 _HALF_POWER = math.sqrt(0.5)
-_ROUNDED = 1e-12  # of the output's largest magnitude: what moves by less is rounded
+_ROUNDED = 1e-12  # of the output's largest magnitude: smaller motion is rounding
 _STILL = Undefined("the output does not move at the lowest frequency", is_open=True)
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Where the sines are.
+    """Signals and windows of the sines.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Sweep:
 
     @cached_property
     def defect(self) -> str:
-        """Why no figure is defined."""
+        """Reason why no figure is defined."""
         broken = defect(self.t, self.drive, self.response)
         if not broken and not self.frequencies.size:
             return "no whole period is recorded"
@@ -68,7 +68,7 @@ class Sweep:
 
     @property
     def note(self) -> str:
-        """Nothing is treated."""
+        """Empty: the samples are raw."""
         return ""
 
     @property
@@ -119,7 +119,7 @@ def select(recording: xr.Dataset, setting: Setting) -> Sweep:
     Raises
     ------
     UnknownNameError
-        When the recording does not hold them.
+        When the recording does not contain them.
     """
     t, _ = signal(recording, "time")
     drive, drive_unit = signal(recording, setting.drive)

@@ -1,7 +1,7 @@
-"""Static gain of a step: how far it moves what answers it, once that is at rest.
+"""Static gain of a step: change of the response at rest per height of the step.
 
 Levels are those of `bywire.bench.kpis.step_response` in an open loop: the mean before the step, and
-that in the window of the steady state.
+the mean in the window of the steady state.
 """
 
 from __future__ import annotations
@@ -10,14 +10,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import Samples, moving_average
-from bywire.bench.kpis.smoothing import treatment
+from bywire.bench.kpis.samples import Samples, moving_average, treatment
 from bywire.bench.kpis.step_response import Response, level_before, response_from, why_unseen
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What the step was, and how to look at its response.
+    """The step, and the treatment of its response.
 
     Parameters
     ----------
@@ -28,7 +27,7 @@ class Setting:
     drive
         Height of the step [``unit``].
     unit
-        SI unit of what was stepped.
+        SI unit of the step.
     window
         Beginning and end [s] of the steady state; None for the last 20 % after the step.
     smoothing
@@ -44,7 +43,7 @@ class Setting:
 
     @property
     def note(self) -> str:
-        """How the samples are treated."""
+        """Note on the treatment of the samples."""
         return treatment(self.smoothing)
 
     def units(self, level: str) -> Mapping[str, str]:

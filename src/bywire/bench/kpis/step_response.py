@@ -1,14 +1,14 @@
-"""Key figures of a step response: how fast, how exactly, how calmly.
+"""Key figures of a step response: speed, accuracy and ripple.
 
-All levels are relative to the step: 0 % is ``start``, 100 % is ``end``; steps downward count
-alike. Crossings are interpolated linearly between samples. Ripple (dither) makes first crossings
-early, last ones late, by up to its amplitude over the local slope, and adds to the overshoot;
-the setting's ``smoothing`` averages first and says so in every note.
+All levels are relative to the step: 0 % is ``start``, 100 % is ``end``, also for steps downward.
+Crossings are interpolated linearly between samples. Ripple (dither) makes first crossings early and
+last crossings late, by up to its amplitude over the local slope, and adds to the overshoot. The
+setting's ``smoothing`` averages first, and every note mentions it.
 
-A response that never leaves its first level by more than 5 % of the step height does not answer: of
-these figures it has the steady-state error alone. One that still moves in the window of the steady
-state leaves open how far it will go: its overshoot, error and ripple are not defined. Without a set
-point, none of the figures is.
+A response that never leaves its first level by more than 5 % of the step height does not respond:
+of these figures it has the steady-state error alone. One that still moves in the window of the
+steady state has no overshoot, error and ripple, because its final level is unknown. Without a set
+point, it has none of the figures.
 """
 
 from __future__ import annotations
@@ -19,18 +19,17 @@ from math import isfinite
 from typing import NamedTuple
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import Samples, integral, moving_average, total, value_at
-from bywire.bench.kpis.smoothing import treatment
+from bywire.bench.kpis.samples import Samples, integral, moving_average, total, treatment, value_at
 
 _DEAD, _BAND = 0.05, 0.02  # of the step height: end of the dead time; half settling band
 _MOVING = 0.02  # of the step height, between both halves of the window of the steady state
-_LAST = 0.2  # of the time after the step: the window of the steady state, by default
-_SETTLED = 0.1  # of the time after the step: must lie inside the band, else nothing is proved
+_LAST = 0.2  # of the time after the step: default window of the steady state
+_SETTLED = 0.1  # of the time after the step: least time in the band that counts as settled
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What the step was, and how to look at its response.
+    """The step, and the treatment of its response.
 
     Parameters
     ----------
@@ -39,14 +38,14 @@ class Setting:
     t_step
         Instant of the step [s].
     start, end
-        Set point before and after the step, in the signal's SI unit. None where there is none
-        (open loop): then the response's mean before the step and that in the window.
+        Set point before and after the step, in the signal's SI unit. None in an open loop, for the
+        response's mean before the step and its mean in the window.
     window
         Beginning and end [s] of the steady state; None for the last 20 % after the step.
     smoothing
         Averaging time [s], usually one dither period; 0 for the raw signal.
     set_point
-        Name of the set point in the recording, for figures; empty where none is recorded.
+        Name of the set point in the recording, for plots; empty if none is recorded.
     """
 
     signal: str
@@ -59,16 +58,16 @@ class Setting:
 
     @property
     def note(self) -> str:
-        """How the samples are treated."""
+        """Note on the treatment of the samples."""
         return treatment(self.smoothing)
 
 
 class Response(NamedTuple):
-    """A response from the step on.
+    """Response from the step on.
 
     ``t`` and ``z``: times from the instant of the step, and the response with 0 at ``start`` and 1
-    at ``end``; ``most``: how far it ever goes from its first level. In the window of the steady
-    state, ``low`` to ``high``: its mean, the band that it fills, and by how much it still moves.
+    at ``end``; ``most``: its largest distance from its first level. In the window of the steady
+    state, ``low`` to ``high``: its mean, its peak-to-peak value, and its drift.
     """
 
     t: Samples
@@ -95,7 +94,7 @@ def response(t: Samples, signal: Samples, setting: Setting) -> Response | Undefi
 
 
 def level_before(t: Samples, y: Samples, t_step: float, smoothing: float) -> float:
-    """Mean of a response, an average over a period, before a step; else where it is then."""
+    """Mean of an averaged response before a step; without samples there, its value at the step."""
     before = bisect_left(t, t_step - 0.5 * smoothing)
     return total(y[:before]) / before if before > 0 else value_at(t, y, t_step)
 
@@ -108,9 +107,9 @@ def response_from(
     set_point: float | None,
     window: tuple[float, float] | None,
 ) -> Response | Undefined:
-    """Response from the step on, between two levels; the second one is its own without set point.
+    """Response from the step on, between two levels; without set point, up to its final mean.
 
-    Its window of the steady state is the last 20 % where none is given.
+    The default window of the steady state is the last 20 %.
     """
     last = t[-1]
     if not t[0] <= t_step < last:
@@ -118,7 +117,7 @@ def response_from(
     here = bisect_right(t, t_step) - 1
     times = list(t[here:])
     levels = list(y[here:])
-    times[0] = t_step  # the step's instant takes the place of the sample before it
+    times[0] = t_step  # the instant of the step replaces the sample before it
     levels[0] = value_at(t, y, t_step)
     low = last - _LAST * (last - t_step) if window is None else window[0]
     high = last if window is None else window[1]
@@ -181,9 +180,9 @@ def rise_time(response: Response) -> float | Undefined:
 def settling_time(response: Response) -> float | Undefined:
     """Time from the step to the last entry into the band of 2 % of the step height around its end.
 
-    The entry is interpolated. Not defined when it falls into the last tenth of the time after
-    the step, where a longer recording could show another one. Ripple of more than 4 % peak to
-    peak never settles, nor does a steady-state error of more than 2 %.
+    The entry is interpolated. It is not defined in the last tenth of the time after the step,
+    where a longer recording could show a later entry. A response with ripple of more than 4 % peak
+    to peak, or a steady-state error of more than 2 %, never settles.
     """
     unseen = why_unseen(response)
     if unseen is not None:
@@ -211,8 +210,8 @@ def settling_time(response: Response) -> float | Undefined:
 def overshoot(response: Response) -> float | Undefined:
     """Largest excess of the response over the step's end, in % of the step height.
 
-    The largest sample counts. It is 0 where the end is never exceeded; a response that does not
-    even settle there leaves open whether it would overshoot.
+    The largest sample counts. It is 0 if the end is never exceeded. If the response does not
+    settle, it is unknown whether it would overshoot.
     """
     unseen = why_unseen(response)
     if unseen is not None:
@@ -235,7 +234,7 @@ def steady_state_error(response: Response) -> float | Undefined:
     """Magnitude of the set point minus the mean response in the window of the steady state.
 
     Trapezoidal mean over the window's samples, by default the last 20 % of the time after the
-    step. Ripple averages out but for an incomplete period.
+    step. Ripple averages out except for an incomplete period.
     """
     if not response.is_tracking:
         return Undefined("no set point is given")
@@ -269,7 +268,7 @@ def ripple(response: Response) -> float | Undefined:
 
 
 def why_unseen(response: Response) -> Undefined | None:
-    """Why there is no step to be seen; None where there is one."""
+    """Reason why there is no visible step; None if there is one."""
     flat = _why_flat(response)
     if flat is not None:
         return flat
@@ -284,7 +283,7 @@ def why_unseen(response: Response) -> Undefined | None:
 
 
 def _why_flat(response: Response) -> Undefined | None:
-    """That the step height is zero, or not known."""
+    """Reason if the step height is zero or unknown; else None."""
     if _has_height(response.start, response.end):
         return None
     return Undefined(
@@ -293,7 +292,7 @@ def _why_flat(response: Response) -> Undefined | None:
 
 
 def _why_still(response: Response) -> Undefined | None:
-    """That the response never leaves its first level by more than 5 % of the step height."""
+    """Reason if the response stays within 5 % of the step height of its first level; else None."""
     height = abs(response.end - response.start)
     if not response.most <= _DEAD * height:
         return None
@@ -305,7 +304,7 @@ def _why_still(response: Response) -> Undefined | None:
 
 
 def _why_unsteady(response: Response) -> Undefined | None:
-    """That the response still moves in the window of the steady state.
+    """Reason if the response still moves in the window of the steady state; else None.
 
     The means of both halves of the window, of as many intervals each, differ by more than 2 % of
     the step height, or the extremes of the later half go beyond those of the earlier one by more
@@ -327,13 +326,13 @@ def _without_window(low: float, high: float) -> Undefined:
 
 
 def _has_height(start: float, end: float) -> bool:
-    """Whether two levels are apart."""
+    """Whether two levels differ."""
     height = end - start
     return isfinite(height) and abs(height) > 1e-12 * max(abs(start), abs(end))
 
 
 def _drift(t: Samples, y: Samples) -> float:
-    """How far a response moves from one half of a window to the other: by means, or by extremes."""
+    """Drift of a response between the halves of a window: of its mean, or of its extremes."""
     k = (len(t) - 1) // 2
     if k < 1:
         return 0.0

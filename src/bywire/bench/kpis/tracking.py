@@ -10,8 +10,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.samples import defect, signal
-from bywire.bench.kpis.smoothing import smoothed, treatment
+from bywire.bench.kpis.samples import defect, signal, smoothed, treatment
 from bywire.core.typing import Array
 
 _LONGEST_LAG = 0.3  # s: longer delays are not looked for

@@ -56,7 +56,7 @@ _C_WORDS = (
 
 @dataclass(frozen=True)
 class Kind:
-    """A type: ``base`` is a class, ``list`` for samples, or ``tuple`` for a pair of numbers."""
+    """Type in C: ``base`` is a class, ``list`` for samples, or ``tuple`` for a pair of numbers."""
 
     base: type
     or_none: bool = False
@@ -69,25 +69,25 @@ class Kind:
 
     @property
     def is_wrapped(self) -> bool:
-        """Whether it may stand for nothing, and so holds its value as a field."""
+        """Whether it may be None or undefined, so that its value is a field."""
         return self.base is not Undefined and (self.or_none or self.or_undefined)
 
     @property
     def inner(self) -> Kind:
-        """The type of the value that is there."""
+        """Type of the value itself."""
         return Kind(self.base) if self.is_wrapped else self
 
 
 FLOAT, INT, BOOL, SAMPLES = Kind(float), Kind(int), Kind(bool), Kind(list)
 _NOTHING = Kind(NoneType)
 FIGURE = Kind(float, or_undefined=True)
-"""what the function of a key figure may return"""
+"""result of the function of a key figure"""
 PAIR = Kind(tuple)
 
 
 @dataclass(frozen=True)
 class Value:
-    """An expression in C, and its type."""
+    """Expression in C, and its type."""
 
     text: str
     kind: Kind
@@ -95,7 +95,7 @@ class Value:
 
 @dataclass
 class Function:
-    """A translated function.
+    """Translated function.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class Unit:
             When it holds what has no translation, with its line.
         """
         if not isinstance(function, FunctionType):
-            raise ModelError(f"{function!r} is not a function that is written out in a file")
+            raise ModelError(f"{function!r} is not a function in a source file")
         if function not in self._functions:
             self._begun.add(function)
             self._functions[function] = _Writer(self, function).translated()
@@ -223,7 +223,8 @@ def _hints(of: Any) -> dict[str, Any]:
         return typing.get_type_hints(of)
     except NameError as error:
         raise ModelError(
-            f"{of.__module__}: the types of {of.__name__} are not known when it runs: {error}"
+            f"{of.__module__}: the types of {of.__name__} are not known at run time: {error}",
+            name=of.__name__,
         ) from None
 
 
@@ -239,7 +240,8 @@ class _Writer:
             self.hints = _hints(function)
         except (OSError, SyntaxError) as error:
             raise ModelError(
-                f"{self.place}: {function.__name__} cannot be translated to C: {error}"
+                f"{self.place}: {function.__name__} cannot be translated to C: {error}",
+                name=function.__name__,
             ) from None
         self.kinds: dict[str, Kind] = {}
         self.locals: dict[str, Kind] = {}
@@ -292,7 +294,7 @@ class _Writer:
         return kind
 
     def refuse(self, node: ast.AST, why: str) -> NoReturn:
-        """Raise the error of what has no translation."""
+        """Raise the error for code that cannot be translated."""
         line = self.first + getattr(node, "lineno", 1) - 1
         text = "" if isinstance(node, (ast.FunctionDef, ast.arg)) else f" `{_short(node)}`"
         raise ModelError(

@@ -9,7 +9,7 @@ from math import isfinite
 from typing import NamedTuple
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import Samples, moving_average, value_at
+from bywire.bench.kpis.samples import Samples, moving_average, value_at
 from bywire.core.typing import Array
 
 SLOW = 2.5

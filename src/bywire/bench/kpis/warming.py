@@ -10,8 +10,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.kpis.kpi import Undefined, measure
-from bywire.bench.kpis.loops import integral, total
-from bywire.bench.kpis.samples import defect, signal
+from bywire.bench.kpis.samples import defect, integral, signal, total
 from bywire.core.typing import Array
 
 

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.bench.stimuli.quantities import Amplitude, Level
+from bywire.bench.stimulus import Amplitude, Level
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, TimeConstant
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from bywire.bench.stimuli.quantities import Amplitude, Count, Level, reached
+from bywire.bench.stimulus import Amplitude, Count, Level, reached
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Frequency, TimeConstant
 

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.bench.stimuli.quantities import Level, LevelRate
+from bywire.bench.stimulus import Level, LevelRate
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import TimeConstant
 

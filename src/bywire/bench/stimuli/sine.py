@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.bench.stimuli.quantities import Amplitude, Level, Phase, reached
+from bywire.bench.stimulus import Amplitude, Level, Phase, reached
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Frequency, TimeConstant
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.bench.stimuli.quantities import Level, reached
+from bywire.bench.stimulus import Level, reached
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import TimeConstant
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from bywire.bench.stimuli.quantities import TOLERANCE
+from bywire.bench.stimulus import TOLERANCE
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
 

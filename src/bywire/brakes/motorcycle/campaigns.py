@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bywire.campaigns.declared import DeclaredCampaign
+from bywire.campaigns.residual import DeclaredCampaign
 
 CAMPAIGN = DeclaredCampaign(
     "motorcycle",

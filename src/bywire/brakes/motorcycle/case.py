@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.bench.experiment import Case
-from bywire.bench.extent import check_memory
+from bywire.bench.experiment import Case, check_memory
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current, memory_at, resting_at, state_at

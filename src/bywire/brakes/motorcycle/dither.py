@@ -14,7 +14,7 @@ from bywire.analysis.periodic import PeriodicModel, periodic_model, require_movi
 from bywire.bench.experiment import as_run
 from bywire.bench.kpis.hysteresis import Loop, loop_area
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis.samples import smoothed
 from bywire.brakes.motorcycle.ecu import Stimulus
 from bywire.brakes.motorcycle.experiments import friction_ramp
 from bywire.brakes.motorcycle.linear import current_loop, demand_filter

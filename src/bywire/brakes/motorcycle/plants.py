@@ -6,8 +6,7 @@ from typing import Any, cast
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.linear.plant import Plant, PlantPoint
-from bywire.analysis.loop import Quantity
+from bywire.analysis.loop import Plant, PlantPoint, Quantity
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current, memory_at, state_at

@@ -1,4 +1,4 @@
-"""The two-wheeler as a moving picture."""
+"""Animation of the two-wheeler."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the two-wheeler's experiments share: runs that begin rolling, and what judges a stop."""
+"""Shared parts of the two-wheeler's experiments: rolling starts, and the judge of a stop."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case
 from bywire.bench.kpis import vehicle_stop
-from bywire.bench.kpis.cases import FamilyJudge
+from bywire.bench.kpis.families import FamilyJudge
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire, at_speed
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
-from bywire.core.errors import ParameterError
+from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
 from bywire.core.typing import Array
@@ -52,7 +52,7 @@ def rolling_case(
     heat
         Temperatures of the brakes at the start, by their parts; cold by default.
     vehicle
-        Its model, and ``at_speed(v, par, heat)`` of it.
+        Its model, and ``at_speed(v, par, heat)`` of that model.
     """
     model, rolling = vehicle
     changed = par.replace(dict(changes or {}))
@@ -77,29 +77,29 @@ def rolling_case(
 
 
 def on_surface(first: SurfaceName, further: SurfaceName | None = None) -> dict[str, float]:
-    """Return the parameters of a road of some surface, and of a further one; own ones stay."""
+    """Return the parameters of a road of a surface, and of a further one; "own" changes none."""
     return laid("vehicle.road", first, further)
 
 
 def parameters_of(run: xr.Dataset) -> TwoWheelerParameters:
     """Return the parameters with which a recording was made."""
-    known = getattr(run, "par", None)
-    if isinstance(known, TwoWheelerParameters):
-        return known
+    par = getattr(run, "par", None)  # plain rows carry them
+    if isinstance(par, TwoWheelerParameters):
+        return par
     return TwoWheelerParameters.model_validate_json(run.attrs["parameters"])
 
 
 def vehicle_of(run: xr.Dataset) -> VehicleParameters:
     """Return the parameters of the vehicle with which a recording was made, whatever its brakes."""
-    known = getattr(run, "par", None)
-    if known is not None:
-        of_it: VehicleParameters = known.vehicle
-        return of_it
+    par = getattr(run, "par", None)
+    if par is not None:
+        vehicle: VehicleParameters = par.vehicle
+        return vehicle
     return VehicleParameters.model_validate(json.loads(run.attrs["parameters"])["vehicle"])
 
 
 def _levels(run: xr.Dataset, options: Any) -> dict[str, dict[str, float]]:
-    """Return what a stop from ``options.v_0`` is measured by."""
+    """Return the reference values of a stop from ``options.v_0``."""
     par = vehicle_of(run)
     peak = adhesion.peak_slip(road.surface(0.0, par.road), par.front_tyre)
     ideal = ideal_stop.ideal_distance(options.v_0, par)
@@ -111,13 +111,12 @@ JUDGE = FamilyJudge(lambda _: {"vehicle_stop": vehicle_stop.Setting()}, levels=_
 
 
 def locked_stop(v_0: float, par: VehicleParameters) -> float:
-    """Return a time [s] in which locked wheels stop a vehicle, a single one on most roads."""
+    """Return a time [s] in which locked wheels stop a vehicle, on most roads even one wheel."""
     road_ahead, body = par.road, par.body
     slope = road.slope(0.0, road_ahead)
     locked = adhesion.adhesion(1.0, road.surface(0.0, road_ahead), par.front_tyre)
     held = locked * slope.cosine + slope.sine
     if not held > 0.0:
-        raise ParameterError(
-            "locked wheels do not stop on this slope: give options.duration, the time to record"
-        )
+        advice = "the time to record, as locked wheels do not stop on this slope"
+        raise not_valid("options.duration", "0 s", "> 0 s", advice)
     return round(v_0 / (0.7 * held * body.g) + 1.0, 1)

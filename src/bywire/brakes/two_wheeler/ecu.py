@@ -1,6 +1,6 @@
 """The ECU of the two-wheeler: wheel speeds, reference speed, slip and lift control.
 
-Controllers only ever lower what the rider demands.
+Controllers never raise the rider's demand; they only lower it.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from bywire.core.signals import Limited, Signal
 
 
 class Stimulus(NamedTuple):
-    """What the rider demands."""
+    """Demands of the rider."""
 
     p_f_set: Annotated[float, Signal("Pa", "front pressure demand of the rider", 2e6), Ge(0)]
     p_r_set: Annotated[float, Signal("Pa", "rear pressure demand of the rider", 2e6), Ge(0)]
 
 
 class Memory(NamedTuple):
-    """What the ECU holds between its ticks."""
+    """Memory of the ECU between its ticks."""
 
     p_f_ref: Annotated[
         float,
@@ -82,7 +82,7 @@ class Memory(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """What there is to be seen at a tick."""
+    """Readings at a tick."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     sine: Annotated[float, Signal("1", "sine of the slope", 0.05)]
@@ -123,7 +123,7 @@ def tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
             abs_r=on_rear.acts,
         )
     if par.ecu.lift == "pi":
-        # Last, so that it knows from where on it lowers: a road may hold more soon.
+        # Last, as it needs the demand that it lowers: the road's adhesion may rise soon.
         seen = lift_pi.Input(m.a_hat, u.p_f_set, p_f, before.p_f_most)
         lift, out = lift_pi.output(
             lift_pi.State(m.lift_integral), seen, par.ecu.T_s, par.ecu.front_lift
@@ -136,7 +136,7 @@ _Demands = tuple[float, float, float]
 
 
 class _Wheel(NamedTuple):
-    """What slip control knows of a wheel."""
+    """Signals of a wheel for slip control."""
 
     slip: float
     tread: float
@@ -146,7 +146,7 @@ class _Wheel(NamedTuple):
 
 
 class _Lowered(NamedTuple):
-    """What slip control does."""
+    """Output of slip control."""
 
     p: float
     acts: float
@@ -157,7 +157,10 @@ class _Lowered(NamedTuple):
 def _lowered(
     wheel: _Wheel, v: float, demands: _Demands, gains: slip_pi.Parameters, par: Par
 ) -> _Lowered:
-    """Return what slip control leaves of the rider's demand: all, what may be lowered, before."""
+    """Return the rider's demand, lowered by slip control.
+
+    ``demands``: whole demand, the part that slip control may lower, and that part one tick before.
+    """
     mix, seen = mixed_slip.output(
         mixed_slip.State(wheel.tread_before, wheel.eta),
         mixed_slip.Input(slip_pi.set_point(v, gains), wheel.slip, wheel.tread),
@@ -174,16 +177,16 @@ def _lowered(
 
 
 def _by_rules(
-    side: str, p_most: float, m: Memory, before: Memory, own: slip_pi.Parameters, par: Par
+    side: str, p_most: float, m: Memory, before: Memory, wheel: slip_pi.Parameters, par: Par
 ) -> tuple[float, Memory]:
-    """Return what rules leave of the demand of a wheel, "f" or "r", and what they remember."""
+    """Return the demand of a wheel, "f" or "r", lowered by rules, and the new memory."""
     seen = abs_rules.Input(
         v=m.v_hat,
         a=m.a_hat,
         v_wheel=getattr(m, f"tread_{side}"),
         v_last=getattr(before, f"tread_{side}"),
         slip=getattr(m, f"slip_{side}_hat"),
-        inertia=own.J_hat / (own.r_hat * own.k_hat),
+        inertia=wheel.J_hat / (wheel.r_hat * wheel.k_hat),
         p_most=p_most,
         p_before=getattr(before, f"p_{side}_most"),
         p_ref=getattr(before, f"p_{side}_ref"),

@@ -1,6 +1,6 @@
-"""What may fail on the two-wheeler beside what its elements say.
+"""Failures of the two-wheeler other than those that its elements declare.
 
-Of a whole brake at the rear, what is declared of that brake may fail too, under its path.
+A whole brake at the rear adds the failures that it declares, under its path.
 """
 
 from __future__ import annotations

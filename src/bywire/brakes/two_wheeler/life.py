@@ -1,7 +1,7 @@
-"""Life of the front brake's pads: they thin, and what they lose is drawn from the reservoir.
+"""Life of the front brake's pads: they thin, and fluid from the reservoir fills their place.
 
-The seals draw the pistons back by the same way after every stop, so that the clearance stays: wear
-takes fluid through the compensating port instead. See `bywire.life`.
+The seals retract the pistons by the same travel after every stop: the clearance is constant, and
+wear draws fluid through the compensating port instead. See `bywire.life`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class WearParameters(ParameterSet):
     V_new: Volume
     """fluid in the reservoir with new pads"""
     V_min: Volume
-    """fluid below which it warns"""
+    """fluid below which the vehicle warns"""
 
 
 def begin(par: TwoWheelerParameters, wear: WearParameters) -> Values:
@@ -39,7 +39,7 @@ def begin(par: TwoWheelerParameters, wear: WearParameters) -> Values:
 
 
 def follows(z: Values, par: TwoWheelerParameters, wear: WearParameters) -> Mapping[str, float]:
-    """Return no changes: a loop that holds its pressure does not feel how thick its pads are."""
+    """Return no changes: a loop that holds its pressure does not depend on its pads."""
     return {}
 
 
@@ -50,7 +50,7 @@ def effects(
     par: TwoWheelerParameters,
     wear: WearParameters,
 ) -> Effects:
-    """Return what each stop wears, and the fluid that follows the pistons of all faces."""
+    """Return the wear by each stop, and the fluid that follows the pistons of all faces."""
     work = figures["disc_energy"] * figures["disc_share_front"] / 100.0
     before, after = warm_stops.temperatures(work, stops["pause"], stops["T_air"], wear.disc)
     thinned = warm_stops.thinned(work, before, after, wear.pads)
@@ -59,7 +59,7 @@ def effects(
 
 
 def left(z: Values, par: TwoWheelerParameters, wear: WearParameters) -> Values:
-    """Return the lining and the fluid that are left."""
+    """Return the remaining lining and fluid."""
     return {"lining": z["h_pad"] - wear.h_min, "fluid": z["V_reservoir"] - wear.V_min}
 
 

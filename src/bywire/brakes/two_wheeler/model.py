@@ -11,15 +11,14 @@ from bywire.core.model import Task
 from bywire.core.parts import Part
 from bywire.core.signals import zeros
 from bywire.plant import brake_disc, pressure_loop, road, road_wheel, wheel_encoder
-from bywire.vehicle.hot_brakes import HotBrakes, cold_start
 from bywire.vehicle.slip_remarks import far_from_peak
-from bywire.vehicle.two_wheeler import VehicleParameters, rolling_start
+from bywire.vehicle.two_wheeler import HotBrakes, VehicleParameters, cold_start, rolling_start
 
 Par = TwoWheelerParameters
 
 
 class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
-    """Each brake follows its demand as a loop of second order, as fast as its bandwidth."""
+    """A vehicle whose brakes follow their demands as loops of second order."""
 
     name: ClassVar[str] = "two-wheeler-by-wire"
     Memory: ClassVar = ecu.Memory
@@ -97,7 +96,7 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
     )
 
     def cold_torques(self, w: Self) -> tuple[float, float]:
-        """Return what cold discs hold at the pressures of both circuits."""
+        """Return the torques that cold discs hold at the pressures of both circuits."""
         w.front_circuit.u = pressure_loop.Input(w.m.p_f_ref)
         w.rear_circuit.u = pressure_loop.Input(w.m.p_r_ref)
         w.front_encoder.u = wheel_encoder.Input(w.front.x.omega)
@@ -114,7 +113,7 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
         return (Task("ecu", par.ecu.T_s, tick),)
 
     def remarks(self, recording: Any, par: Par) -> list[str]:
-        """Return where slip alone is held that is far below that of the largest adhesion."""
+        """Return remarks on a slip that is held far below that of the largest adhesion."""
         if par.ecu.abs != "pi" or par.ecu.mix.alpha < 1.0:
             return []
         ways, x = par.vehicle.road, recording["x"].values
@@ -154,7 +153,7 @@ def at_speed(v: float, par: Par, heat: Mapping[str, Any] | None = None) -> tuple
 
 
 def awake(v: float, vehicle: VehicleParameters, T_s: float) -> ecu.Memory:
-    """Return what the ECU, of a sample time [s], holds while the vehicle rolls [m/s]."""
+    """Return the memory of an ECU with a sample time [s], while the vehicle rolls [m/s]."""
     front, rear = v / vehicle.front_wheel.r, v / vehicle.rear_wheel.r
     return zeros(ecu.Memory)._replace(
         v_hat=v,
@@ -169,7 +168,7 @@ def awake(v: float, vehicle: VehicleParameters, T_s: float) -> ecu.Memory:
 
 
 def tick(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
-    """Run the ECU once, of what its sensors show."""
+    """Run the ECU once, with the readings of its sensors."""
     front, rear = par.vehicle.front_wheel, par.vehicle.rear_wheel
     edges = [
         wheel_encoder.reading(

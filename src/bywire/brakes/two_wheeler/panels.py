@@ -1,4 +1,4 @@
-"""What time traces of the two-wheeler show."""
+"""Panels of time traces of the two-wheeler."""
 
 from __future__ import annotations
 

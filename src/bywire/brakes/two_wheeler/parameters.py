@@ -31,20 +31,20 @@ class HotBrakeParameters(BrakeParameters):
 
 
 class SensorParameters(ParameterSet):
-    """Sensors beside those of the brakes."""
+    """Sensors other than those of the brakes."""
 
     encoder: wheel_encoder.Parameters
     a_offset: Acceleration
-    """what the accelerometer shows too much of deceleration"""
+    """offset of the accelerometer, positive for too much deceleration"""
     tau_a: TimeConstant
     """time constant of its filter"""
 
 
 class EcuParameters(ParameterSet):
-    """What runs on the ECU.
+    """The ECU: sample time and controllers.
 
     ``abs``: ``"pi"`` controls the slip of both wheels; ``"rules"`` build, dump and hold their
-    pressures by thresholds; ``"off"`` leaves them to the rider.
+    pressures by thresholds; with ``"off"`` the rider controls them.
     ``lift``: ``"pi"`` keeps the rear wheel on the ground.
     ``sees``: the speed and slip of the controllers are ``"estimated"`` from the sensors, or
     ``"known"``, for comparison.

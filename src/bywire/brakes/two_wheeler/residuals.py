@@ -1,7 +1,7 @@
-"""What the two-wheeler's ECU can compute to see a failure, of its encoders and accelerometer.
+"""Residuals by which the two-wheeler's ECU can detect failures of encoders and accelerometer.
 
-A wheel that stands, or whose speed no vehicle could have, is either what slip control has to end
-within a moment, or no truth.
+A standing wheel, or a speed that no vehicle can have, is either a slip that control ends within a
+moment, or a wrong reading.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _SPAN = 0.1  # s, over which both speeds are compared
 
 
 def _fast(signals: Signals, par: Any, values: Array) -> Array:
-    """Return a residual above the speed below which slip is left to grow, else none."""
+    """Return a residual above the speed at which slip control fades out, otherwise none."""
     return np.where(signals["v_hat"] > par.ecu.front_slip.v_fall, values, NEVER)
 
 
@@ -36,7 +36,7 @@ def _slip(side: str) -> Callable[[Signals, Any, float], Array]:
 
 
 def _speed(signals: Signals, par: Any, dt: float) -> Array:
-    """Return by how much the believed speed changes beside what the accelerometer shows."""
+    """Return the deviation of the estimated speed's change from the accelerometer's."""
     rows, v = round(_SPAN / dt), signals["v_hat"]
     lost = np.concatenate((np.broadcast_to(v[:, :1], (len(v), rows)), v[:, :-rows]), axis=1) - v
     shown = mean_of_the_last(signals["a_hat"], rows) * rows * dt

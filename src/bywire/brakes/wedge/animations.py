@@ -1,4 +1,4 @@
-"""The wedge brake on a car's corner as a moving picture."""
+"""Animation of the wedge brake on a car's corner."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""The fault campaign of the wedge brake: a moment held, then a little less, then a ramp."""
+"""The fault campaign of the wedge brake: a moment held, then a reduction, then a ramp."""
 
 from __future__ import annotations
 
-from bywire.campaigns.declared import DeclaredCampaign
+from bywire.campaigns.residual import DeclaredCampaign
 
 CAMPAIGN = DeclaredCampaign(
     "wedge",

@@ -1,23 +1,23 @@
-"""What the wedge brake's experiments share: runs that start parked, and key figures of braking."""
+"""Shared parts of the wedge brake's experiments: parked starts, readings, figures of braking."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
+from pydantic import AfterValidator, Field
 
+from bywire.bench.energy_ledger import energy_residual
 from bywire.bench.experiment import Case
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.recording import energy_residual
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import PARKED
-from bywire.brakes.wedge.model import WedgeBrake, state_at
+from bywire.brakes.wedge.model import WedgeBrake, memory_at, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rows import along_disc
-from bywire.brakes.wedge.start import memory_at
+from bywire.core.quantities import Unit
 from bywire.core.typing import Array
 
 Signals = Mapping[str, Array]
@@ -29,13 +29,13 @@ BRAKING = Figures(
     peak_power_filtered=("W", "Largest power at the drives' input, as the rig measures it."),
     peak_normal_force=("N", "Largest normal force."),
     caliper_energy=("J", "Largest energy of the caliper before the demand changes."),
-    disc_share=("%", "Work of the disc on the wedge until then, over that energy."),
-    rate_limited=("%", "Share of the time until the demand changes on the software rate limit."),
+    disc_share=("%", "Share of that energy supplied by the disc (self-reinforcement)."),
+    rate_limited=("%", "Share of the time on the software rate limit, until the demand changes."),
     peak_speed=("rad/s", "Largest speed of motor 1."),
     energy_in=("J", "Energy at the drives' input, standby included."),
     energy_braked=("J", "Energy taken from the disc."),
-    energy_left=("J", "Largest residual of the energy balance: the step's error."),
-    undefined="the level is never reached in time",
+    energy_left=("J", "Largest residual of the energy balance: the numerical error."),
+    undefined="the signal does not reach the level in this time",
 )
 """key figures of :func:`braking`"""
 
@@ -117,9 +117,9 @@ def _contact(held: xr.Dataset) -> float:
 
 def parameters_of(run: xr.Dataset) -> WedgeParameters:
     """Return the parameters with which a recording was made."""
-    known = getattr(run, "par", None)  # of plain rows
-    if isinstance(known, WedgeParameters):
-        return known
+    par = getattr(run, "par", None)  # plain rows carry them
+    if isinstance(par, WedgeParameters):
+        return par
     return WedgeParameters.model_validate_json(run.attrs["parameters"])
 
 
@@ -129,7 +129,7 @@ def clearance(x: float, par: WedgeParameters) -> float:
 
 
 def release_time(run: xr.Dataset, begin: float, name: str = "release_time") -> Kpi:
-    """Return the time from the end of the demand [s] until the pads leave the disc for good."""
+    """Return the time from the end of the demand [s] until the pads finally leave the disc."""
     after = run.sel(time=slice(begin - 1e-9, None))
     pressing = np.flatnonzero(after["F_N"].values > 0)
     value, note = math.nan, ""
@@ -149,7 +149,7 @@ def parking_time(run: xr.Dataset, begin: float, name: str = "parking_time") -> K
     """Return the time from the end of the demand [s] until the brake is parked."""
     after = run.sel(time=slice(begin - 1e-9, None))
     parked = np.flatnonzero(after["mode"].values == PARKED)
-    value, note = math.nan, "not parked until the end of the recording"
+    value, note = math.nan, "the brake is not parked when the recording ends"
     if parked.size:
         value, note = float(after["time"].values[parked[0]]) - begin, ""
     return Kpi(name, value, "s", "Time from the end of the demand until the brake is parked.", note)
@@ -181,3 +181,108 @@ def swing(run: xr.Dataset, name: str, begin: float, end: float) -> float:
 
 def _gained(run: xr.Dataset, name: str) -> float:
     return float(run[name].values[-1] - run[name].values[0])
+
+
+# --- Reading recordings: the disc's direction, its revolutions, their rows
+
+
+def along_disc(run: xr.Dataset) -> xr.Dataset:
+    """Return a recording whose moments and speed count positive in the disc's first direction."""
+    if not float(run["Omega"].values[0]) < 0:
+        return run
+    # Not negated, which would make negative zeros.
+    return run.assign({name: 0.0 - run[name] for name in ("M_B", "y_M", "Omega")})
+
+
+def last_turn(run: xr.Dataset, begin: float, end: float) -> float | None:
+    """Return when the disc's last revolution before a time begins [s]; None if before another."""
+    nearest = int(np.abs(run["time"].values - end).argmin())
+    speed = abs(float(run["Omega"].values[nearest]))
+    if speed * (end - begin) < 2.0 * math.pi:
+        return None
+    return end - 2.0 * math.pi / speed
+
+
+def too_coarse(run: xr.Dataset, begin: float, end: float, rows: int = 1) -> str:
+    """Return why rows are too far apart to judge a moment between two times [s]; else "".
+
+    Parameters
+    ----------
+    rows
+        Least number of rows in that time. A revolution of the disc takes five: fewer would
+        alias the run-out's oscillation.
+    """
+    t = run["time"].values
+    apart = float(np.diff(t).max()) if t.size > 1 else math.inf
+    speed = float(np.abs(run["Omega"].values).max())
+    fifth = 0.4 * math.pi / speed if speed > 0 else math.inf
+    inside = np.count_nonzero((t >= begin - 1e-9) & (t <= end + 1e-9))
+    if inside >= rows and apart <= 1.05 * fifth:  # the message rounds the interval
+        return ""
+    interval = min((end - begin) / rows, fifth)
+    return (
+        f"rows {apart:.3g} s apart are too few between t = {begin:.4g} s and {end:.4g} s: "
+        f"record every {interval:.2g} s or more often"
+    )
+
+
+# --- Several friction coefficients
+
+FRICTIONLESS = {
+    "bearing.C_0": 0.0,
+    "bearing.C_1": 0.0,
+    "bearing.C_2": 0.0,
+    "bearing.T_nu": 0.0,
+    "screw.law": "load",
+    "screw.eta_f": 1.0,
+    "screw.eta_b": 1.0,
+    "wedge_friction.mu_int": 0.0,
+    "wedge_friction.mu_R": 0.0,
+    "encoder.law": "ideal",
+}
+"""changes that leave the pads on the disc as the brake's only dry friction; without friction the
+counts of an encoder would keep the shafts moving"""
+
+
+def _distinct(values: tuple[float, ...]) -> tuple[float, ...]:
+    tags = [tag(value) for value in values]
+    for k, value in enumerate(values):
+        if tags[k] in tags[:k]:
+            raise ValueError(f"{value:g} is given twice: leave one out")
+    return values
+
+
+Coefficient = Annotated[float, Field(gt=0, le=2, allow_inf_nan=False)]
+Coefficients = Annotated[
+    tuple[Coefficient, ...],
+    Unit("1", 0.35),
+    Field(min_length=1, max_length=100),
+    AfterValidator(_distinct),
+]
+"""friction coefficients of the pads, in any order, each once"""
+
+
+def tag(mu_B: float) -> str:
+    """Return the name of a friction coefficient in labels and key figures.
+
+    Examples
+    --------
+    >>> tag(0.35), tag(0.355)
+    ('mu35', 'mu35p5')
+    """
+    return f"mu{100.0 * mu_B:.10g}".replace(".", "p")
+
+
+def with_friction(par: WedgeParameters, mu_B: float, known: bool) -> dict[str, Any]:
+    """Return the changes that give the pads a friction coefficient.
+
+    Parameters
+    ----------
+    known
+        Whether the moment controller knows the coefficient and assumes the slope that belongs to
+        it. That slope keeps its ratio to the brake's, so that a mismatch remains.
+    """
+    slope = par.control.moment.slope_hat
+    if known and par.wedge.mu_B > 0:
+        slope *= mu_B / par.wedge.mu_B
+    return {"wedge.mu_B": mu_B, "control.moment.slope_hat": slope}

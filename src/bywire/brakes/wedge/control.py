@@ -1,6 +1,6 @@
 """Controllers of the wedge brake at their sampling instants: moment at 1 kHz, position at 5 kHz.
 
-And, of a brake that has one, the adjuster, which turns between two applications.
+A brake may also have an adjuster, which turns between two applications.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Stimulus(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What the controllers hold between their sampling instants."""
+    """Memory of the controllers between their sampling instants."""
 
     on: Annotated[float, Signal("1", "power stages on")]
     M_set: Annotated[float, Signal("N*m", "moment demand", 300.0)]
@@ -67,7 +67,7 @@ class Memory(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """What the sensors show at a sampling instant."""
+    """Readings of the sensors at a sampling instant."""
 
     theta_1: Annotated[float, Signal("rad", "encoder 1", 3.0)]
     theta_2: Annotated[float, Signal("rad", "encoder 2", 3.0)]
@@ -138,18 +138,18 @@ def position_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> 
 
 
 def adjuster_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
-    """Run the adjuster once: what it turns takes it a sample, and the moment control follows."""
-    own = par.control.adjuster
-    wanted = ops.where(u.M_set > par.control.moment.M_on, 1.0, 0.0)
+    """Run the adjuster once: a turn takes it one sample, and the moment control follows."""
+    law = par.control.adjuster
+    braking = ops.where(u.M_set > par.control.moment.M_on, 1.0, 0.0)
     x, out = gap_adjusting.output(
         gap_adjusting.State(m.applied, m.wide, m.teeth),
-        gap_adjusting.Input(m.theta_c, m.mode, wanted),
-        own,
+        gap_adjusting.Input(m.theta_c, m.mode, braking),
+        law,
     )
     return m._replace(
         adjusting=out.mode,
-        click_rate=out.turned / own.T_adjust,
-        meant_rate=out.teeth / own.T_adjust,
+        click_rate=out.turned / law.T_adjust,
+        meant_rate=out.teeth / law.T_adjust,
         clicks=m.clicks + out.turned,
         gap_hat=out.gap,
         **x._asdict(),
@@ -166,9 +166,9 @@ def current_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
 
 
 def _derated(m: Memory, par: WedgeParameters) -> Memory:
-    """Return the memory with the limit that the hotter motor leaves of both currents.
+    """Return the memory with the limit of both currents that the hotter motor sets.
 
-    The drives follow their demands; these stand for the currents, which nobody measures.
+    The drives follow their demands, which therefore serve as the currents: these are not measured.
     """
     control, T = par.control.derating, par.control.T_fast
     if control.law == "off":
@@ -197,16 +197,16 @@ def _derated(m: Memory, par: WedgeParameters) -> Memory:
 
 
 def _position(m: Memory, par: WedgeParameters) -> position_pd.Parameters:
-    """Return the position control with the limit of its demand that derating leaves."""
+    """Return the position control with the current limit that derating sets."""
     control = par.control.position
     if par.control.derating.law == "off":
         return control
-    # A smaller limit; symbols could not be validated.
+    # Not validated: the limit may be a symbol, and it is only smaller.
     return position_pd.Parameters.model_construct(**{**dict(control), "i_max": m.i_most})
 
 
 def _references(m: Memory, r: Readings, u: Stimulus, par: WedgeParameters) -> Memory:
-    """Return the memory with the references of both shafts renewed."""
+    """Return the memory with updated references of both shafts."""
     if par.command.mode == "position":
         return m._replace(theta_1_ref=u.theta_1_set, theta_2_ref=u.theta_2_set)
     advanced = m.theta_ref + _allowed(m, par) * par.control.T_fast
@@ -225,7 +225,7 @@ def _references(m: Memory, r: Readings, u: Stimulus, par: WedgeParameters) -> Me
 def _allowed(m: Memory, par: WedgeParameters) -> float:
     """Return the speed of the common reference [rad/s]: 0 where both motors are on their limit.
 
-    Anti-wind-up: a reference that went on would have to come all the way back at a release.
+    Anti-wind-up: a reference that moved on would have to return all the way at a release.
     """
     limit, speed = _position(m, par).i_max, m.direction * m.rate
     push = ops.where(speed < 0, -1.0, 1.0)

@@ -18,7 +18,7 @@ Motor = Wired[servo_motor.State, servo_motor.Input, None, servo_motor.Parameters
 
 
 class Command(NamedTuple):
-    """What the real-time computer holds for one motor."""
+    """Memory of the real-time computer for one motor."""
 
     theta_ref: Annotated[float, Signal("rad", "angle reference", 3.0)]
     last: Annotated[float, Signal("rad", "encoder at the last sample", 3.0)]
@@ -27,7 +27,7 @@ class Command(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """What a rig's operator asks of one motor; which of them acts depends on its mode."""
+    """Demands of a rig's operator on one motor, whose mode selects the one that acts."""
 
     theta: Annotated[float, Signal("rad", "demanded angle", 3.0)]
     i: Annotated[float, Signal("A", "demanded current", 5.0)]
@@ -52,7 +52,7 @@ def power(motor: Motor) -> float:
 
 
 def measured_power(drive: Drive, motor: Motor, i_ref: float, on: float) -> float:
-    """Return the electrical power into a motor [W], value-only: nothing feels its measurement."""
+    """Return the electrical power into a motor [W], value-only: measuring it has no reaction."""
     emf = servo_motor.torque_constant(motor.par) * motor.xe.omega
     u = current_drive.Input(i_ref=i_ref, i=motor.xe.i, emf=emf, on=on)
     return current_drive.output(drive.xe, u, drive.par).v * motor.xe.i
@@ -89,8 +89,8 @@ def command(
 ) -> Command:
     """Run the real-time computer once for one motor of a rig.
 
-    ``mode``: whether the motor's position is controlled, or its drive is handed the demanded
-    current; ``theta``: what the encoder shows [rad].
+    ``mode``: "position" controls the motor's position, "current" passes the demanded current to
+    its drive; ``theta``: reading of the encoder [rad].
     """
     x, out = position_pd.output(
         position_pd.State(held.last, held.speed),

@@ -1,4 +1,4 @@
-"""What may fail in the wedge brake beside what its elements say."""
+"""Failures of the wedge brake other than those that its elements declare."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CORNER_CHANNELS = Channels(WedgeCorner.name, _SIGNALS)
 
 
 def _jammed(motor: str) -> Any:
-    """Return the changes in which a screw jams: its motor is braked without end by damping."""
+    """Return the changes that jam a screw: a large damping of its motor."""
 
     def changes(par: Any, value: float) -> Mapping[str, Any]:
         return {f"{motor}.D_M": value}
@@ -34,12 +34,12 @@ def _jammed(motor: str) -> Any:
 
 
 def _shorted(motor: str) -> Any:
-    """Return the changes in which a winding is shorted: no torque but a drag, K^2/R."""
+    """Return the changes that short a winding: no torque, but a drag K^2/R."""
 
     def changes(par: Any, value: float) -> Mapping[str, Any]:
-        own = getattr(par, motor)
-        drag = own.K_ref * own.K_ref / own.R_ref
-        return {f"{motor}.D_M": own.D_M + drag, f"{motor}.K_ref": _NOTHING * own.K_ref}
+        healthy = getattr(par, motor)
+        drag = healthy.K_ref * healthy.K_ref / healthy.R_ref
+        return {f"{motor}.D_M": healthy.D_M + drag, f"{motor}.K_ref": _NOTHING * healthy.K_ref}
 
     return changes
 
@@ -48,7 +48,7 @@ FAULTS = (
     *(
         Fault(
             f"screw_{number}.jammed",
-            f"screw {number} jams where it is, by damping",
+            f"screw {number} jams in its position, modeled by damping",
             _jammed(f"motor_{number}"),
             WedgeBrake.name,
             "N*m*s/rad",

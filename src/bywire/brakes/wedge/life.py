@@ -25,22 +25,22 @@ from bywire.plant import pad_wear, roller_screw
 
 
 class WearParameters(ParameterSet):
-    """Pads, how warm stops make them, what adjusts them, and where they end.
+    """Pads, heating of the disc, adjuster, and limits of wear.
 
-    ``mechanism``: ``"teeth"`` is an adjuster; ``"none"`` leaves the clearance to grow.
+    ``mechanism``: ``"teeth"`` is an adjuster; with ``"none"`` the clearance grows.
     """
 
     pads: pad_wear.Parameters
     disc: warm_stops.Parameters
     mechanism: Literal["none", "teeth"]
-    """what takes the clearance back"""
+    """mechanism that restores the clearance"""
     adjuster: wear_adjuster.Parameters
     h_new: Length
-    """thickness of a new pad; the bench's stiffness is that of new pads"""
+    """thickness of a new pad; the bench's stiffness belongs to new pads"""
     h_min: Length
     """thickness at which pads are replaced"""
     M_full: SomeMoment
-    """moment that has to be within the wedge's travel"""
+    """moment that the wedge's travel must allow"""
 
 
 def begin(par: WedgeCornerParameters, wear: WearParameters) -> Values:
@@ -68,18 +68,18 @@ def effects(
     par: WedgeCornerParameters,
     wear: WearParameters,
 ) -> Effects:
-    """Return what each stop wears: both pads thin alike, and the clearance grows by both.
+    """Return the wear by each stop: both pads thin equally, and the clearance grows by both.
 
-    Read between stops: by how much the way to contact, as the moment control sees it, is longer
-    than the clearance, and how warm the disc is where a stop begins.
+    The readings between stops are the travel to contact, estimated by the moment control, minus
+    the clearance, and the temperature of the disc when a stop begins.
     """
     work = figures["energy_braked"]
     before, after = warm_stops.temperatures(work, stops["pause"], stops["T_air"], wear.disc)
     thinned = warm_stops.thinned(work, before, after, wear.pads)
-    way = figures["contact_angle"] * roller_screw.slope(par.screw) * wedge.slope(par.wedge)
+    travel = figures["contact_angle"] * roller_screw.slope(par.screw) * wedge.slope(par.wedge)
     return Effects(
         {"h_pad": -thinned, "clearance": 2.0 * thinned, "work": work},
-        {"beyond": float(np.mean(way)) - z["clearance"], "T_disc": float(np.mean(before))},
+        {"beyond": float(np.mean(travel)) - z["clearance"], "T_disc": float(np.mean(before))},
     )
 
 
@@ -108,11 +108,11 @@ def between(
 
 
 def left(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Values:
-    r"""Return what is left of the lining, of the wedge's travel, and until a hot disc drags.
+    r"""Return the remaining lining, wedge travel, and clearance until a hot disc drags.
 
     .. math:: x_{stop} \tan\alpha - c - F_N/K_{CAL}
 
-    is left of the travel, with the normal force of the moment M_full.
+    is the remaining travel, with the normal force of the moment M_full.
     """
     F_N = wear.M_full / (2.0 * par.wedge.mu_B * par.caliper.r_B)
     reach = par.wedge.x_stop * wedge.slope(par.wedge)

@@ -6,17 +6,25 @@ Mechatronic Wedge Brake", SAE, 2003.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
-from bywire.brakes.wedge import control, drive_train, start
-from bywire.brakes.wedge import watch as warnings
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.brakes.wedge import control, drive_train
+from bywire.brakes.wedge.control import Memory
 from bywire.brakes.wedge.elements import brake_heart, wedge, wedge_caliper, wedge_friction
+from bywire.brakes.wedge.laws import screw_offset
+from bywire.brakes.wedge.laws.moment_control import MOMENT
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core import ops
 from bywire.core.assembly import Assembly
 from bywire.core.model import Bounds, Task
+from bywire.core.parameters import ParameterSet
 from bywire.core.parts import Integral, Part, Shown, Wire
-from bywire.core.signals import Role
+from bywire.core.signals import Role, zeros
 from bywire.plant import (
     clearance_adjuster,
     current_drive,
@@ -189,7 +197,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     )
 
     def wire(self, w: Self) -> None:
-        """Say what every part feels: forces of the contacts, shafts, wedge, disc, measurements."""
+        """Connect all parts: forces of the contacts, shafts, wedge, disc, measurements."""
         par, forces = w.par, brake_heart.output(w.heart.f)
         w.F_1, w.F_2, w.squeeze = forces.F_1, forces.F_2, forces.squeeze
         w.turning = flywheel.turning(w.disc.xe, par.flywheel)
@@ -230,7 +238,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         )
 
     def disc_torque(self, w: Self) -> float:
-        """Return what turns the disc beside its own drive [N m]: nothing on the test stand."""
+        """Return the torque on the disc other than its drive's [N m]: none on the test stand."""
         return 0.0
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
@@ -247,7 +255,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         return (*shafts, (-sliding, sliding), (-moment, moment))
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return what crosses the border, and what the dry frictions take."""
+        """Return the powers across the system boundary, and those of the dry frictions."""
         friction_1, friction_2, friction, moment = w.reaction
         motors = drive_train.power(w.motor_1) + drive_train.power(w.motor_2)
         return {
@@ -263,11 +271,11 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         }
 
     def record(self, w: Self) -> dict[str, float]:
-        """Return what is recorded beside states, wires and losses."""
+        """Return the recorded signals other than states, wires and losses."""
         motors = drive_train.power(w.motor_1) + drive_train.power(w.motor_2)
         heat_1 = motor_heat.stored(w.heat_1.x, w.heat_1.par)
         heat_2 = motor_heat.stored(w.heat_2.x, w.heat_2.par)
-        # What is off costs no operation: motors that stay cold keep what they give to the air.
+        # Heat that is off costs no operation: cold motors show the zero heat to the air.
         cold, none = w.par.motor_heat.law == "off", w.flow.E_motor_air
         given = w.flow.W_electric + w.flow.W_disc + w.flow.W_runout
         adjusts = w.par.adjuster.law != "none"
@@ -318,11 +326,11 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
 
     def rest(self, par: Par) -> tuple[Any, control.Memory]:
         """Return the brake parked: the wedge in its middle, preloaded, without current."""
-        return state_at(0.0, par), start.memory_at(0.0, par)
+        return state_at(0.0, par), memory_at(0.0, par)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
-        """Return what the user should know of a recording."""
-        return warnings.watch(recording, par) + super().watch(recording, par)
+        """Return the warnings about a recording."""
+        return warnings_of(recording, par) + super().watch(recording, par)
 
 
 def state_at(x: float, par: Par) -> Any:
@@ -341,7 +349,7 @@ def state_at(x: float, par: Par) -> Any:
 
 
 def readings(x: Any, par: Par) -> control.Readings:
-    """Return what the controllers see at a tick."""
+    """Return the controllers' readings at a tick."""
     return control.Readings(
         theta_1=shaft_encoder.reading(x.theta_1, par.encoder),
         theta_2=shaft_encoder.reading(x.theta_2, par.encoder),
@@ -360,3 +368,179 @@ def _contact_number(forces: brake_heart.Forces) -> float:
     bits = (1.0, 2.0, 4.0)
     closed = (bit * ops.where(f > 0, 1.0, 0.0) for bit, f in zip(bits, forces, strict=True))
     return sum(closed, 0.0)
+
+
+# --- States at rest: parked, preloaded, without current
+
+
+def travel_for(F_N: float, par: Par) -> float:
+    """Return the wedge travel [m] at a normal force [N], run-out left out."""
+    return (par.caliper.clearance + wedge_caliper.travel(F_N, par.caliper)) / wedge.slope(par.wedge)
+
+
+def force_for(moment: float, par: Par) -> float:
+    """Return the normal force [N] that gives a braking moment [N m]."""
+    return moment / wedge_caliper.moment(1.0, par.wedge.mu_B, 1.0, par.caliper)
+
+
+def contact_angle(par: Par) -> float:
+    """Return the motor angle [rad] at which the pads touch."""
+    return travel_for(0.0, par) / roller_screw.slope(par.screw)
+
+
+def memory_at(x: float, par: Par) -> Memory:
+    """Return the controllers' memory with the references at this travel [m]."""
+    k = roller_screw.slope(par.screw)
+    delta = par.control.offset.delta_preload
+    both = screw_offset.output(x / k, delta, par.control.offset)
+    adjusts = par.adjuster.law != "none"
+    return zeros(Memory)._replace(
+        on=1.0,
+        direction=ops.where(par.flywheel.Omega_0 < 0, -1.0, 1.0),
+        theta_c=contact_angle(par),
+        gap_hat=par.control.adjuster.gap_slope_hat * contact_angle(par) if adjusts else 0.0,
+        theta_ref=x / k,
+        delta=delta,
+        theta_1_ref=both.theta_1,
+        theta_2_ref=both.theta_2,
+        last_1=x / k - delta / k,
+        last_2=x / k + delta / k,
+    )
+
+
+# --- Warnings about a recording: stops, limits, screws that hold
+
+Rows = NDArray[np.bool_]
+
+_REACHED = 0.95  # of the demanded moment
+_LONG = 0.05  # time [s] on the current limit after which a moment counts as out of reach
+_SWINGS = 10  # reversals on the current limit, each within _LONG of the last, that a step never has
+
+
+def warnings_of(recording: xr.Dataset, par: ParameterSet) -> list[str]:
+    """Return the warnings of a recording of at least one row; none without the brake's signals."""
+    values = par.flat()
+    if not {"F_end", "M_set", "i_1_ref", "i_2_ref"} <= set(recording):
+        return []
+    warnings = _end_stop(recording)
+    if values["command.mode"] == "moment":  # elsewhere the demanded currents are the test's own
+        warnings += _out_of_reach(recording, values) or _not_reached(recording, values)
+        warnings += _limits(recording, values)
+    return warnings + _holding_screw(values)
+
+
+def _end_stop(recording: xr.Dataset) -> list[str]:
+    force = np.abs(recording["F_end"].values)
+    if not force.any():
+        return []
+    k = int(np.argmax(force > 0))
+    when, x = _when(recording, k), 1e3 * float(recording["x"].values[k])
+    return [
+        f"the wedge reached its end stop {when}, x = {x:.3g} mm, and pressed on it with "
+        f"up to {force.max():.3g} N: the stop ends the braking moment"
+    ]
+
+
+def _when(recording: xr.Dataset, k: int) -> str:
+    """Return the time of row ``k`` in words; an event in the first row began earlier."""
+    t = float(recording["time"].values[k])
+    return "before the recording starts" if k == 0 else f"at t = {t:.4g} s"
+
+
+def _limit(values: Mapping[str, Any]) -> float:
+    return float(min(values["control.position.i_max"], values["drive.i_max"]))
+
+
+def _limited(recording: xr.Dataset, values: Mapping[str, Any]) -> Rows:
+    """Return the rows in which a motor's demanded current is at its limit."""
+    refs = [np.abs(recording[name].values) for name in ("i_1_ref", "i_2_ref")]
+    return np.asarray(np.maximum(*refs) >= _limit(values) * (1.0 - 1e-9))
+
+
+def _out_of_reach(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
+    """Warn that the current limit keeps a moment out of reach as long as it is demanded."""
+    begin, end = _longest(_short_of(recording, values) & _limited(recording, values))
+    t, demand = recording["time"].values, recording["M_set"].values
+    demanded = float(demand[begin : end + 1].max())
+    moment = np.abs(recording["M_B"].values)
+    most = float(moment[demand >= _REACHED * demanded].max())
+    if t[end] - t[begin] < _LONG or most >= _REACHED * demanded or _swings(recording, values):
+        return []
+    return [
+        f"the motors cannot reach the demanded {demanded:.4g} N*m: on the current limit of "
+        f"{_limit(values):.4g} A from t = {t[begin]:.4g} s to {t[end]:.4g} s, the moment stays at "
+        f"{most:.4g} N*m at most"
+    ]
+
+
+def _not_reached(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
+    """Warn that the moment never reached the largest demand, whatever the cause."""
+    demanded = float(recording["M_set"].values.max())
+    most = float(np.abs(recording["M_B"].values).max())
+    sparse = np.diff(recording["time"].values).max(initial=0.0) > _LONG  # may miss the peak
+    if sparse or most >= _REACHED * demanded:
+        return []
+    text = f"the demand of {demanded:.4g} N*m was not reached: the moment is {most:.4g} N*m at most"
+    M_on, speed = values["control.moment.M_on"], np.abs(recording["Omega"].values).max()
+    if demanded <= M_on:
+        text += f", as the brake stays parked up to control.moment.M_on = {M_on:.4g} N*m"
+    elif speed < values["control.moment.Omega_still"]:
+        text += ", as the disc stands"
+    return [text]
+
+
+def _limits(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
+    """Warn that the current limit was reached in passing, or that currents swing between limits."""
+    limited, limit = _limited(recording, values), _limit(values)
+    if not limited.any() or _out_of_reach(recording, values):
+        return []
+    swings = _swings(recording, values)
+    if swings:
+        begin, end, number = swings
+        return [
+            f"the demanded current swings between its limits of -{limit:.4g} A and {limit:.4g} A, "
+            f"{number} times from t = {begin:.4g} s to {end:.4g} s: a loop is likely unstable, "
+            "see 'bywire margins position' and 'bywire margins moment'"
+        ]
+    k = int(np.argmax(limited))
+    return [f"the current limit of {limit:.4g} A was reached {_when(recording, k)}"]
+
+
+def _swings(recording: xr.Dataset, values: Mapping[str, Any]) -> tuple[float, float, int] | None:
+    """Return begin and end [s] of the longest swing between both limits, and its reversals."""
+    t, limit, begin = recording["time"].values, _limit(values) * (1.0 - 1e-9), None
+    for name in ("i_1_ref", "i_2_ref"):
+        current = recording[name].values
+        rows = np.flatnonzero(np.abs(current) >= limit)
+        reversals = t[rows[1:]][np.diff(np.sign(current[rows])) != 0]
+        for chain in np.split(reversals, np.flatnonzero(np.diff(reversals) > _LONG) + 1):
+            if chain.size >= max(_SWINGS, 0 if begin is None else begin[2] + 1):
+                begin = float(chain[0]), float(chain[-1]), int(chain.size)
+    return begin
+
+
+def _short_of(recording: xr.Dataset, values: Mapping[str, Any]) -> Rows:
+    """Return the rows in which a moment is controlled on a turning disc, below its demand."""
+    turning = np.abs(recording["Omega"].values) > values["control.moment.Omega_still"]
+    demanded = _REACHED * recording["M_set"].values
+    below = np.abs(recording["y_M"].values) < demanded
+    return np.asarray((recording["mode"].values == MOMENT) & turning & below)
+
+
+def _longest(rows: Rows) -> tuple[int, int]:
+    """Return first and last index of the longest stretch of rows; (0, 0) where there is none."""
+    edges = np.flatnonzero(np.diff(rows.astype(np.int8), prepend=0, append=0))
+    if not edges.size:
+        return 0, 0
+    begins, ends = edges[::2], edges[1::2] - 1
+    k = int(np.argmax(ends - begins))
+    return int(begins[k]), int(ends[k])
+
+
+def _holding_screw(values: Mapping[str, Any]) -> list[str]:
+    if values["screw.law"] != "load" or values["screw.eta_b"] != 0.0:
+        return []
+    return [
+        "screw.eta_b = 0: no load drives these screws back, so that the brake keeps its moment "
+        "when the power goes off"
+    ]

@@ -1,4 +1,4 @@
-"""What time traces of the wedge brake and its rigs show, and what is compared of several runs."""
+"""Panels of time traces of the wedge brake and its rigs, and signals compared over runs."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ BRAKING = Panels(
             saturated="on the software rate limit",
         ),
         Panel("current", (Trace("i_1"), Trace("i_2", Role.SECOND)), limit="drive.i_max"),
-        # The rig shows the filtered power; the peaks of the raw one would hide it.
+        # The rig measures the filtered power; the peaks of the raw power would hide it.
         Panel("power", (Trace("P_meas"), Trace("P_in", Role.SECOND))),
         Panel("force", (Trace("F_M"),)),
         _MODE,
@@ -97,4 +97,4 @@ DRIVES = Panels(
 COMPARED: Mapping[str, str] = MappingProxyType(
     {"y_M": "moment", "theta": "angle", "F_M": "force", "i_2": "current 2", "P_meas": "power"}
 )
-"""what overlaid traces compare, and what a low panel calls it"""
+"""signals that overlaid traces compare, with their names in low panels"""

@@ -1,4 +1,4 @@
-"""Parameters of the wedge brake: one group per element, the controllers' apart."""
+"""Parameters of the wedge brake and its rigs: one group per element, and the controllers'."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from pydantic import model_validator
 
 from bywire.brakes.wedge.elements import brake_heart, wedge, wedge_caliper, wedge_friction
 from bywire.brakes.wedge.laws import gap_adjusting, moment_control, screw_offset
-from bywire.brakes.wedge.rigs import rig_parameters
 from bywire.control import derating, position_pd
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration
+from bywire.core.quantities import Duration, Force, Inertia, Torque
 from bywire.plant import (
     axial_bearing,
     clearance_adjuster,
@@ -19,6 +18,7 @@ from bywire.plant import (
     drive_supply,
     end_stop,
     flywheel,
+    force_sensor,
     moment_sensor,
     motor_heat,
     roller_screw,
@@ -27,15 +27,43 @@ from bywire.plant import (
 )
 
 
+class RigParameters(ParameterSet):
+    """Fixtures and operating modes of the rigs; the assembled brake does not have them."""
+
+    mode_1: Literal["position", "current"]
+    """quantity that the operator commands of motor 1"""
+    mode_2: Literal["position", "current"]
+    """quantity that the operator commands of motor 2"""
+    load: Literal["dummy", "screw"]
+    """load of a single motor: a solid dummy shaft, or a preloaded screw"""
+    clamp: Literal["open", "closed"]
+    """whether a single motor's shaft is clamped"""
+    J_dummy: Inertia
+    """inertia that the dummy shaft adds"""
+    F_0: Force
+    """preload between the two halves of a single screw's nut"""
+    T_clamp: Torque
+    """torque at which the clamp slips"""
+    sensor: force_sensor.Parameters
+
+
+def dummy_inertia(par: RigParameters) -> float:
+    """Return the inertia [kg m^2] that the rig adds; the screw's own is in the motor's."""
+    return par.J_dummy if par.load == "dummy" else 0.0 * par.J_dummy
+
+
+# --- The brake
+
+
 class CommandParameters(ParameterSet):
-    """What the stimulus commands.
+    """Quantity that the stimulus commands.
 
     ``moment`` closes moment and position loops; ``position`` gives each motor's position loop its
     reference; ``current`` gives each drive its current demand.
     """
 
     mode: Literal["moment", "position", "current"]
-    """what the stimulus commands"""
+    """quantity that the stimulus commands"""
 
 
 class ControlParameters(ParameterSet):
@@ -73,7 +101,7 @@ class WedgeParameters(ParameterSet):
     encoder: shaft_encoder.Parameters
     control: ControlParameters
     command: CommandParameters
-    rig: rig_parameters.Parameters
+    rig: RigParameters
 
     @model_validator(mode="after")
     def _follows_the_adjuster(self) -> WedgeParameters:
@@ -81,6 +109,6 @@ class WedgeParameters(ParameterSet):
         if self.adjuster.law != "none" and abs(T / slow - round(T / slow)) > 1e-6:
             raise ValueError(
                 f"control.adjuster.T_adjust = {T:g} s must be a whole number of "
-                f"control.T_slow = {slow:g} s: the moment control follows what turns in a sample"
+                f"control.T_slow = {slow:g} s: the moment control follows the adjuster's turns"
             )
         return self

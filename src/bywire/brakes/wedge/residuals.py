@@ -1,7 +1,7 @@
-"""What the wedge brake's real-time computer can compute to see a failure.
+"""Residuals by which the wedge brake's real-time computer can detect a failure.
 
-They are looked at while the demanded moment is steady: a gap that is crossed, or a ramp, makes all
-of them large in a healthy brake.
+They count while the demanded moment is steady: in a healthy brake, too, all of them are large while
+a gap is crossed or a ramp is followed.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _IN_MOMENT = 0.2  # s after which the build-up of a moment is over
 
 
 def _steady(signals: Signals, dt: float, values: Array) -> Array:
-    """Return the mean of a residual where the demand has not changed for a while, else none."""
+    """Return the mean of a residual while the demand is steady, otherwise none."""
     rows, M_set = round(_STEADY / dt), signals["M_set"]
     still = largest_of_the_last(M_set, rows) - least_of_the_last(M_set, rows) <= 0
     return np.where(still, mean_of_the_last(values, max(round(_AVERAGE / dt), 1)), NEVER)
@@ -42,7 +42,7 @@ def _moment(signals: Signals, par: Any, dt: float) -> Array:
 
 
 def _difference(signals: Signals, par: Any, dt: float) -> Array:
-    """Return how differently both motors are asked: against each other beyond the preload."""
+    """Return the difference of both demands: the motors work against each other."""
     return _steady(signals, dt, np.abs(signals["i_1_ref"] - signals["i_2_ref"]))
 
 
@@ -51,20 +51,20 @@ def _effort(signals: Signals, par: Any, dt: float) -> Array:
 
 
 def _in_moment(signals: Signals, dt: float, values: Array) -> Array:
-    """Return a residual where the moment has been controlled for a while, else none."""
+    """Return a residual while the moment has been controlled for some time, otherwise none."""
     rows, error = round(_IN_MOMENT / dt), np.abs(signals["mode"] - MOMENT)
     return np.where(largest_of_the_last(error, rows) < 0.5, values, NEVER)
 
 
 def _stiffness(signals: Signals, par: Any, dt: float) -> Array:
-    """Return the measured moment less that of the angle beyond contact, by the believed slope."""
-    believed = par.control.moment.slope_hat * (np.abs(signals["theta_ref"]) - signals["theta_c"])
-    off = mean_of_the_last(signals["M_meas"] - believed, round(_TURN / dt))
+    """Return the measured moment minus that of the angle beyond contact, by the assumed slope."""
+    expected = par.control.moment.slope_hat * (np.abs(signals["theta_ref"]) - signals["theta_c"])
+    off = mean_of_the_last(signals["M_meas"] - expected, round(_TURN / dt))
     return _in_moment(signals, dt, np.abs(off))
 
 
 def _still(signals: Signals, par: Any, dt: float) -> Array:
-    """Return by how little the moment moves in a turn of the disc: nothing where it is stuck."""
+    """Return the negative ripple of the moment over a turn: zero where the sensor is stuck."""
     rows, M = round(_TURN / dt), signals["M_meas"]
     return _in_moment(signals, dt, least_of_the_last(M, rows) - largest_of_the_last(M, rows))
 

@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.core.errors import ParameterError
+from bywire.core.errors import not_valid
 from bywire.core.typing import Array
 from bywire.data.recursive_filter import filtered
 from bywire.identification.replaying.tracking import Relation, Rows
 
-_PRESSED = 0.1  # of the largest force: below it, the relation tells little
-_STEADY = 0.02  # of the largest force per sensor's time constant: faster, its lag would show
-_SMOOTHED = 10.0  # of that time constant: noise is no change of the force
+_PRESSED = 0.1  # share of the largest force below which the relation is imprecise
+_STEADY = 0.02  # largest change per sensor time constant, over the largest force
+_SMOOTHED = 10.0  # smoothing over that time constant, against noise
 
 
 def _steady(data: xr.Dataset, force: str, par: WedgeParameters) -> NDArray[np.bool_]:
-    """Return where a force presses, and changes so slowly that the moment sensor follows."""
+    """Return the rows in which a force presses and changes slowly enough for the moment sensor."""
     t, F = data["time"].values, np.abs(data[force].values)
     top = float(np.nanmax(F))
     lag = 1.0 / (2.0 * np.pi * par.moment_sensor.f_M)
@@ -38,7 +38,7 @@ def _lagged(F: Array, data: xr.Dataset, par: WedgeParameters) -> Array:
     keep = float(np.exp(-2.0 * np.pi * par.moment_sensor.f_M * (t[1] - t[0])))
     there = np.isfinite(F)
     filled = np.interp(t, t[there], F[there]) if there.any() else F
-    # Of a force that runs straight from sample to sample.
+    # Response of the lag to a force that is linear from sample to sample.
     slope = (1.0 - keep) / -np.log(keep)
     numerator = [1.0 - slope, slope - keep]
     late = filtered(numerator, [1.0, -keep], filled, settled=True)
@@ -52,7 +52,7 @@ def _rows(y: Array, phi: Array, used: NDArray[np.bool_]) -> Rows:
 def _from_normal_force(data: xr.Dataset, par: WedgeParameters) -> Rows:
     """Return M = mu_B 2 r_B F_N, both pads (2003, section "Wedge and calliper").
 
-    The force goes through the moment sensor's lag, so that both are late alike.
+    The force passes the moment sensor's lag, so that both signals have the same delay.
     """
     used = _steady(data, "F_N", par)
     phi = 2.0 * par.caliper.r_B * _lagged(np.abs(data["F_N"].values), data, par)
@@ -70,9 +70,8 @@ def _from_actuation_force(data: xr.Dataset, par: WedgeParameters) -> Rows:
 def _from_travel(data: xr.Dataset, par: WedgeParameters) -> Rows:
     """Return |x| tan(alpha) = c + F_N / K_cal: the caliper as a spring, in contact."""
     if par.caliper.law != "linear":
-        raise ParameterError(
-            "caliper.clearance is tracked with caliper.law = 'linear', and the parameters have "
-            f"{par.caliper.law!r}"
+        raise not_valid(
+            "caliper.law", repr(par.caliper.law), "'linear'", "to track caliper.clearance"
         )
     used = _steady(data, "F_N", par)
     y = np.abs(data["x"].values) * wedge.slope(par.wedge)
@@ -98,8 +97,8 @@ RELATIONS: tuple[Relation, ...] = (
         {"y_M": "N*m", "F_M": "N"},
         _from_actuation_force,
         lambda par: np.array([par.wedge.mu_B]),
-        "wedge at rest without friction of its own, which biases by up to that friction over the "
-        "normal force, one way while applying and the other while releasing",
+        "wedge at rest without friction of its own. That friction biases the estimate by up to its "
+        "ratio to the normal force, in opposite directions while applying and releasing",
     ),
     Relation(
         "clearance from the travel",

@@ -1,34 +1,32 @@
-"""Expressions of Python, calls among them, evaluated on known objects and on C text."""
+"""Expressions of Python, evaluated on known objects and on C text: operators, members, calls."""
 
 from __future__ import annotations
 
 import ast
 import builtins
+import operator
 import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import partial
-from typing import Any
+from functools import cached_property, partial
+from typing import Any, Protocol
 
 from bywire.core import ops
 from bywire.core.errors import ModelError
 from bywire.core.parameters import ParameterSet
 from bywire.export.controller.body import Body
+from bywire.export.controller.c_text import c_name
 from bywire.export.controller.elementary import MAGNITUDE
-from bywire.export.controller.operators import (
-    Context,
-    Functions,
-    attribute,
-    binary,
-    chosen,
-    compared,
-    connected,
-    unary,
-)
 from bywire.export.controller.structs import is_number, literal
 from bywire.export.controller.values import (
+    BOTH,
+    CHOICE,
+    COMPARED,
+    EITHER,
     PRIMARY,
+    PRODUCT,
     SUM,
+    UNARY,
     Array,
     Built,
     BuiltGroup,
@@ -39,13 +37,266 @@ from bywire.export.controller.values import (
     Items,
     Known,
     Method,
+    Nodes,
     Record,
+    Shape,
     Table,
     Update,
     is_named_tuple,
     is_parameter_class,
     lifted,
 )
+
+
+class Functions(Protocol):
+    """All functions of an export; see `Translation`."""
+
+    def constant(self, module: str, name: str, found: Any) -> Known:
+        """Return a module's object; a number of its own is called by its name in C."""
+        ...
+
+    def call(self, at: Context, node: ast.AST, function: Any, given: list[Any], named: Any) -> Any:
+        """Return what a function gives."""
+        ...
+
+    def inlined(
+        self, at: Context, node: ast.AST, closure: Closure, given: list[Any], named: Any
+    ) -> Any:
+        """Return what an inner function gives, written out in its caller."""
+        ...
+
+
+class Context(Protocol):
+    """Who evaluates an expression; see `Evaluator`."""
+
+    translation: Functions
+    body: Body
+
+    def refuse(self, node: ast.AST, what: str) -> ModelError:
+        """Return the error for what C does not get."""
+        ...
+
+    def number(self, node: ast.AST, value: Any) -> Expr:
+        """Return the C text of a number or a truth value."""
+        ...
+
+    def known(self, node: ast.AST, value: Any, why: str) -> Any:
+        """Return the object of a value that export has to know."""
+        ...
+
+    def sequence(self, node: ast.AST, value: Any) -> tuple[Any, ...]:
+        """Return the values of a tuple and its like."""
+        ...
+
+
+# --- Fields and methods, as Python finds them behind a dot
+
+
+def attribute(at: Context, node: ast.AST, owner: Any, name: str) -> Any:
+    """Return the field or method of a value."""
+    if isinstance(owner, Known):
+        return _of_known(at, node, owner, name)
+    if isinstance(owner, Update):
+        owner = at.body.settled(owner, "changed")
+    if isinstance(owner, Record):
+        return _of_record(at, node, owner, name)
+    if isinstance(owner, Built):
+        if name in owner.items:
+            return owner.items[name]
+        return Known(owner.cls._fields) if name == "_fields" else Method(owner, name)
+    if isinstance(owner, BuiltGroup) and name in owner.items:
+        return owner.items[name]
+    if isinstance(owner, Group) and name in owner.shape.by_name:
+        return _of_group(at, owner, name)
+    if isinstance(owner, (Group, BuiltGroup)):
+        cls = owner.shape.cls if isinstance(owner, Group) else owner.cls
+        member = getattr(cls, name, None)
+        if isinstance(member, property):
+            return at.translation.call(at, node, member.fget, [owner], {})
+        if isinstance(member, cached_property):
+            return at.translation.call(at, node, member.func, [owner], {})
+        return Method(owner, name)
+    if isinstance(owner, (Items, Table)):
+        return Method(owner, name)
+    raise at.refuse(node, f"it has no {name!r}")
+
+
+def _of_known(at: Context, node: ast.AST, owner: Known, name: str) -> Any:
+    if not hasattr(owner.value, name):
+        raise at.refuse(node, f"it has no {name!r}")
+    member = getattr(owner.value, name)
+    if is_named_tuple(type(owner.value)) and callable(member):
+        return Method(lifted(owner), name)
+    module = owner.value.__name__ if isinstance(owner.value, type(ast)) else ""
+    return at.translation.constant(module, name, member)
+
+
+def _of_record(at: Context, node: ast.AST, owner: Record, name: str) -> Any:
+    if name == "_fields":
+        return Known(owner.cls._fields)
+    if name not in owner.cls._fields:
+        if name in ("_replace", "_asdict"):
+            return Method(owner, name)
+        raise at.refuse(node, f"{owner.cls.__name__} has no {name!r}")
+    struct = at.body.structs.of_tuple(owner.cls)
+    place = f"{owner.expr.text}{'->' if owner.pointer else '.'}{c_name(name)}"
+    expr = Expr(place, uses=owner.expr.uses | {("field", struct.name, name)})
+    ctype = struct.members[name].ctype
+    inner = at.body.structs.known_tuple(ctype)
+    return expr if inner is None else Record(inner, expr)
+
+
+def _of_group(at: Context, owner: Group, name: str) -> Any:
+    kind = owner.shape.by_name[name]
+    if isinstance(kind, Choice):
+        return Known(kind.value)
+    struct = at.body.structs.of_group(owner.shape)
+    place = f"{owner.expr.text}{'->' if owner.pointer else '.'}{c_name(name)}"
+    expr = Expr(place, uses=owner.expr.uses | {("field", struct.name, name)})
+    if isinstance(kind, Nodes):
+        return Array(expr, kind.length)
+    if isinstance(kind, Shape):
+        return Group(kind, expr, False, (*owner.origin, name) if owner.origin else ())
+    return expr
+
+
+# --- Arithmetic, comparisons, truth values and choices
+
+_ARITHMETIC: dict[type[Any], tuple[str, int, Callable[[Any, Any], Any]]] = {
+    ast.Add: ("+", SUM, operator.add),
+    ast.Sub: ("-", SUM, operator.sub),
+    ast.Mult: ("*", PRODUCT, operator.mul),
+    ast.Div: ("/", PRODUCT, operator.truediv),
+}
+_KNOWN: dict[type[Any], Callable[[Any, Any], Any]] = {
+    **{kind: function for kind, (_, _, function) in _ARITHMETIC.items()},
+    ast.Pow: operator.pow,
+    ast.Mod: operator.mod,
+    ast.FloorDiv: operator.floordiv,
+    ast.BitOr: operator.or_,
+    ast.BitAnd: operator.and_,
+    ast.BitXor: operator.xor,
+    ast.LShift: operator.lshift,
+    ast.RShift: operator.rshift,
+}
+_SIGNS: dict[type[Any], Callable[[Any], Any]] = {
+    ast.Not: operator.not_,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+    ast.Invert: operator.invert,
+}
+_COMPARED: dict[type[Any], tuple[str, Callable[[Any, Any], Any]]] = {
+    ast.Lt: ("<", operator.lt),
+    ast.LtE: ("<=", operator.le),
+    ast.Gt: (">", operator.gt),
+    ast.GtE: (">=", operator.ge),
+    ast.Eq: ("==", operator.eq),
+    ast.NotEq: ("!=", operator.ne),
+    ast.In: ("in", lambda a, b: a in b),
+    ast.NotIn: ("not in", lambda a, b: a not in b),
+    ast.Is: ("is", operator.is_),
+    ast.IsNot: ("is not", operator.is_not),
+}
+
+
+def _unary(at: Context, node: ast.UnaryOp, value: Any) -> Any:
+    """Return what an operator gives of one value."""
+    if isinstance(value, Known):
+        return Known(_SIGNS[type(node.op)](value.value))
+    expr = at.number(node, value)
+    if isinstance(node.op, ast.USub) and not expr.truth:
+        return Expr(f"-{expr.at(PRIMARY)}", UNARY, expr.uses)
+    if isinstance(node.op, ast.Not) and expr.truth:
+        return Expr(f"!{expr.at(PRIMARY)}", UNARY, expr.uses, truth=True)
+    raise at.refuse(node, "this operator is not translated")
+
+
+def binary(at: Context, node: ast.BinOp, left: Any, right: Any) -> Any:
+    """Return what an operator gives of two values."""
+    left, right = lifted(left), lifted(right)
+    kind = type(node.op)
+    if isinstance(left, Known) and isinstance(right, Known) and kind in _KNOWN:
+        return Known(_KNOWN[kind](left.value, right.value))
+    if isinstance(left, Items) and isinstance(right, Items) and kind is ast.Add:
+        return Items(left.values + right.values)
+    if kind is ast.Pow and isinstance(right, Known) and right.value in (2, 2.0):
+        return _square(at, node, left)
+    if kind not in _ARITHMETIC:
+        raise at.refuse(node, "this operator is not translated")
+    sign, level, _ = _ARITHMETIC[kind]
+    a, b = (at.body.as_number(at.number(node, each)) for each in (left, right))
+    a, b = at.body.operands(a, b)
+    text = f"{a.at(level)} {sign} {b.at(level + 1)}"
+    return Expr(text, level, a.uses | b.uses)
+
+
+def _square(at: Context, node: ast.AST, value: Any) -> Expr:
+    """Return the square of a value."""
+    base = at.body.settled(at.number(node, value), "base")
+    return Expr(f"{base.at(PRODUCT)} * {base.at(PRODUCT + 1)}", PRODUCT, base.uses)
+
+
+def compared(at: Context, node: ast.Compare, left: Any, right: Any) -> Any:
+    """Return a comparison."""
+    sign, known = _COMPARED[type(node.ops[0])]
+    if isinstance(right, (Items, Table)) and isinstance(left, Known):
+        each = right.values if isinstance(right, Items) else map(Known, right.items)
+        right = Known([v.value for v in each if isinstance(v, Known)])
+    if isinstance(left, Known) and isinstance(right, Known):
+        return Known(known(left.value, right.value))
+    if sign in ("==", "!="):
+        return _equal(at, node, left, right, sign)
+    if sign not in ("<", "<=", ">", ">="):
+        raise at.refuse(node, "this comparison is not translated")
+    a, b = at.body.operands(*(at.number(node, each) for each in (left, right)))
+    return Expr(f"{a.at(SUM)} {sign} {b.at(SUM)}", COMPARED, a.uses | b.uses, truth=True)
+
+
+def _equal(at: Context, node: ast.AST, left: Any, right: Any, sign: str) -> Expr:
+    """Return a comparison of floats for equality, in words that compilers do not warn of."""
+    a, b = (at.body.settled(at.number(node, v), "compared") for v in (left, right))
+    both = f"({a.at(SUM)} <= {b.at(SUM)}) && ({a.at(SUM)} >= {b.at(SUM)})"
+    uses = a.uses | b.uses
+    if sign == "==":
+        return Expr(both, BOTH, uses, truth=True)
+    return Expr(f"!({both})", UNARY, uses, truth=True)
+
+
+def _connected(at: Context, node: ast.BoolOp, values: Iterable[Any]) -> Any:
+    """Return "and" or "or" of values, of which those behind a known end are not evaluated."""
+    is_and = isinstance(node.op, ast.And)
+    parts: list[Expr] = []
+    value: Any = Known(is_and)
+    for each, value in zip(node.values, values, strict=False):
+        if isinstance(value, Known):
+            if bool(value.value) != is_and and not parts:
+                return value
+            continue
+        expr = at.number(each, value)
+        if not expr.truth:
+            raise at.refuse(each, "a number stands for a truth value")
+        parts.append(expr)
+    if not parts:
+        return value
+    sign, level = ("&&", BOTH) if is_and else ("||", EITHER)
+    uses = frozenset().union(*(each.uses for each in parts))
+    text = f" {sign} ".join(each.at(PRIMARY) for each in parts)
+    return Expr(text, level if len(parts) > 1 else PRIMARY, uses, truth=True)
+
+
+def chosen(at: Context, node: ast.AST, condition: Any, then: Any, otherwise: Any) -> Any:
+    """Return what ``ops.where`` gives."""
+    if isinstance(condition, Known):
+        return then if condition.value else otherwise
+    test = at.number(node, condition)
+    if not test.truth:
+        raise at.refuse(node, "a number stands for a truth value")
+    a, b = (at.number(node, each) for each in (then, otherwise))
+    text = f"{test.at(PRIMARY)} ? {a.at(CHOICE + 1)} : {b.at(CHOICE + 1)}"
+    return Expr(text, CHOICE, test.uses | a.uses | b.uses, a.truth and b.truth)
+
+
+# --- Expressions
 
 _LIBRARY = {ops.fabs: "fabs", ops.sqrt: "sqrt", ops.log: "log", ops.power: "pow"}
 _OURS: dict[Any, str] = {
@@ -55,13 +306,13 @@ _OURS: dict[Any, str] = {
     ops.exp: "exponential",
 }
 _OURS_IN_DOUBLE: dict[Any, str] = {**_OURS, ops.log: "logarithm", ops.power: "power_of"}
-EXTREMES = {ops.fmin: "smaller", ops.fmax: "larger"}
+_EXTREMES = {ops.fmin: "smaller", ops.fmax: "larger"}
 """functions of core.ops that stand at the top of the C"""
 
-Named = dict[str, Any]
+_Named = dict[str, Any]
 
 
-def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: Named) -> Any:
+def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: _Named) -> Any:
     """Return what a call gives."""
     if isinstance(function, Method):
         return _method(at, node, function, given, named)
@@ -71,7 +322,7 @@ def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: 
     if isinstance(target, partial):
         held = {**{n: Known(v) for n, v in target.keywords.items()}, **named}
         return called(at, node, Known(target.func), [*map(Known, target.args), *given], held)
-    if target in _LIBRARY or target in _OURS or target in EXTREMES:
+    if target in _LIBRARY or target in _OURS or target in _EXTREMES:
         return _elementary(at, node, target, given)
     if target is ops.where:
         return chosen(at, node, *given, *named.values())
@@ -101,8 +352,8 @@ def _elementary(at: Context, node: ast.AST, function: Any, given: list[Any]) -> 
         return Known(function(*(each.value for each in given)))
     arguments = at.body.operands(*(at.body.as_number(at.number(node, v)) for v in given))
     uses: frozenset[Any] = frozenset().union(*(each.uses for each in arguments))
-    if function in EXTREMES:
-        name = EXTREMES[function]
+    if function in _EXTREMES:
+        name = _EXTREMES[function]
         uses |= {("own", name)}
     elif function in (ours := _ours(at)):
         name = ours[function]
@@ -120,7 +371,7 @@ def _ours(at: Context) -> dict[Any, str]:
     return _OURS_IN_DOUBLE if at.body.structs.precision.name == "double" else _OURS
 
 
-def _made(at: Context, node: ast.AST, cls: Any, given: list[Any], named: Named) -> Built:
+def _made(at: Context, node: ast.AST, cls: Any, given: list[Any], named: _Named) -> Built:
     defaults = {name: Known(value) for name, value in cls._field_defaults.items()}
     items = {**defaults, **dict(zip(cls._fields, given, strict=False)), **named}
     missing = [name for name in cls._fields if name not in items]
@@ -129,7 +380,7 @@ def _made(at: Context, node: ast.AST, cls: Any, given: list[Any], named: Named) 
     return Built(cls, {name: items[name] for name in cls._fields})
 
 
-def _class_method(at: Context, node: ast.AST, target: Any, given: list[Any], named: Named) -> Any:
+def _class_method(at: Context, node: ast.AST, target: Any, given: list[Any], named: _Named) -> Any:
     cls, name = target.__self__, target.__func__.__name__
     if is_named_tuple(cls) and name == "_make":
         return Built(cls, dict(zip(cls._fields, at.sequence(node, given[0]), strict=True)))
@@ -141,7 +392,7 @@ def _class_method(at: Context, node: ast.AST, target: Any, given: list[Any], nam
     return at.translation.call(at, node, target.__func__, [Known(cls), *given], named)
 
 
-def _method(at: Context, node: ast.AST, method: Method, given: list[Any], named: Named) -> Any:
+def _method(at: Context, node: ast.AST, method: Method, given: list[Any], named: _Named) -> Any:
     owner, name = method.owner, method.name
     if isinstance(owner, (Record, Built)):
         if name == "_replace":
@@ -167,25 +418,25 @@ def _method(at: Context, node: ast.AST, method: Method, given: list[Any], named:
     raise at.refuse(node, f"the method {name} is not translated")
 
 
-def _zipped(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _zipped(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     rows = [at.sequence(node, each) for each in given]
     return Items(tuple(Items(row) for row in zip(*rows, strict=False)))
 
 
-def _enumerated(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _enumerated(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     rows = enumerate(at.sequence(node, given[0]))
     return Items(tuple(Items((Known(k), each)) for k, each in rows))
 
 
-def _listed(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _listed(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     return Items(at.sequence(node, given[0]) if given else ())
 
 
-def _length(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _length(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     return Known(len(at.sequence(node, given[0])))
 
 
-def _dictionary(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _dictionary(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     items: dict[str, Any] = {}
     for each in map(lifted, given):
         if isinstance(each, Group):
@@ -202,12 +453,12 @@ def _dictionary(at: Context, node: ast.AST, given: list[Any], named: Named) -> A
     return Table({**items, **named})
 
 
-def _attribute_named(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _attribute_named(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     name = at.known(node, given[1], "names of fields must be known at export")
     return attribute(at, node, given[0], name)
 
 
-def _sum(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _sum(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     total: Any = [*given[1:], *named.values(), Known(0)][0]
     for each in at.sequence(node, given[0]):
         if isinstance(total, Known) and isinstance(each, Known):
@@ -221,7 +472,7 @@ def _sum(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
 def _extreme(function: Any) -> Callable[..., Any]:
     """Return the rule of max or min, which keep the first of equal values."""
 
-    def rule(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+    def rule(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
         values = given if len(given) > 1 else list(at.sequence(node, given[0]))
         best = values[0]
         for each in values[1:]:
@@ -231,14 +482,14 @@ def _extreme(function: Any) -> Callable[..., Any]:
     return rule
 
 
-def _float(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _float(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     value = given[0]
     if isinstance(value, Known):
         return Known(float(value.value))
     return at.body.as_number(at.number(node, value))
 
 
-def _absolute(at: Context, node: ast.AST, given: list[Any], named: Named) -> Any:
+def _absolute(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
     return _elementary(at, node, ops.fabs, given)
 
 
@@ -401,7 +652,7 @@ class Evaluator:
         return bool(self.known(node, value, why))
 
     def _unaryop(self, node: ast.UnaryOp) -> Any:
-        return unary(self, node, self.value(node.operand))
+        return _unary(self, node, self.value(node.operand))
 
     def _binop(self, node: ast.BinOp) -> Any:
         return binary(self, node, self.value(node.left), self.value(node.right))
@@ -412,7 +663,7 @@ class Evaluator:
         return compared(self, node, self.value(node.left), self.value(node.comparators[0]))
 
     def _boolop(self, node: ast.BoolOp) -> Any:
-        return connected(self, node, map(self.value, node.values))
+        return _connected(self, node, map(self.value, node.values))
 
     def _subscript(self, node: ast.Subscript) -> Any:
         value = lifted(self.value(node.value))

@@ -9,13 +9,19 @@ from typing import Any
 
 from bywire.core.provenance import Cited
 from bywire.export.controller import render
-from bywire.export.controller.a2l import a2l, instance_header, instance_source
 from bywire.export.controller.c_text import c_name
-from bywire.export.controller.can import can_header, can_source, dbc
 from bywire.export.controller.contract import INPUT, LARGEST, RESULT, CheckedInput
 from bywire.export.controller.harness import FLAGS, harness, makefile, vector_header
 from bywire.export.controller.program import Program
 from bywire.export.controller.render import parameter_file
+from bywire.export.controller.tool_files import (
+    a2l,
+    can_header,
+    can_source,
+    dbc,
+    instance_header,
+    instance_source,
+)
 from bywire.export.controller.vectors import Vectors
 
 

@@ -20,10 +20,9 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
 from bywire.export.controller import render
 from bywire.export.controller.program import Program, Step, program
-from bywire.simulation.compiler import Compiler, compile_library, find_compiler
-from bywire.simulation.kernel_cache import load
-from bywire.simulation.layout import Layout
+from bywire.simulation.compiler import Compiler, compile_library, find_compiler, load
 from bywire.simulation.native import Request, SingleKernel, pointer
+from bywire.simulation.schedule import Layout
 from bywire.simulation.tapped import Tapped
 
 NEVER = 2**40

@@ -17,7 +17,7 @@ from bywire.core import ops
 from bywire.core.errors import ModelError, place_of
 from bywire.export.controller.body import Body
 from bywire.export.controller.c_text import c_name, unique
-from bywire.export.controller.evaluation import Evaluator
+from bywire.export.controller.evaluation import Context, Evaluator, attribute
 from bywire.export.controller.functions import (
     CFunction,
     as_value,
@@ -27,7 +27,6 @@ from bywire.export.controller.functions import (
     passed,
     received,
 )
-from bywire.export.controller.operators import Context, attribute
 from bywire.export.controller.structs import Structs, ctype_of
 from bywire.export.controller.values import (
     Array,

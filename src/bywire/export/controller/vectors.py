@@ -1,19 +1,446 @@
-"""Test vectors: what the Python of a task makes of inputs that reach every limit."""
+"""Test vectors: what the Python of a task makes of inputs that reach every limit and border.
+
+Random inputs hardly ever meet a limit to the last digit, where ``<`` and ``<=`` differ, nor come
+so close to it that another limit shows. A tick is run on numbers that note every comparison that
+they take part in, and how far its sides are apart. One input is changed until a comparison turns;
+in between the place is sought where it does. What lies there is where the search goes on: behind
+a limit that is rarely met stand those that are met nowhere else.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import math
+import sys
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import FrameType
 from typing import Any
 
 import numpy as np
 
+from bywire.core import ops
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import Signal, ranges_of, signals_of
 from bywire.core.typing import Array
-from bywire.export.controller.borders import Borders
 from bywire.export.controller.contract import LARGEST
 from bywire.export.controller.program import Program, Step
+
+_Place = tuple[Any, ...]
+"""places in the code that lead to a comparison, innermost first; those of ``core.ops`` as one"""
+Margins = dict[_Place, float]
+"""how far the sides of comparisons are apart"""
+_LESS = ("__lt__", "__ge__")
+
+_now = threading.local()
+"""``margins``: of the tick that this thread is in"""
+
+
+class Traced(float):
+    """A float that notes what it is compared with; what is computed of it does so, too."""
+
+    __slots__ = ()
+    __hash__ = float.__hash__
+
+
+def _comparing(name: str) -> Callable[[Traced, Any], Any]:
+    plain = getattr(float, name)
+
+    def compare(self: Traced, other: Any) -> Any:
+        if isinstance(other, (float, int)):
+            # Equal sides count with those that are not apart: where the comparison turns.
+            apart = float(self) - float(other)
+            _now.margins[_place(sys._getframe(1))] = -apart if name in _LESS else apart
+        return plain(self, other)
+
+    return compare
+
+
+def _place(frame: FrameType | None) -> _Place:
+    inside: list[int] = []
+    while frame is not None and frame.f_code.co_filename == ops.__file__:
+        inside.append(frame.f_lasti)
+        frame = frame.f_back
+    places: list[Any] = [tuple(inside)]
+    while frame is not None and frame.f_code is not _BEGIN:
+        places.append(frame.f_lasti)
+        frame = frame.f_back
+    return tuple(places)
+
+
+def _computing(name: str) -> Callable[..., Any]:
+    plain = getattr(float, name)
+
+    def compute(self: Traced, *others: Any) -> Any:
+        result = plain(self, *others)
+        return Traced(result) if isinstance(result, float) else result
+
+    return compute
+
+
+for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
+    setattr(Traced, f"__{_name}__", _comparing(f"__{_name}__"))
+for _name in (
+    "add",
+    "radd",
+    "sub",
+    "rsub",
+    "mul",
+    "rmul",
+    "truediv",
+    "rtruediv",
+    "neg",
+    "pos",
+    "abs",
+    "pow",
+):
+    setattr(Traced, f"__{_name}__", _computing(f"__{_name}__"))
+
+
+def margins(tick: Callable[..., Any], inputs: tuple[Any, Any, Any], par: Any) -> Margins:
+    """Return how far the sides of every comparison of a tick are apart; none where it fails.
+
+    Parameters
+    ----------
+    tick
+        ``tick(x, m, u, par) -> memory``.
+    inputs
+        Plant, stimulus and memory.
+    """
+    x, u, m = (type(each)(*map(Traced, each)) for each in inputs)
+    _now.margins = {}
+    try:
+        with np.errstate(all="ignore"):  # numbers of single precision warn where others raise
+            tick(x, m, u, par)
+    except (ArithmeticError, ValueError):
+        return {}
+    noted: Margins = _now.margins
+    return noted
+
+
+_BEGIN = margins.__code__
+"""above it there is no law any more"""
+
+
+# --- Where a comparison turns while an input of a tick changes
+
+Inputs = tuple[Any, Any, Any]
+"""plant, stimulus and memory of a tick"""
+_Field = tuple[int, str]
+"""an input: which of the three, and its name"""
+_STEPS, _JUMP = 60, 1e-7
+
+
+def _value_of(inputs: Inputs, field: _Field) -> float:
+    """Return an input."""
+    return float(getattr(inputs[field[0]], field[1]))
+
+
+def changed(inputs: Inputs, changes: Iterable[tuple[_Field, float]]) -> Inputs:
+    """Return inputs of which some have other values."""
+    parts = list(inputs)
+    for (part, name), value in changes:
+        parts[part] = parts[part]._replace(**{name: value})
+    return tuple(parts)
+
+
+@dataclass(frozen=True)
+class Border:
+    """Inputs on both sides of where a comparison turns, and whether its sides are equal at one."""
+
+    above: Inputs
+    below: Inputs
+    is_met: bool
+
+    def changed(self, field: _Field, value: float) -> Border:
+        """Return both sides with another input changed, which are taken to be equal at one."""
+        above, below = (changed(each, [(field, value)]) for each in (self.above, self.below))
+        return Border(above, below, is_met=True)
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A comparison of a tick, looked at along one of its inputs.
+
+    Parameters
+    ----------
+    tick
+        ``tick(x, m, u, par) -> memory``.
+    place
+        Of the comparison.
+    field
+        The input.
+    """
+
+    tick: Callable[..., Any]
+    par: Any
+    place: _Place
+    field: _Field
+
+    def margins(self, inputs: Inputs, value: float) -> Margins:
+        """Return how far the sides of all comparisons are apart, with a value of the input."""
+        return margins(self.tick, changed(inputs, [(self.field, value)]), self.par)
+
+    def margin(self, inputs: Inputs, value: float) -> float:
+        """Return how far the sides are apart; NaN where the comparison is not reached."""
+        return self.margins(inputs, value).get(self.place, math.nan)
+
+    def border(
+        self, inputs: Inputs, first: tuple[float, float], last: tuple[float, float]
+    ) -> Border:
+        """Return where the comparison turns between two values with their margins."""
+        ends = _turning_point(lambda value: self.margin(inputs, value), first, last)
+        above, below = (changed(inputs, [(self.field, value)]) for value, _ in ends)
+        return Border(above, below, ends[1][1] == 0.0)
+
+    def is_at(self, border: Border) -> bool:
+        """Return whether the comparison turns there, as the border says."""
+        above, below = (
+            margins(self.tick, each, self.par).get(self.place, 0.0)
+            for each in (border.above, border.below)
+        )
+        return above > 0.0 >= below and (below == 0.0 or not border.is_met)
+
+    def is_seen(self, border: Border) -> bool:
+        """Return whether the memory jumps between two inputs next to each other."""
+        try:
+            with np.errstate(all="ignore"):
+                first, last = (
+                    list(self.tick(x, m, u, self.par)) for x, u, m in (border.above, border.below)
+                )
+        except (ArithmeticError, ValueError):
+            return False
+        return any(abs(a - b) > _JUMP * (abs(a) + abs(b)) for a, b in zip(first, last, strict=True))
+
+
+def _turning_point(
+    margin: Callable[[float], float], first: tuple[float, float], last: tuple[float, float]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return two numbers as close to each other as can be, between which a margin turns.
+
+    Parameters
+    ----------
+    margin
+        Of a number; NaN where the comparison is not reached.
+    first, last
+        Numbers and their margins, of which one is above zero.
+
+    Returns
+    -------
+    tuple
+        The number above with its margin, and the one that is not.
+    """
+    above, below = (first, last) if first[1] > 0.0 else (last, first)
+    for step in range(_STEPS):
+        middle = 0.5 * above[0] + 0.5 * below[0]
+        if middle in (above[0], below[0]):
+            break
+        if step % 3 < 2 and math.isfinite(above[1] - below[1]):
+            middle = _guessed(above, below, middle, is_beyond=step % 3 == 1)
+        at = margin(middle)
+        if math.isnan(at):
+            break
+        if at > 0.0:
+            above = middle, at
+        else:
+            below = middle, at
+    return above, below
+
+
+def _guessed(
+    above: tuple[float, float], below: tuple[float, float], middle: float, is_beyond: bool
+) -> float:
+    """Return where a straight line turns, or a number just beyond the end that is closer to it."""
+    (a, at_a), (b, at_b) = above, below
+    guess = b - at_b * (a - b) / (at_a - at_b)
+    if is_beyond or at_b == 0.0:
+        end, other = (b, a) if abs(at_b) <= abs(at_a) else (a, b)
+        ulps = 1.0 if at_b == 0.0 else 4.0
+        guess = end + math.copysign(ulps * math.ulp(end), other - end)
+    return guess if min(a, b) < guess < max(a, b) else middle
+
+
+# --- Inputs next to borders
+
+_LAW = 3
+"""places, innermost first, that are the same for all who call a law"""
+_BORDER_TRIES, _CONTEXTS, _NEAR_BY, _SMALL = 4, 40, 3, 1e-6
+_AT_ONCE, _ENOUGH, _UNSEEN, _MET = 2, 6, 2, 2
+"""comparisons of a change; borders of each that are kept, those that do not show in the memory, and
+those whose sides are equal"""
+_BEYOND, _FAR = 1.01, 1e3
+"""how far beyond a border is aimed, and how many times its size an input may become"""
+_ULPS = (1, -1, 2, -2, 3, -3, 5, -5, 8, -8)
+_LATEST = 200
+"""borders from which the search goes on"""
+
+
+class Borders:
+    """Seeks inputs of a task next to where its comparisons turn.
+
+    Parameters
+    ----------
+    tick
+        ``tick(x, m, u, par) -> memory``.
+    used
+        Fields that the task reads, of plant, stimulus and memory.
+    """
+
+    def __init__(
+        self, tick: Callable[..., Any], used: Sequence[set[str]], rng: np.random.Generator
+    ) -> None:
+        self.tick, self.rng = tick, rng
+        self.fields = [(part, name) for part, names in enumerate(used) for name in sorted(names)]
+        self.rows: list[Inputs] = []
+        self.reached: list[tuple[Inputs, int]] = []
+        self.shown: Counter[_Place] = Counter()
+        self.met: Counter[_Place] = Counter()
+        self.unseen: Counter[_Place] = Counter()
+        self.sides: dict[_Place, list[_Field]] = {}
+
+    def near(self, rows: Sequence[tuple[Inputs, Any]], wanted: int) -> Iterator[tuple[Inputs, int]]:
+        """Yield inputs on both sides of borders, and which of the rows they come from.
+
+        Parameters
+        ----------
+        rows
+            Inputs and parameters from which the search begins.
+        wanted
+            Inputs, about; comparisons that were met rarely come first.
+        """
+        self.rows = [inputs for inputs, _ in rows]
+        self.reached = [(inputs, at) for at, inputs in enumerate(self.rows)]
+        given = 0
+        for _ in range(_BORDER_TRIES * wanted):
+            if given >= wanted or not self.fields:
+                return
+            at = self._any(len(rows))
+            inputs = rows[at][0]
+            if given and self.rng.random() < 0.5:
+                inputs, at = self.reached[-1 - self._any(min(given, _LATEST))]
+            for border in self._turned(inputs, rows[at][1]):
+                for side in (border.above, border.below):
+                    given += 1
+                    self.reached.append((side, at))
+                    yield side, at
+
+    def _any(self, count: int) -> int:
+        return int(self.rng.integers(count))
+
+    def _another(self, inputs: Inputs, field: _Field) -> float:
+        """Return another value of an input: that of other inputs, none, or its own changed."""
+        others = self.rows[self._any(len(self.rows))]
+        before = _value_of(inputs, field)
+        values = (_value_of(others, field), 0.0, -before, 3.0 * before)
+        return values[max(int(self.rng.integers(-3, 4)), 0)]
+
+    def _turned(self, inputs: Inputs, par: Any) -> Iterator[Border]:
+        """Yield borders of the rarest comparisons that turn where an input gets another value."""
+        along = Turn(self.tick, par, (), self.fields[self._any(len(self.fields))])
+        at, to = _value_of(inputs, along.field), self._another(inputs, along.field)
+        here, there = (along.margins(inputs, value) for value in (at, to))
+        ends = [(to, there)]
+        ends += [(v, along.margins(inputs, v)) for v in self._aimed((at, here), (to, there))]
+        turning: dict[_Place, tuple[float, float]] = {}
+        for value, last in ends:
+            for place in here.keys() & last.keys():
+                if (here[place] > 0.0) != (last[place] > 0.0):
+                    turning.setdefault(place, (value, last[place]))
+        for place in sorted(turning, key=self._rank)[:_AT_ONCE]:
+            if self._rank(place)[0] >= _ENOUGH:
+                return
+            turn = replace(along, place=place)
+            border = turn.border(inputs, (at, here[place]), turning[place])
+            shown = border if turn.is_seen(border) else self._elsewhere(turn, border)
+            if self._is_worth(place[:_LAW], shown):
+                yield self._met(turn, shown) if shown is not None else border
+
+    def _is_worth(self, law: _Place, shown: Border | None) -> bool:
+        """Count a border; return whether it is kept."""
+        self.shown[law] += int(shown is not None)
+        self.unseen[law] += int(shown is None)
+        return shown is not None or self.unseen[law] <= _UNSEEN
+
+    def _aimed(self, first: tuple[float, Margins], last: tuple[float, Margins]) -> Iterator[float]:
+        """Yield a value beyond which the rarest comparison turns that the input has a say in."""
+        (at, here), (to, there) = first, last
+        for place in sorted(here.keys() & there.keys(), key=self._rank):
+            moves = there[place] - here[place]
+            if moves == 0.0 or not math.isfinite(moves):
+                continue
+            value = at - _BEYOND * here[place] * (to - at) / moves
+            if abs(value) <= _FAR * (abs(at) + abs(to)):
+                yield value
+                return
+
+    def _rank(self, place: _Place) -> tuple[float, _Place]:
+        """Return how well a comparison is known already."""
+        law = place[:_LAW]
+        return self.met[law] + self.shown[law] / 3 + self.unseen[law] / 10, place
+
+    def _met(self, turn: Turn, border: Border) -> Border:
+        """Return a border with its sides equal, if it can be had by the last digits of inputs.
+
+        The numbers that one input can be may make a side jump over the other.
+        """
+        law = turn.place[:_LAW]
+        if not border.is_met and self.met[law] < _MET:
+            border = next(self._nudged(turn, border), border)
+        self.met[law] += int(border.is_met)
+        return border
+
+    def _nudged(self, turn: Turn, border: Border) -> Iterator[Border]:
+        law = turn.place[:_LAW]
+        if law not in self.sides:
+            self.sides[law] = list(self._sides(turn, border.below))
+        for field in self.sides[law]:
+            at = _value_of(border.below, field)
+            for ulps in () if field == turn.field else _ULPS:
+                nudged = border.changed(field, at + ulps * math.ulp(at))
+                if turn.is_at(nudged) and turn.is_seen(nudged):
+                    yield nudged
+
+    def _sides(self, turn: Turn, inputs: Inputs) -> Iterator[_Field]:
+        """Yield inputs that have a say in a comparison."""
+        before = margins(self.tick, inputs, turn.par).get(turn.place)
+        for field in self.fields:
+            value = _value_of(inputs, field) * (1.0 + _SMALL) + _SMALL
+            moved = changed(inputs, [(field, value)])
+            if margins(self.tick, moved, turn.par).get(turn.place) != before:
+                yield field
+
+    def _elsewhere(self, turn: Turn, border: Border) -> Border | None:
+        """Return a border of the same comparison that shows, with other inputs changed, if any."""
+        above, below = (_value_of(each, turn.field) for each in (border.above, border.below))
+        for count in range(_CONTEXTS):  # the same place: what follows from it may be hidden
+            inputs = border.above
+            if count % 2:
+                inputs = self.reached[self._any(len(self.reached))][0]
+            inputs = changed(inputs, self._changes(inputs, turn.field) if count % 4 < 2 else ())
+            high, low = (changed(inputs, [(turn.field, value)]) for value in (above, below))
+            moved = Border(high, low, border.is_met)
+            if turn.is_seen(moved) and turn.is_at(moved):
+                return moved
+        apart = 1e-3 * (2.0 * abs(above) + 1e-3)
+        for _ in range(_NEAR_BY):  # where other inputs have a say in the comparison
+            inputs = changed(border.above, self._changes(border.above, turn.field))
+            first, last = ((v, turn.margin(inputs, v)) for v in (above - apart, above + apart))
+            if (first[1] > 0.0) != (last[1] > 0.0) and math.isfinite(first[1] - last[1]):
+                moved = turn.border(inputs, first, last)
+                if turn.is_seen(moved):
+                    return moved
+        return None
+
+    def _changes(self, inputs: Inputs, but: _Field) -> Iterator[tuple[_Field, float]]:
+        """Yield other values of some inputs."""
+        for _ in range(int(self.rng.integers(1, 4))):
+            field = self.fields[self._any(len(self.fields))]
+            if field != but:
+                yield field, self._another(inputs, field)
+
+
+# --- Vectors
 
 WILD, CALM, RELATED = tuple(range(10)), (9,) * 20 + tuple(range(10)), (9,) * 5 + (6, 6, 5)
 """kinds of draws: anything, hardly anything unusual, and much that is equal or at a limit"""
@@ -122,10 +549,10 @@ class Draw:
 
 # --- Vectors
 
-BORDERING = 3
+_BORDERING = 3
 """of so many vectors one is next to where a comparison turns"""
 _MOST_AT_BORDERS = 400
-SEGMENT = 40
+_SEGMENT = 40
 """ticks after which a trajectory starts anew"""
 _TRIES = 50
 _KINDS = ("random", "jumping", "smooth")
@@ -190,7 +617,7 @@ def vectors(program: Program, memory: Any, count: int, seed: int = 0) -> list[Ve
         for cls in (model.State, model.Stimulus, model.Memory)
     }
     drawn = _drawn(program, memory, draw, sets, used, count)
-    _filled(rows, drawn, count - min(count // BORDERING, _MOST_AT_BORDERS))
+    _filled(rows, drawn, count - min(count // _BORDERING, _MOST_AT_BORDERS))
     for step in program.steps:
         every = rows[step.task.name]
         parts = [used[cls] for cls in (model.State, model.Stimulus, model.Memory)]
@@ -227,7 +654,7 @@ def _drawn(
         if _KINDS[kind] == "smooth":
             x, u = draw.alike(x, used[model.State]), draw.alike(u, used[model.Stimulus])
             m = _at_rest(program, x, u, m, sets[which], number)
-        for at in range(SEGMENT):
+        for at in range(_SEGMENT):
             if _KINDS[kind] == "random":
                 pool: dict[str, list[float]] = {}
                 draw.kinds = (WILD, CALM, RELATED)[at % 3]
@@ -252,7 +679,7 @@ def _at_rest(
     program: Program, x: Any, u: Any, m: Any, par: ParameterSet, number: Callable[[float], Any]
 ) -> Any:
     """Return the memory behind ticks with unchanged inputs: filters have come to rest."""
-    for _ in range(SEGMENT):
+    for _ in range(_SEGMENT):
         for step in program.steps:
             after = _ticked(step, x, m, u, par, number)
             if after is None:

@@ -1,9 +1,16 @@
-"""An FMU: description, binaries, sources, documentation and a reference run in one archive."""
+"""An FMU: description, binaries, sources, documentation and a reference run in one archive.
+
+The kernel may take all numbers as finite, which would delete the checks of what a client gives:
+both are compiled apart.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import io
+import platform
+import subprocess
+import sys
 import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,19 +21,159 @@ from xml.etree.ElementTree import Element, indent, tostring
 
 import numpy as np
 
+from bywire.core.child_process import run_program
+from bywire.core.errors import CompilerError, unknown_name
 from bywire.core.scratch import replacing, scratch_folder
 from bywire.core.units import shown
 from bywire.core.version import __version__
-from bywire.export.exported import Exported, start_source
-from bywire.export.fmu.binaries import PLATFORMS, compiled
+from bywire.export.exported import (
+    Exported,
+    Interface,
+    Kind,
+    Part,
+    identifier_of,
+    interface,
+    start_source,
+)
 from bywire.export.fmu.description import build_description, description_2, description_3
 from bywire.export.fmu.model_exchange import Equations, exchange_interface
-from bywire.export.interface import Interface, Kind, Part, identifier_of, interface
 from bywire.export.model_header import model_header
+from bywire.simulation.compiler import (
+    KERNEL_MATH,
+    PLAIN,
+    TIMEOUT,
+    Compiler,
+    bundled_compiler,
+    find_compiler,
+)
 from bywire.simulation.run import sampled_stimulus, simulate
 
-HERE = Path(__file__).parent
-KERNEL = "kernel.c"
+_LANGUAGE = ("-std=c11", "-fvisibility=hidden")
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A system that binaries are made for.
+
+    Parameters
+    ----------
+    folder_2, folder_3
+        Where they stand in an FMU of version 2.0 and of 3.0.
+    suffix
+        Ending of their file.
+    triple
+        How the compiler of the extra ``compiler`` calls it.
+    """
+
+    folder_2: str
+    folder_3: str
+    suffix: str
+    triple: str
+
+
+PLATFORMS: Mapping[str, Platform] = {
+    "linux64": Platform("linux64", "x86_64-linux", ".so", "x86_64-linux-gnu.2.17"),
+    "win64": Platform("win64", "x86_64-windows", ".dll", "x86_64-windows-gnu"),
+    "darwin64": Platform("darwin64", "x86_64-darwin", ".dylib", "x86_64-macos"),
+    "aarch64-linux": Platform("aarch64-linux", "aarch64-linux", ".so", "aarch64-linux-gnu.2.17"),
+    "aarch64-darwin": Platform("aarch64-darwin", "aarch64-darwin", ".dylib", "aarch64-macos"),
+}
+
+
+def this_platform() -> str:
+    """Return the name of the system that this is, of ``PLATFORMS``."""
+    is_arm = platform.machine().lower() in ("aarch64", "arm64")
+    if sys.platform == "win32":
+        return "win64"
+    if sys.platform == "darwin":
+        return "aarch64-darwin" if is_arm else "darwin64"
+    return "aarch64-linux" if is_arm else "linux64"
+
+
+def compiled(sources: Path, kernel: str, functions: str, target: str, library: Path) -> str:
+    """Compile the sources of an FMU to a shared library.
+
+    Parameters
+    ----------
+    sources
+        Their folder.
+    kernel, functions
+        File of the kernel, and that of the functions of the interface.
+    target
+        Name of the system, one of ``PLATFORMS``.
+    library
+        Where to.
+
+    Returns
+    -------
+    str
+        What the compiler is.
+
+    Raises
+    ------
+    UnknownNameError
+        For another system.
+    CompilerError
+        When there is no compiler for it, or it fails.
+    """
+    if target not in PLATFORMS:
+        raise unknown_name("target", target, PLATFORMS)
+    compiler, cross = _compiler_for(target)
+    sources, library = sources.absolute(), library.absolute()
+    position = () if target == "win64" else ("-fPIC",)
+    objects = []
+    for name, flags in ((kernel, (*KERNEL_MATH, *compiler.flags(PLAIN))), (functions, ("-O2",))):
+        made = library.parent / f"{name}.o"
+        given = [flag for flag in flags if not (cross and flag.startswith("-mtune"))]
+        call = [*_LANGUAGE, *position, *given, "-c", str(sources / name), "-o", str(made)]
+        _call(compiler, cross, call)
+        objects.append(str(made))
+    _call(compiler, cross, ["-shared", "-s", *objects, "-o", str(library), *_libraries(target)])
+    for each in objects:
+        Path(each).unlink()
+    return compiler.label
+
+
+def _libraries(target: str) -> list[str]:
+    return [] if target == "win64" else ["-lm"]
+
+
+def _compiler_for(target: str) -> tuple[Compiler, tuple[str, ...]]:
+    """Return a compiler and what tells it for which system."""
+    if target == this_platform():
+        compiler = find_compiler()
+        if compiler is None:
+            raise CompilerError(
+                "an FMU has a compiled model, and there is no C compiler: install one, or the "
+                "extra bywire[compiler]"
+            )
+        return compiler, ()
+    command = bundled_compiler()
+    if command is None:
+        raise CompilerError(
+            f"target {target}: this system's compiler makes {this_platform()} only; install the "
+            "extra bywire[compiler], which compiles for all"
+        )
+    return Compiler(command, "clang of the extra compiler"), ("-target", PLATFORMS[target].triple)
+
+
+def _call(compiler: Compiler, cross: tuple[str, ...], arguments: list[str]) -> None:
+    command = [*compiler.command, *cross, *arguments]
+    try:
+        done = run_program(command, TIMEOUT)
+    except subprocess.TimeoutExpired:
+        raise CompilerError(f"{compiler.label} took longer than {TIMEOUT:g} s for an FMU") from None
+    except OSError as error:
+        raise CompilerError(f"{compiler.label} did not run ({error.strerror or error})") from None
+    if done.returncode != 0:
+        message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
+        raise CompilerError(f"{compiler.label} refused the sources of an FMU:\n{message}")
+
+
+# --- The archive
+
+_HERE = Path(__file__).parent
+_KERNEL = "kernel.c"
 _DATE = (1980, 1, 1, 0, 0, 0)  # of every file in the archive: the same FMU has the same bytes
 Progress = Callable[[str, float], None]
 
@@ -74,7 +221,7 @@ class Unit:
             "generationTool": f"bywire {__version__}",
         }
         arguments = (self.made, self.faces, self.identifier, self.token, head)
-        compiled_files = (KERNEL, self.functions)
+        compiled_files = (_KERNEL, self.functions)
         if self.version == 2:
             return description_2(*arguments, compiled_files)
         return description_3(*arguments)
@@ -98,7 +245,7 @@ def unit_of(made: Exported, part: Part, version: int, kind: Kind = "co-simulatio
     token = f"{{{UUID(bytes=digest.digest()[:16])}}}"
     name = made.bench.name or made.bench.experiment
     files = {
-        KERNEL: kernel,
+        _KERNEL: kernel,
         "model.h": model_header(made, faces, start, token, modes),
         **written,
     }
@@ -125,13 +272,13 @@ def write_unit(unit: Unit, path: Path, targets: Sequence[str], progress: Progres
             for name, text in unit.files.items():
                 _add(archive, f"sources/{name}", text.encode())
             if unit.version == 3:
-                built = build_description(unit.identifier, (KERNEL, unit.functions))
+                built = build_description(unit.identifier, (_KERNEL, unit.functions))
                 _add(archive, "sources/buildDescription.xml", _xml(built))
             for number, target in enumerate(targets):
                 progress(f"compiling for {target}", number / (len(targets) + 1))
                 system = PLATFORMS[target]
                 library = scratch / f"{unit.identifier}{system.suffix}"
-                labels.append(compiled(scratch, KERNEL, unit.functions, target, library))
+                labels.append(compiled(scratch, _KERNEL, unit.functions, target, library))
                 folder = system.folder_2 if unit.version == 2 else system.folder_3
                 _add(archive, f"binaries/{folder}/{library.name}", library.read_bytes())
             progress("reference run", len(targets) / (len(targets) + 1))
@@ -156,7 +303,7 @@ def reference(made: Exported) -> bytes:
 
 
 def _own(name: str) -> str:
-    return (HERE / name).read_text(encoding="utf-8")
+    return (_HERE / name).read_text(encoding="utf-8")
 
 
 def _xml(root: Element) -> bytes:

@@ -8,13 +8,20 @@ from xml.etree.ElementTree import Element, SubElement
 
 from bywire.core.quantities import display_unit
 from bywire.core.units import base_powers, convert
-from bywire.export.exported import Exported
-from bywire.export.interface import Interface, Kind, Numbered, Variable, finite_range, tables
+from bywire.export.exported import (
+    Exported,
+    Interface,
+    Kind,
+    Numbered,
+    Variable,
+    finite_range,
+    tables,
+)
 
 _BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
-def unit_definitions(units: Iterable[str]) -> Element:
+def _unit_definitions(units: Iterable[str]) -> Element:
     """Return the element ``UnitDefinitions`` of both versions.
 
     Each with the unit in which bywire shows it, where that is another one.
@@ -83,7 +90,7 @@ def description_2(
     files = SubElement(offered, "SourceFiles")
     for name in sources:
         SubElement(files, "File", name=name)
-    root.append(unit_definitions(each.unit for each in faces.variables))
+    root.append(_unit_definitions(each.unit for each in faces.variables))
     categories = SubElement(root, "LogCategories")
     for name in ("logStatusWarning", "logStatusError"):
         SubElement(categories, "Category", name=name)
@@ -92,10 +99,10 @@ def description_2(
     )
     variables = SubElement(root, "ModelVariables")
     for reference, each in enumerate(faces.variables):
-        variables.append(_scalar(reference, each, states_of_rates(faces).get(reference)))
+        variables.append(_scalar(reference, each, _states_of_rates(faces).get(reference)))
     structure = SubElement(root, "ModelStructure")
     results = [k for k, each in enumerate(faces.variables) if each.causality == "output"]
-    rates = states_of_rates(faces)
+    rates = _states_of_rates(faces)
     unknowns = sorted({*results, *rates, *rates.values()})
     sections = {"Outputs": results, "Derivatives": list(rates), "InitialUnknowns": unknowns}
     for section, references in sections.items():
@@ -105,7 +112,7 @@ def description_2(
     return root
 
 
-def states_of_rates(faces: Interface) -> dict[int, int]:
+def _states_of_rates(faces: Interface) -> dict[int, int]:
     """Return the value reference of the state of each derivative, by that of the derivative.
 
     The states that are integrated stand first in the state vector.
@@ -121,7 +128,7 @@ def _scalar(reference: int, each: Variable, state: int | None) -> Element:
             "name": each.name,
             "valueReference": str(reference),
             "causality": each.causality,
-            "variability": variability(each),
+            "variability": _variability(each),
             **({"description": each.label} if each.label else {}),
         },
     )
@@ -132,19 +139,19 @@ def _scalar(reference: int, each: Variable, state: int | None) -> Element:
     real = SubElement(scalar, "Real")
     if state is not None:
         real.set("derivative", str(state + 1))
-    for name, value in real_attributes(each).items():
+    for name, value in _real_attributes(each).items():
         real.set(name, value)
     return scalar
 
 
-def variability(each: Variable) -> str:
+def _variability(each: Variable) -> str:
     """Return when a variable may change."""
     if each.causality == "parameter":
         return "tunable" if each.is_tunable else "fixed"
     return "discrete" if each.is_held else "continuous"
 
 
-def real_attributes(each: Variable) -> dict[str, str]:
+def _real_attributes(each: Variable) -> dict[str, str]:
     """Return unit, range and start of a variable, as both versions write them."""
     made = {} if each.unit == "1" else {"unit": each.unit}
     if each.leaf is not None:
@@ -196,7 +203,7 @@ def description_3(
                 "fixedInternalStepSize": repr(schedule.frame),
             },
         )
-    root.append(unit_definitions(each.unit for each in faces.variables))
+    root.append(_unit_definitions(each.unit for each in faces.variables))
     categories = SubElement(root, "LogCategories")
     for name in ("logStatusWarning", "logStatusError"):
         SubElement(categories, "Category", name=name)
@@ -208,7 +215,7 @@ def description_3(
         stepSize=repr(schedule.frame),
     )
     variables = SubElement(root, "ModelVariables")
-    rates = states_of_rates(faces)
+    rates = _states_of_rates(faces)
     for nodes in tables(faces):
         variables.append(_float(nodes, rates.get(nodes[0][0])))
     count = len(faces.variables)
@@ -256,8 +263,8 @@ def _float(nodes: list[Numbered], state: int | None) -> Element:
             "name": name,
             "valueReference": str(reference),
             "causality": first.causality,
-            "variability": variability(first),
-            **real_attributes(first),
+            "variability": _variability(first),
+            **_real_attributes(first),
             **({"description": first.label} if first.label else {}),
         },
     )

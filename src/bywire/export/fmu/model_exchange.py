@@ -8,8 +8,8 @@ from functools import cached_property
 from itertools import chain
 
 from bywire.core.signals import Signal, signals_of
-from bywire.export.exported import Exported
-from bywire.export.interface import (
+from bywire.export.exported import (
+    Exported,
     Interface,
     Variable,
     leaves_read,
@@ -22,9 +22,9 @@ from bywire.export.interface import (
 from bywire.export.model_header import braced, number
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.continuous import Continuous, build_continuous
-from bywire.simulation.emission import indented, leaf_namer, statements
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph, Node
+from bywire.simulation.stages import indented, leaf_namer, statements
 
 LEAVES = {"p": "p", "x": "x", "m": "m", "c": "closed", "r": "reaction"}
 """arguments of the C functions by kind of leaf; integrals are none, they are not computed"""

@@ -10,8 +10,9 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
+from bywire.bench.energy_ledger import energy_signals
 from bywire.bench.experiment import Case, changes_of, driven_at
-from bywire.bench.recording import energy_doubts_of, energy_signals
+from bywire.bench.recording import energy_doubts_of
 from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, abandoned, steps_of, unestimated
 from bywire.core.callers import option
 from bywire.core.errors import (

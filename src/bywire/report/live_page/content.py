@@ -27,9 +27,8 @@ from bywire.analysis.margins import MARGINS
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import bench_text
 from bywire.bench.experiment import Case
-from bywire.bench.kpis.cases import FamilyJudge
-from bywire.bench.kpis.registry import FAMILIES
-from bywire.bench.result import Result
+from bywire.bench.kpis.families import FAMILIES, FamilyJudge
+from bywire.bench.running import Result
 from bywire.bench.stated import StatedLevel, StatedRange, stated_figures, stated_for
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import BywireError, InputError

@@ -15,7 +15,6 @@ from matplotlib.lines import Line2D
 
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.legend import legend_outside
 from bywire.report.panels import Role
 from bywire.report.readable_axis import (
     CHARACTER,
@@ -28,6 +27,7 @@ from bywire.report.readable_axis import (
     write_out,
 )
 from bywire.report.study.drawn_cases import DrawnCases
+from bywire.report.style import legend_outside
 
 _JITTER = 0.3  # how far points of a choice lie from its place, of the distance of two
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # its multiples are spread evenly, however many there are

@@ -13,7 +13,6 @@ from matplotlib.patches import Patch
 
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.legend import legend_outside
 from bywire.report.readable_axis import (
     CHARACTER,
     Scale,
@@ -26,6 +25,7 @@ from bywire.report.readable_axis import (
     size_of,
 )
 from bywire.report.study.drawn_cases import BARS
+from bywire.report.style import legend_outside
 from bywire.studies.findings import ChoiceInfluence, Effect
 from bywire.studies.sensitivity import ElementaryEffects, VarianceShares
 from bywire.studies.statistics import Influence

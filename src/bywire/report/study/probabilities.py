@@ -14,7 +14,6 @@ from matplotlib.patches import Patch, Polygon
 
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.legend import legend_outside
 from bywire.report.panels import Role
 from bywire.report.readable_axis import (
     beyond,
@@ -25,6 +24,7 @@ from bywire.report.readable_axis import (
     size_of,
     write_out,
 )
+from bywire.report.style import legend_outside
 from bywire.studies.statistics import Share
 
 _COLUMNS = 2

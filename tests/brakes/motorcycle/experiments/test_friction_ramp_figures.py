@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 import bywire
+from bywire.bench.kpis.families import evaluate
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate
 from bywire.brakes.motorcycle.experiments import friction_ramp
 
 

@@ -13,10 +13,10 @@ from brakes.wedge.wedge_runs import TAN_ALPHA
 from bywire.bench.experiment import as_run
 from bywire.bench.recording import record
 from bywire.brakes.wedge import control as wedge_control
+from bywire.brakes.wedge.case import FRICTIONLESS
 from bywire.brakes.wedge.control import Memory, Readings, Stimulus
 from bywire.brakes.wedge.model import WedgeBrake
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.series import FRICTIONLESS
 from bywire.simulation.run import simulate
 from run_once import run_once
 

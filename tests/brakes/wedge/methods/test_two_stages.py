@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.brakes.wedge.methods.drive_train.cogging_waves import waves
-from bywire.brakes.wedge.methods.drive_train.force_current import Squeeze
+from bywire.brakes.wedge.methods.force_calibration import Squeeze, cogging_waves
 from bywire.brakes.wedge.methods.stiffness import METHOD, Contacts, clear_of, truth
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.catalog import parameters
@@ -34,7 +33,7 @@ def test_ideal_sensors_leave_no_error_of_the_model() -> None:
 
 def left_over(q_1: Array, q_2: Array, current: Array) -> float:
     """Return what the waves leave of a current, beside an offset."""
-    columns = np.column_stack((np.ones_like(q_1), waves(q_1, q_2, ORDER)))
+    columns = np.column_stack((np.ones_like(q_1), cogging_waves(q_1, q_2, ORDER)))
     rest = current - columns @ np.linalg.lstsq(columns, current, rcond=None)[0]
     return float(np.abs(rest).max())
 
@@ -53,7 +52,7 @@ def test_a_motor_that_stands_leaves_the_waves_of_the_other(first_moves: bool) ->
     angle, still = np.linspace(0.0, 0.3, 500), np.full(500, 0.1)
     q_1, q_2 = (angle, still) if first_moves else (still, angle)
     assert left_over(q_1, q_2, 0.05 * np.cos(ORDER * angle + 0.4)) < 1e-12
-    assert not waves(q_1, q_2, ORDER)[:, 2:].any()
+    assert not cogging_waves(q_1, q_2, ORDER)[:, 2:].any()
 
 
 def test_windows_at_and_after_a_contact_are_left_out() -> None:

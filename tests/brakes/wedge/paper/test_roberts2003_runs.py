@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.brakes.wedge.figures.brake_factor import FARTHEST, WedgeForces, brake_factor
-from bywire.brakes.wedge.paper.runs import order_spectrum, settled, stacked
+from bywire.brakes.wedge.figures import FARTHEST, WedgeForces, brake_factor
+from bywire.brakes.wedge.paper.statements import order_spectrum, settled, stacked
 from bywire.core.errors import ParameterError
 
 

@@ -7,8 +7,9 @@ import pytest
 import xarray as xr
 
 from bywire.bench.experiment import Case
-from bywire.brakes.wedge.experiments import load_sweep, run_down
-from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft, Load
+from bywire.brakes.wedge.experiments import run_down
+from bywire.brakes.wedge.experiments.screw_efficiency import LOAD_SWEEP
+from bywire.brakes.wedge.rigs.shaft_rig import DrivenShaft, Load
 from bywire.core.catalog import parameters
 from bywire.identification.output_error import trial
 from bywire.identification.sensed import Sensor, sensed
@@ -52,8 +53,8 @@ def test_under_the_force_of_the_other_screw() -> None:
     The current and the force hold for a millisecond each, which is what the difference shows.
     """
     par = parameters("roberts2003").replace({"rig.load": "screw"})
-    options = load_sweep.EXPERIMENT.defaults.replace({"levels": 1, "i_drive": 6.0})
-    case = load_sweep.EXPERIMENT.cases(par, options, None)[0]
+    options = LOAD_SWEEP.defaults.replace({"levels": 1, "i_drive": 6.0})
+    case = LOAD_SWEEP.cases(par, options, None)[0]
     sensors = {
         "theta": Sensor("theta_1"),
         "omega": Sensor("omega_1"),

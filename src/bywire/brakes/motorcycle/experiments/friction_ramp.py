@@ -5,19 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import hysteresis, occupation
+from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.stimuli import ramp
 from bywire.brakes.motorcycle.case import case_from_rest, smoothing
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, CurrentRate, Frequency, TimeConstant
-from bywire.data.recursive_filter import filtered
+from bywire.data.recursive_filter import low_passed
 
 WITHOUT, WITH = "without-dither", "with-dither"
 
@@ -62,9 +61,7 @@ def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tupl
 def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
     """Add the measured current behind the low-pass filter, as the paper plots it."""
     interval = float(recording["time"][1] - recording["time"][0])
-    decay = float(np.exp(-2.0 * np.pi * options.f_filter * interval))
-    raw = recording["i_meas"].values
-    behind = filtered([1.0 - decay], [1.0, -decay], raw, settled=True)
+    behind = low_passed(recording["i_meas"].values, options.f_filter, interval)
     attrs = {"units": "A", "long_name": "measured current, filtered"}
     return recording.assign(i_filtered=("time", behind, attrs))
 

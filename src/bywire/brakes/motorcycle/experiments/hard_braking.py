@@ -6,8 +6,7 @@ from typing import Any
 
 from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import effort, occupation, step_response
-from bywire.bench.kpis.cases import FamilyJudge
-from bywire.bench.kpis.registry import units_of
+from bywire.bench.kpis.families import FamilyJudge, units_of
 from bywire.brakes.motorcycle.case import case_from_rest, smoothing, step_at_zero
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.parameters import ParameterSet

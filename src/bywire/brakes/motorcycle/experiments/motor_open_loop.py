@@ -9,9 +9,9 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation
+from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.stimulus import Stimulus
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.experiments.friction_ramp import PEAK
 from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters

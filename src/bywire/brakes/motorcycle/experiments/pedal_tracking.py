@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import effort, occupation, tracking
-from bywire.bench.kpis.cases import FamilyJudge
-from bywire.bench.kpis.registry import units_of
+from bywire.bench.kpis.families import FamilyJudge, units_of
 from bywire.brakes.motorcycle.case import case_from_rest, smoothing
 from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters
 from bywire.control import pedal_map

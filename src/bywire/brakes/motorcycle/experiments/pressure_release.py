@@ -9,8 +9,8 @@ import numpy as np
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation, release
+from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.brakes.motorcycle.case import case_from_rest, step_at_zero
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current

@@ -6,8 +6,7 @@ from typing import Any, Literal
 
 from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import effort, occupation, static_gain, step_response
-from bywire.bench.kpis.cases import FamilyJudge
-from bywire.bench.kpis.registry import units_of
+from bywire.bench.kpis.families import FamilyJudge, units_of
 from bywire.brakes.motorcycle.case import case_from_rest, settled_start, smoothing, step_at_zero
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.analysis.crossings import bandwidth
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.brakes.motorcycle.linear import Rotor, current_loop
 from bywire.brakes.motorcycle.paper.facts import FACTS
 from bywire.brakes.motorcycle.paper.runs import MAIN, PRINTED, Runs, parameters

@@ -8,13 +8,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.loop_width import closed_above
-from bywire.analysis.response.harmonics import amplitudes, total_distortion
+from bywire.analysis.response.sweep import amplitudes, total_distortion
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import as_run
 from bywire.bench.kpis import hysteresis
-from bywire.bench.kpis.smoothing import smoothed
-from bywire.bench.result import Result
+from bywire.bench.kpis.hysteresis import closed_above
+from bywire.bench.kpis.samples import smoothed
+from bywire.bench.running import Result
 from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, FACTS
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, parameters
 from bywire.core.typing import Array

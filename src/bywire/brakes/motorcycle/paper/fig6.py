@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.kpis import step_response
-from bywire.bench.kpis.registry import evaluate
-from bywire.bench.result import Result
+from bywire.bench.kpis.families import evaluate
+from bywire.bench.running import Result
 from bywire.brakes.motorcycle.linear import Rational, theoretical
 from bywire.brakes.motorcycle.methods.region_fit import averaged
 from bywire.brakes.motorcycle.paper.facts import FACTS, table4_model

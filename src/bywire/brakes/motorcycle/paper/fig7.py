@@ -14,11 +14,11 @@ from bywire.analysis.margins import margins
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.sweep import Sweep, complex_values
 from bywire.bench.bench import Bench
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.brakes.motorcycle.linear import BAND, PressureLoop, cancelling_pi
 from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, FACTS, REGIONS, table4_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, of_set_point, parameters
-from bywire.report.bode import Response, bode
+from bywire.report.response_figures import Response, bode
 from bywire.report.step_response import StepFacts, StepLimits, step_response, tracking
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part, kpis

@@ -11,7 +11,7 @@ import xarray as xr
 from bywire.analysis.loop import LOOPS, Point
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.sweep import Sweep
-from bywire.bench.result import Result
+from bywire.bench.running import Result
 from bywire.brakes.motorcycle.ecu import Stimulus
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters

@@ -25,7 +25,7 @@ from bywire.brakes.motorcycle.paper.runs import (
 )
 from bywire.brakes.motorcycle.trim import travel_at
 from bywire.identification.method import Effort, Identified
-from bywire.report.bode import Response, bode
+from bywire.report.response_figures import Response, bode
 from bywire.reproduction.item import Fact, Item, compared, found, quoted
 from bywire.reproduction.reproduction import Exhibit, Part, kpis
 

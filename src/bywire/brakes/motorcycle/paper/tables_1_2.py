@@ -15,7 +15,7 @@ from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import travel_at
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.plant import pipeline
-from bywire.report.bode import Response, bode
+from bywire.report.response_figures import Response, bode
 from bywire.report.subject import parameter_rows
 from bywire.report.tables import parameter_table
 from bywire.reproduction.item import Item, compared, found

@@ -1,4 +1,4 @@
-"""Drag of the rear brake after it was let go, while the vehicle rolls on: a caliper that sticks."""
+"""Drag of the released rear brake while the vehicle rolls on: a caliper that sticks."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 from bywire.plant.road import SurfaceName
 
-_LEFT = 0.1  # of the torque, below which the brake counts as released
-_END = 0.1  # s at the end over which what is left is averaged
+_LEFT = 0.1  # share of the torque below which the brake counts as released
+_END = 0.1  # s at the end over which the drag is averaged
 
 FIGURES = Figures(
     drag=("N*m", f"Mean torque that the rear brake holds in the last {_END:g} s."),
     residual_pressure=("Pa", "Mean pressure at its pads then."),
     release_time=(
         "s",
-        f"Time from letting go until the torque stays below {_LEFT:g} of what it was.",
+        f"Time from the release until the torque stays below {_LEFT:g} of its start.",
     ),
 )
 _SIGNALS = ("T_r", "p_r")
@@ -35,17 +35,17 @@ class Options(ParameterSet):
     v_0: RidingSpeed
     """speed at the start"""
     p_rear: Demand
-    """rear pressure at the start, which the rider demands until he lets go"""
+    """rear pressure at the start, which the rider demands until the release"""
     hold: Duration
-    """when he lets go"""
+    """time of the release"""
     surface: SurfaceName
-    """what the road is made of"""
+    """surface of the road"""
     duration: Duration
     """time recorded"""
 
 
 def cases(par: WholeRearParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the one run, which begins with the rear brake pressed."""
+    """Return the single run, which begins with the rear brake applied."""
 
     def demand(t: Array) -> Array:
         return np.where(t < options.hold, options.p_rear, 0.0)
@@ -67,7 +67,7 @@ def cases(par: WholeRearParameters, options: Options, _: object = None) -> tuple
 
 
 def left(run: xr.Dataset, options: Options) -> dict[str, float | tuple[float, str]]:
-    """Return what the brake still holds after it was let go."""
+    """Return drag, pressure and release time."""
     t, torque, p = (run[name].values for name in ("time", *_SIGNALS))
     end = t >= t[-1] - _END
     figures: dict[str, float | tuple[float, str]] = {
@@ -77,7 +77,7 @@ def left(run: xr.Dataset, options: Options) -> dict[str, float | tuple[float, st
     go = int(np.searchsorted(t, options.hold))
     above = np.flatnonzero(torque > _LEFT * torque[min(go, t.size - 1)])
     if not go or go >= t.size or not torque[go] > 0.0:
-        figures["release_time"] = (np.nan, "the brake was not pressed, or never let go")
+        figures["release_time"] = (np.nan, "the brake was not applied, or never released")
     elif above[-1] + 1 == t.size:
         figures["release_time"] = (np.nan, "the brake is not released within the recorded time")
     else:
@@ -94,7 +94,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="rear-drag",
     assembly="two-wheeler-whole-rear",
-    summary="the rider lets the whole rear brake go at {v_0}: what drags on",
+    summary="the rider releases the whole rear brake at {v_0}: residual drag",
     options=Options,
     defaults=Options(v_0=20.0, p_rear=20e5, hold=0.5, surface="dry-asphalt", duration=2.0),
     cases=cases,

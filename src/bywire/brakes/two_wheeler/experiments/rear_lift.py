@@ -1,4 +1,4 @@
-"""Rear lift: the front brake alone brings the rear wheel off the ground, and is let go, or not."""
+"""Rear lift: the front brake alone lifts the rear wheel off the ground, with or without control."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Options(ParameterSet):
     p_front: Demand
     """front pressure that the rider demands"""
     p_rate: PressureRate
-    """how fast: faster, and the wheel locks before the load is on it"""
+    """its build-up rate; with a faster one the wheel locks before it is loaded"""
     grip: Factor
     """factor on the adhesion of the road: sport tyres hold more than the surfaces' car tyres"""
     duration: Duration
@@ -42,14 +42,14 @@ class Options(ParameterSet):
 
 
 def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     demands = {"p_f_set": options.p_front}
     changes = {"ecu.abs": "off", "ecu.p_rate": options.p_rate, "vehicle.road.grip": options.grip}
     return (rolling_case(par, options.v_0, demands, options.duration, changes),)
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return when the rear wheel lifts, and how far."""
+    """Return time and size of the rear wheel's lift."""
     run = recordings["run"]
     body = vehicle_of(run).body
     flat = body.g * body.l_f / body.h

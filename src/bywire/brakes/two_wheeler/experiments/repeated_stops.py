@@ -1,9 +1,9 @@
 """Repeated stops: brakes that warm up from stop to stop, fade, and heat their fluid once parked.
 
-The stops run one after the other, each from the temperatures that the last one left. Between them
-no brake acts, and only heat is left to be told: three temperatures a wheel, over minutes. That
-stretch is integrated by the equations of the same element, at the speed driven, by a method of high
-order with error control in place of substeps of 20 us; the vehicle is back at its speed at once.
+The stops run one after the other, each from the temperatures at the end of the last one. Between
+them no brake acts, and only the heat changes: three temperatures a wheel, over minutes. These
+stretches use the equations of the same element at the speed driven. A method of high order with
+error control integrates them, without substeps of 20 us; the vehicle regains its speed at once.
 """
 
 from __future__ import annotations
@@ -34,15 +34,13 @@ from bywire.core.typing import Array
 from bywire.plant import brake_disc, disc_heat
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import simulate
-from bywire.vehicle.hot_brakes import cold_start
-
-# Stops of brakes that warm up, one after the other, and the ways between them.
+from bywire.vehicle.two_wheeler import cold_start
 
 Heat = Mapping[str, disc_heat.State]
 """temperatures of the brakes by their parts"""
 WARM = {"front.heat.law": "lumped", "rear.heat.law": "lumped"}
 BRAKES = {"front_heat": ("front", "_f"), "rear_heat": ("rear", "_r")}
-"""name and suffix of each brake, by the part that is its heat"""
+"""name and suffix of each brake, by the part of its heat"""
 TEMPERATURES = tuple(n + end for _, end in BRAKES.values() for n in disc_heat.State._fields)
 _SUBSTEPS = 50  # of a sample time
 
@@ -53,24 +51,26 @@ def braked(case: Case) -> dict[str, Array]:
     Raises
     ------
     ParameterError
-        When it does not come to one.
+        When the vehicle does not come to one.
     """
     run = as_run(case, case.par.ecu.T_s / _SUBSTEPS)  # type: ignore[attr-defined]
     with interrupts_deferred():
         prepare(run.model, run.par).engine()
-    made = simulate(run, ("v", "x", *TEMPERATURES))
-    if made.status == "interrupted":
+    stop = simulate(run, ("v", "x", *TEMPERATURES))
+    if stop.status == "interrupted":
         raise KeyboardInterrupt
-    end = vehicle_stop.standstill(made.time, made["v"])
+    end = vehicle_stop.standstill(stop.time, stop["v"])
     if math.isnan(end):
         raise ParameterError(
             f"{case.label} does not come to a standstill within {case.duration:g} s: its brakes "
-            "have faded, or the road does not hold; take fewer stops, a longer options.pause or a "
-            "smaller options.deceleration"
+            "have faded, or the road does not hold; give fewer options.stops, a longer "
+            "options.pause or a smaller options.deceleration",
+            name=case.label,
+            valid=f"{case.duration:g} s",
         )
-    t = np.append(made.time[made.time < end], end)
+    t = np.append(stop.time[stop.time < end], end)
     return {"time": t} | {
-        name: np.interp(t, made.time, made[name]) for name in ("v", "x", *TEMPERATURES)
+        name: np.interp(t, stop.time, stop[name]) for name in ("v", "x", *TEMPERATURES)
     }
 
 
@@ -88,15 +88,15 @@ def cooled(heat: Heat, par: TwoWheelerParameters, v: float, t: Array) -> dict[st
     """
     rows: dict[str, Array] = {"time": t}
     for part, (brake, end) in BRAKES.items():
-        own: disc_heat.Parameters = par.value(f"{brake}.heat")
-        felt, capacities = disc_heat.Input(0.0, v, 0.0), np.array(disc_heat.mass(own))
+        law: disc_heat.Parameters = par.value(f"{brake}.heat")
+        felt, capacities = disc_heat.Input(0.0, v, 0.0), np.array(disc_heat.mass(law))
 
-        def rate(_: float, T: Array, own: Any = own, u: Any = felt, C: Array = capacities) -> Array:
-            return np.array(disc_heat.balance(disc_heat.State(*T), u, own)) / C
+        def rate(_: float, T: Array, law: Any = law, u: Any = felt, C: Array = capacities) -> Array:
+            return np.array(disc_heat.balance(disc_heat.State(*T), u, law)) / C
 
         span = (0.0, float(t[-1]))
-        got = solve_ivp(rate, span, heat[part], "DOP853", t_eval=t, rtol=1e-10, atol=1e-8)
-        rows |= {n + end: y for n, y in zip(disc_heat.State._fields, got.y, strict=True)}
+        solution = solve_ivp(rate, span, heat[part], "DOP853", t_eval=t, rtol=1e-10, atol=1e-8)
+        rows |= {n + end: y for n, y in zip(disc_heat.State._fields, solution.y, strict=True)}
     return rows
 
 
@@ -133,32 +133,32 @@ EACH = Figures(
 ALL = Figures(
     distance_first=("m", "Distance of the first stop."),
     distance_last=("m", "Distance of the last stop."),
-    longer=("%", "What the last stop takes more than the first."),
+    longer=("%", "Extra distance of the last stop, relative to the first."),
     pads_last=("K", "Temperature of the front pads after the last stop."),
     fluid_last=("K", "Temperature of the front fluid after the last stop."),
     rear_disc_last=("K", "Temperature of the rear disc after the last stop."),
     pressure_cold=("Pa", "Front pressure for the deceleration with cold pads."),
-    pressure_hot=("Pa", "The same with pads as they are after the last stop."),
+    pressure_hot=("Pa", "The same with pads as hot as after the last stop."),
     fluid_peak=("K", "Highest temperature of the front fluid, the time parked included."),
-    fluid_peak_time=("s", "Time of it after the last standstill."),
+    fluid_peak_time=("s", "Time of that peak after the last standstill."),
 )
 
 
 class Options(ParameterSet):
-    """The stops, and the way from one to the next.
+    """The stops, and the drive from one to the next.
 
-    ``hold``: the rider presses alike in every stop (``"pressure"``), or by as much more as the pads
-    have faded when it begins (``"deceleration"``).
+    ``hold``: the rider presses equally in every stop (``"pressure"``), or more in proportion to the
+    fading of the pads when it begins (``"deceleration"``).
     """
 
     v_0: RidingSpeed
     """speed at the start of each stop"""
     deceleration: Annotated[float, Unit("m/s**2", 8.0), Field(gt=0, allow_inf_nan=False)]
-    """what cold brakes give the vehicle's mass, drag and rolling resistance apart"""
+    """deceleration of the mass by cold brakes, without drag and rolling resistance"""
     share: Weight
     """share of the braking force that the front brake gives"""
     hold: Literal["pressure", "deceleration"]
-    """what the rider holds from stop to stop"""
+    """quantity that the rider keeps from stop to stop"""
     stops: Annotated[float, Unit("1", 10.0), Field(ge=1, le=200, multiple_of=1)]
     """number of stops"""
     pause: Duration
@@ -177,7 +177,7 @@ class _Stop(NamedTuple):
 
 
 def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the first and the last stop, this from what all those before it left."""
+    """Return the first and the last stop, the last from the heat of all stops before it."""
     every = _series(par.replace(WARM), options)
     return tuple(
         replace(stop.case, label=label, duration=round(stop.rows["time"][-1] + _AFTER, 1))
@@ -204,7 +204,7 @@ def _series(par: TwoWheelerParameters, options: Options) -> tuple[_Stop, ...]:
         case = _case(par, options, heat, f"stop {k + 1}")
         try:
             rows = braked(case)
-        except ParameterError:  # faded brakes take longer
+        except ParameterError:  # faded brakes need longer
             rows = braked(replace(case, duration=case.duration * _LONGEST))
         stops.append(_Stop(case, rows))
     return tuple(stops)
@@ -214,10 +214,10 @@ def _case(par: TwoWheelerParameters, options: Options, start: Heat, label: str) 
     demands = {}
     shares = {"p_f_set": options.share, "p_r_set": 1.0 - options.share}
     for (name, share), (part, (brake, _)) in zip(shares.items(), BRAKES.items(), strict=True):
-        left = 1.0
+        friction = 1.0
         if options.hold == "deceleration":
-            left = disc_heat.friction(start[part].T_disc, par.value(f"{brake}.heat"))
-        demands[name] = share * _pressure(par, options, brake) / left
+            friction = disc_heat.friction(start[part].T_disc, par.value(f"{brake}.heat"))
+        demands[name] = share * _pressure(par, options, brake) / friction
     duration = round(_USUAL * options.v_0 / options.deceleration + _AFTER, 1)
     return rolling_case(par, options.v_0, demands, duration, label=label, heat=start)
 
@@ -229,7 +229,7 @@ def _pressure(par: TwoWheelerParameters, options: Options, brake: str) -> float:
 
 
 def static(par: TwoWheelerParameters, options: Options) -> dict[str, xr.Dataset]:
-    """Return the temperatures over all stops, the ways between them, and the time parked."""
+    """Return the temperatures over all stops, the drives between them, and the time parked."""
     warm, begin, pieces = par.replace(WARM), 0.0, []
     every = _series(warm, options)
     for k, (_, rows) in enumerate(every):
@@ -253,7 +253,7 @@ def _dataset(par: TwoWheelerParameters, pieces: list[dict[str, Array]]) -> xr.Da
     names = ("time", "v", "stop", *TEMPERATURES)
     rows = {name: np.concatenate([each[name] for each in pieces]) for name in names}
     t = rows.pop("time")
-    said = [
+    warnings = [
         f"{brake} brake: {text}"
         for brake, end in BRAKES.values()
         for text in disc_heat.watch(
@@ -267,11 +267,11 @@ def _dataset(par: TwoWheelerParameters, pieces: list[dict[str, Array]]) -> xr.Da
         for name, y in rows.items()
     }
     time = ("time", t, {"units": "s", "long_name": "time"})
-    return xr.Dataset(values, {"time": time}, {"warnings": "; ".join(said)})
+    return xr.Dataset(values, {"time": time}, {"warnings": "; ".join(warnings)})
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return temperatures of every stop, and what the heat costs."""
+    """Return temperatures of every stop, and the effects of the heat."""
     course, stops = recordings[_COURSE], range(1, round(options.stops) + 1)
     disc, number = course["T_disc_f"].values, course["stop"].values
     each = [disc[number == k] for k in stops]

@@ -1,4 +1,4 @@
-"""Rider's trace: the rider's demand moves, as a measured file or any stimulus says."""
+"""Rider's trace: the rider's demand follows a measured file or any stimulus."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import vehicle_stop
+from bywire.bench.kpis.families import units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.kpis.registry import units_of
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.stimulus import Stimulus
 from bywire.brakes.two_wheeler.case import (
     JUDGE,
     Course,
@@ -28,7 +28,7 @@ from bywire.core.quantities import Duration
 from bywire.plant import brake_disc
 from bywire.plant.road import SurfaceName
 
-# Built-in ride, our choice: a light pull, a moment's doubt, then all that the hand gives.
+# Built-in ride, our choice: a light pull, a short hesitation, then the full force of the hand.
 _TIMES = (0.0, 0.25, 0.9, 1.1, 1.3, 1.5, 3.0)  # s
 _FRONT = (0.0, 8e5, 10e5, 4e5, 5e5, 38e5, 34e5)  # Pa
 _REAR = (0.0, 3e5, 6e5, 6e5, 8e5, 20e5, 20e5)  # Pa
@@ -43,12 +43,12 @@ FIGURES = Figures(
 
 
 class Options(ParameterSet):
-    """The ride; demands are [stimulus.p_f_set] and [stimulus.p_r_set], built in without them."""
+    """The ride; demands are [stimulus.p_f_set] and [stimulus.p_r_set], or the built-in trace."""
 
     v_0: RidingSpeed
     """speed at the start"""
     surface: SurfaceName
-    """what the road is made of"""
+    """surface of the road"""
     duration: Duration
     """time recorded"""
 
@@ -61,10 +61,12 @@ def driven(_: Options) -> Mapping[str, str]:
 def cases(
     par: TwoWheelerParameters, options: Options, stimuli: Mapping[str, Stimulus] | None = None
 ) -> tuple[Case, ...]:
-    """Return the one run; of two demands, one that is not given stays at zero."""
-    given: dict[str, float | Course] = {name: each.sample for name, each in (stimuli or {}).items()}
+    """Return the single run; with one demand given, the other is zero."""
+    custom: dict[str, float | Course] = {
+        name: each.sample for name, each in (stimuli or {}).items()
+    }
     built_in: dict[str, float | Course] = {name: _course(p) for name, p in _DRIVEN.items()}
-    demands = {**dict.fromkeys(_DRIVEN, 0.0), **given} if given else built_in
+    demands = {**dict.fromkeys(_DRIVEN, 0.0), **custom} if custom else built_in
     return (rolling_case(par, options.v_0, demands, options.duration, on_surface(options.surface)),)
 
 
@@ -72,8 +74,8 @@ def _course(values: tuple[float, ...]) -> Course:
     return lambda t: np.interp(t, _TIMES, values)
 
 
-def what_is_left(run: xr.Dataset, _: Options) -> tuple[Kpi, ...]:
-    """Return what is left of the rider's demand."""
+def rider_shares(run: xr.Dataset, _: Options) -> tuple[Kpi, ...]:
+    """Return the remaining shares of the rider's demand."""
     return FIGURES(**_shares(run))
 
 
@@ -85,13 +87,13 @@ def _shares(run: xr.Dataset) -> dict[str, float]:
     left, asked = 0.0, 0.0
     shares = {}
     for wheel, side, disc in (("front", "f", par.front.disc), ("rear", "r", par.rear.disc)):
-        p, wanted = (
+        p, demanded = (
             float(np.trapezoid(run[name].values[braked], t[braked]))
             for name in (f"p_{side}", f"p_{side}_set")
         )
-        shares[f"rider_share_{wheel}"] = 100.0 * p / wanted if wanted > 0 else math.nan
+        shares[f"rider_share_{wheel}"] = 100.0 * p / demanded if demanded > 0 else math.nan
         torque = brake_disc.torque_per_pressure(disc)
-        left, asked = left + torque * p, asked + torque * wanted
+        left, asked = left + torque * p, asked + torque * demanded
     return {**shares, "rider_share": 100.0 * left / asked if asked > 0 else math.nan}
 
 
@@ -103,7 +105,7 @@ EXPERIMENT = Experiment(
     defaults=Options(v_0=30.0, surface="wet-asphalt", duration=8.0),
     cases=cases,
     judge=replace(
-        JUDGE, further=what_is_left, further_signals=("v", "p_f", "p_r", "p_f_set", "p_r_set")
+        JUDGE, further=rider_shares, further_signals=("v", "p_f", "p_r", "p_f_set", "p_r_set")
     ),
     kpis=FIGURES.units | units_of("vehicle_stop"),
     figures=("road-marks", "time-traces", "energy-balance"),

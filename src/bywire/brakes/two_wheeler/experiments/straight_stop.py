@@ -1,9 +1,23 @@
-"""Straight stop: the rider demands more than the road holds, with slip control or without."""
+"""Panic stops: the rider demands more than the road holds, with slip control or without.
+
+The same demand on one surface, with a whole brake by wire at the rear wheel, with ever quicker
+brakes, and across a change of the surface.
+"""
 
 from __future__ import annotations
 
-from bywire.bench.experiment import Case, Experiment
-from bywire.bench.kpis.registry import units_of
+import math
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+import xarray as xr
+from pydantic import Field
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import vehicle_stop
+from bywire.bench.kpis.families import units_of
+from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.two_wheeler.case import (
     JUDGE,
     Demand,
@@ -11,17 +25,18 @@ from bywire.brakes.two_wheeler.case import (
     locked_stop,
     on_surface,
     rolling_case,
+    vehicle_of,
 )
-from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
+from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters, WholeRearParameters
+from bywire.brakes.two_wheeler.rigs.whole_rear import TwoWheelerWholeRear, at_speed
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import TimeConstant
-from bywire.plant.road import SurfaceName
+from bywire.core.quantities import Duration, Nodes, TimeConstant, Unit
+from bywire.plant import adhesion, road
+from bywire.plant.road import Distance, SurfaceName
 
-_FROM = 100.0 / 3.6
 
-
-class Options(ParameterSet):
-    """The stop, and the surface; slope and controllers are parameters."""
+class PanicOptions(ParameterSet):
+    """Speed and demands, the same in every panic stop."""
 
     v_0: RidingSpeed
     """speed at the start"""
@@ -29,28 +44,261 @@ class Options(ParameterSet):
     """front pressure that the rider demands"""
     p_rear: Demand
     """rear pressure that the rider demands"""
+
+
+def _demands(options: PanicOptions) -> dict[str, float]:
+    return {"p_f_set": options.p_front, "p_r_set": options.p_rear}
+
+
+# --- On one surface
+
+
+class StraightStopOptions(PanicOptions):
+    """The stop, and the surface; slope and controllers are parameters."""
+
     surface: SurfaceName
-    """what the road is made of"""
+    """surface of the road"""
     duration: TimeConstant
-    """time recorded; 0 for as long as locked wheels take on this surface, and a little more"""
+    """time recorded; 0 for the stopping time of locked wheels on this surface, with a margin"""
 
 
-def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the one run."""
-    demands = {"p_f_set": options.p_front, "p_r_set": options.p_rear}
+def straight_stop(
+    par: TwoWheelerParameters, options: StraightStopOptions, _: object = None
+) -> tuple[Case, ...]:
+    """Return the single run."""
     changes = on_surface(options.surface)
     duration = options.duration or locked_stop(options.v_0, par.replace(changes).vehicle)
-    return (rolling_case(par, options.v_0, demands, duration, changes),)
+    return (rolling_case(par, options.v_0, _demands(options), duration, changes),)
 
 
-EXPERIMENT = Experiment(
+STRAIGHT_STOP = Experiment(
     name="straight-stop",
     assembly="two-wheeler-by-wire",
     summary="panic stop from {v_0:km/h} with {p_front} in front and {p_rear} behind, on {surface}",
-    options=Options,
-    defaults=Options(v_0=_FROM, p_front=40e5, p_rear=40e5, surface="dry-asphalt", duration=0.0),
-    cases=cases,
+    options=StraightStopOptions,
+    defaults=StraightStopOptions(
+        v_0=100.0 / 3.6, p_front=40e5, p_rear=40e5, surface="dry-asphalt", duration=0.0
+    ),
+    cases=straight_stop,
     judge=JUDGE,
     kpis=units_of("vehicle_stop"),
+    figures=("road-marks", "time-traces", "energy-balance"),
+)
+
+
+# --- With a whole brake by wire at the rear wheel
+
+ACTUATOR_FIGURES = Figures(
+    rear_energy=("J", "Energy that the rear brake draws until the vehicle stands."),
+    rear_current=("A", "Largest magnitude of the current of its motor until then."),
+    rear_pressure_error=(
+        "Pa",
+        "Root mean square of the demand on the rear brake minus the pressure at its pads.",
+    ),
+)
+_ACTUATOR_SIGNALS = ("v", "E_rear_source", "rear_i", "p_r_ref", "p_r")
+
+
+def whole_rear_stop(
+    par: WholeRearParameters, options: StraightStopOptions, _: object = None
+) -> tuple[Case, ...]:
+    """Return the single run."""
+    changes = {**on_surface(options.surface), "rear.actuator.drive.mode": "pressure"}
+    duration = options.duration or locked_stop(options.v_0, par.replace(changes).vehicle)
+    vehicle = (TwoWheelerWholeRear, at_speed)
+    return (rolling_case(par, options.v_0, _demands(options), duration, changes, vehicle=vehicle),)
+
+
+def actuator_effort(run: xr.Dataset, _: StraightStopOptions) -> tuple[Kpi, ...]:
+    """Return energy, current and pressure error of the rear actuator until the vehicle stands."""
+    t, *signals = (run[name].values for name in ("time", *_ACTUATOR_SIGNALS))
+    end = vehicle_stop.standstill(t, signals[0])
+    braked = (t >= 0.0) & (t <= (end if math.isfinite(end) else math.inf))
+    energy, current, p_ref, p = (each[braked] for each in signals[1:])
+    return ACTUATOR_FIGURES(
+        rear_energy=float(energy[-1] - energy[0]),
+        rear_current=float(np.abs(current).max()),
+        rear_pressure_error=float(np.sqrt(np.mean((p_ref - p) ** 2))),
+    )
+
+
+WHOLE_REAR_STOP = Experiment(
+    name="whole-rear-stop",
+    assembly="two-wheeler-whole-rear",
+    summary="panic stop with the whole motorcycle brake by wire at the rear wheel, {p_rear}",
+    options=StraightStopOptions,
+    defaults=StraightStopOptions(
+        v_0=30.0, p_front=40e5, p_rear=40e5, surface="wet-asphalt", duration=0.0
+    ),
+    cases=whole_rear_stop,
+    judge=replace(JUDGE, further=actuator_effort, further_signals=_ACTUATOR_SIGNALS),
+    kpis=ACTUATOR_FIGURES.units | units_of("vehicle_stop"),
+    figures=("road-marks", "time-traces", "energy-balance"),
+)
+
+
+# --- Over the bandwidth of the brakes: the benefit of faster actuators
+
+_COMPARED = {
+    "stopping_distance": "m",
+    "braking_efficiency": "%",
+    "peak_slip_front": "1",
+    "jerk": "m/s**3",
+    "locked_time_front": "s",
+}
+
+
+class BandwidthsOptions(PanicOptions):
+    """The stop, and the natural frequencies of both pressure loops."""
+
+    surface: SurfaceName
+    """surface of the road"""
+    f_n: Annotated[Nodes, Unit("Hz", 10.0), Field(min_length=1)]
+    """natural frequencies of the pressure loops, one run each"""
+    duration: Duration
+    """time recorded"""
+
+
+def _label(f: float) -> str:
+    return f"{f:g} Hz"
+
+
+def bandwidths(
+    par: TwoWheelerParameters, options: BandwidthsOptions, _: object = None
+) -> tuple[Case, ...]:
+    """Return a run for each frequency."""
+    return tuple(
+        rolling_case(
+            par,
+            options.v_0,
+            _demands(options),
+            options.duration,
+            {
+                "front.circuit.f_n": f,
+                "rear.circuit.f_n": f,
+                **on_surface(options.surface),
+            },
+            _label(f),
+        )
+        for f in options.f_n
+    )
+
+
+def judge_bandwidths(recordings: Recordings, options: BandwidthsOptions) -> tuple[Kpi, ...]:
+    """Return the figures by which the stops differ, with the frequency behind each name."""
+    return tuple(
+        Kpi(f"{kpi.name}_{f:g}Hz", kpi.value, kpi.unit, kpi.definition, kpi.note)
+        for f in options.f_n
+        for kpi in JUDGE({"run": recordings[_label(f)]}, options)
+        if kpi.name in _COMPARED
+    )
+
+
+def bandwidths_units(options: BandwidthsOptions) -> dict[str, str]:
+    """Return the unit of every key figure."""
+    return {f"{name}_{f:g}Hz": unit for f in options.f_n for name, unit in _COMPARED.items()}
+
+
+_BANDWIDTHS = BandwidthsOptions(
+    v_0=30.0,
+    p_front=40e5,
+    p_rear=40e5,
+    surface="wet-asphalt",
+    f_n=(2.0, 3.0, 5.0, 10.0, 20.0, 40.0, 100.0),
+    duration=7.0,
+)
+
+BANDWIDTHS = Experiment(
+    name="bandwidths",
+    assembly="two-wheeler-by-wire",
+    summary="controlled stops from {v_0} on {surface} with pressure loops of {f_n}",
+    options=BandwidthsOptions,
+    defaults=_BANDWIDTHS,
+    cases=bandwidths,
+    judge=judge_bandwidths,
+    kpis=bandwidths_units(_BANDWIDTHS),
+    named=bandwidths_units,
+    figures=("overlaid-traces",),
+    compared={
+        "v": "speed",
+        "a": "deceleration",
+        "slip_f": "front slip",
+        "p_f": "front pressure",
+    },
+)
+
+
+# --- Across a change of the surface
+
+_CALM = 1.2  # of the peak's slip
+
+JUMP_FIGURES = Figures(
+    recovery_time=(
+        "s",
+        "Time from the front wheel's step onto the further surface until its slip stays below "
+        f"{_CALM:g} of the slip of the peak there, above {vehicle_stop.SLOW:g} m/s.",
+    ),
+    jump_speed=("m/s", "Speed at that step."),
+)
+
+
+class SurfaceJumpOptions(PanicOptions):
+    """The stop, and the two surfaces."""
+
+    first: SurfaceName
+    """surface at the start"""
+    further: SurfaceName
+    """surface from x_change on"""
+    x_change: Distance
+    """place where that surface begins"""
+    duration: Duration
+    """time recorded"""
+
+
+def surface_jump(
+    par: TwoWheelerParameters, options: SurfaceJumpOptions, _: object = None
+) -> tuple[Case, ...]:
+    """Return the single run."""
+    changes = {
+        **on_surface(options.first, options.further),
+        "vehicle.road.x_change": options.x_change,
+        "vehicle.road.x_back": options.x_change + 1e6,
+    }
+    return (rolling_case(par, options.v_0, _demands(options), options.duration, changes),)
+
+
+def recovery(run: xr.Dataset, options: SurfaceJumpOptions) -> tuple[Kpi, ...]:
+    """Return the front wheel's recovery on the further surface."""
+    t, x, v = (run[name].values for name in ("time", "x", "v"))
+    if not np.any(x > options.x_change):
+        undefined = (math.nan, "the vehicle stops before the further surface")
+        return JUMP_FIGURES(recovery_time=undefined, jump_speed=undefined)
+    k = int(np.argmax(x > options.x_change))
+    begin = float(np.interp(options.x_change, x[: k + 1], t[: k + 1]))
+    ground = road.surface(options.x_change + 1.0, vehicle_of(run).road)
+    beyond = (t > begin) & (v > vehicle_stop.SLOW)
+    peak = adhesion.peak_slip(ground, vehicle_of(run).front_tyre)
+    beyond &= run["slip_f"].values > _CALM * peak
+    last = float(t[np.flatnonzero(beyond)[-1]]) if beyond.any() else begin
+    return JUMP_FIGURES(recovery_time=last - begin, jump_speed=float(np.interp(begin, t, v)))
+
+
+SURFACE_JUMP = Experiment(
+    name="surface-jump",
+    assembly="two-wheeler-by-wire",
+    summary="panic stop from {v_0}, {first} turns {further} after {x_change:m}",
+    options=SurfaceJumpOptions,
+    defaults=SurfaceJumpOptions(
+        v_0=30.0,
+        p_front=40e5,
+        p_rear=40e5,
+        first="dry-asphalt",
+        further="wet-asphalt",
+        x_change=15.0,
+        duration=6.0,
+    ),
+    cases=surface_jump,
+    judge=replace(JUDGE, further=recovery, further_signals=("x", "v", "slip_f")),
+    kpis=JUMP_FIGURES.units | units_of("vehicle_stop"),
     figures=("road-marks", "time-traces", "energy-balance"),
 )

@@ -22,7 +22,7 @@ Load = Annotated[float, Unit("N", 2e3), Field(gt=0, allow_inf_nan=False)]
 
 
 class DrumParameters(ParameterSet):
-    """The drum: its surface keeps its speed, whatever the wheel does."""
+    """The drum: its surface has a constant speed."""
 
     v: DrumSpeed
     """speed of its surface"""
@@ -47,14 +47,14 @@ Par = WheelOnDrumParameters
 
 
 class Stimulus(NamedTuple):
-    """What slip control is to hold, and what it may use."""
+    """Slip demand, and the pressure that slip control may lower."""
 
     slip_set: Annotated[float, Signal("1", "slip demand", 0.1)]
     p_set: Annotated[float, Signal("Pa", "pressure that may be lowered", 4e6), Ge(0)]
 
 
 class Memory(NamedTuple):
-    """What slip control holds between its ticks."""
+    """Memory of slip control between its ticks."""
 
     p_ref: Annotated[
         float, Signal("Pa", "pressure set point", 2e6, set_point_of="p"), Limited("p_set")
@@ -66,9 +66,9 @@ class Memory(NamedTuple):
 
 
 class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
-    """The wheel turns, so that brake and rolling resistance are a torque that linear models see.
+    """A turning wheel, so that brake and rolling resistance are a torque in linear models.
 
-    Where it would lock, this rig is no longer right, and says so.
+    The rig is not valid where the wheel would lock; a warning then says so.
     """
 
     name: ClassVar[str] = "wheel-on-drum"
@@ -87,7 +87,7 @@ class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
     slip = Shown("1", "braking slip", 0.1)
 
     def wire(self, w: Self) -> None:
-        """Say what wheel, tyre and brake feel."""
+        """Connect wheel, tyre and brake."""
         drum, surface = w.par.drum, adhesion.surface_of(w.par.drum.surface)
         limits = tyre.limits(
             tyre.Contact(drum.v, road_wheel.tread_speed(w.wheel.xe, w.wheel.par), *surface),
@@ -104,7 +104,7 @@ class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
         w.wheel.u = road_wheel.Input(w.F, -w.T)
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return what the drum gives and the brake takes."""
+        """Return the powers of drum and brake."""
         return {"W_drum": w.F * w.par.drum.v, "E_brake": w.T * w.wheel.x.omega}
 
     def record(self, w: Self) -> dict[str, float]:
@@ -116,11 +116,11 @@ class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
         return (Task("slip", par.T_s, tick),)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
-        """Return what the user should know of a recording."""
-        said = super().watch(recording, par)
+        """Return the warnings about a recording."""
+        warnings = super().watch(recording, par)
         if "omega" in recording and bool((recording["omega"] <= 0).any()):
-            said.append("the wheel came to a stop: on this rig it would turn backward then")
-        return said
+            warnings.append("the wheel came to a stop: on this rig it would turn backward then")
+        return warnings
 
     def rest(self, par: Par) -> tuple[Any, Any]:
         """Return the wheel rolling freely on the drum."""

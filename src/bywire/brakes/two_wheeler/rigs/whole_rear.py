@@ -1,8 +1,8 @@
 """The two-wheeler with a whole brake by wire at its rear wheel: that of Dardanelli et al. (2010).
 
-The front brake is known by the loop of its pressure alone. At the rear there is all of the other
-one: battery, motor, screw, cylinder, line, caliper, and an ECU with dither that follows what slip
-control leaves of the rider's demand.
+The front brake is modeled by its pressure loop alone. The rear brake is complete: battery, motor,
+screw, cylinder, line, caliper, and an ECU with dither that follows the rider's demand, lowered by
+slip control.
 """
 
 from __future__ import annotations
@@ -19,14 +19,13 @@ from bywire.core.model import Task
 from bywire.core.parts import Part, Wire
 from bywire.core.subassembly import Sub
 from bywire.plant import brake_disc, pressure_loop, wheel_encoder
-from bywire.vehicle.hot_brakes import HotBrakes, cold_start
-from bywire.vehicle.two_wheeler import rolling_start
+from bywire.vehicle.two_wheeler import HotBrakes, cold_start, rolling_start
 
 Par = WholeRearParameters
 
 
 class TwoWheelerWholeRear(HotBrakes[WholeRearParameters, Any]):
-    """The vehicle's ECU lowers what the rear brake's own ECU is asked for.
+    """A vehicle whose ECU lowers the demand on the rear brake's ECU.
 
     The pads press as hard as the caliper pushes them: a caliper that sticks drags.
     """
@@ -52,7 +51,7 @@ class TwoWheelerWholeRear(HotBrakes[WholeRearParameters, Any]):
     records: ClassVar[tuple[str, ...]] = (*TwoWheelerByWire.records, *actuator.records)
 
     def cold_torques(self, w: Self) -> tuple[float, float]:
-        """Return what cold discs hold at the pressures that press the pads."""
+        """Return the torques that cold discs hold at the pressures on the pads."""
         w.p_r = w.actuator.pads.x.p
         w.front_circuit.u = pressure_loop.Input(w.m.p_f_ref)
         w.front_encoder.u = wheel_encoder.Input(w.front.x.omega)
@@ -83,12 +82,12 @@ def at_speed(
     heat
         Temperatures of the brakes by their parts, see `cold_start`, which is the default.
     p_rear
-        Pressure [Pa] that the rear brake's own ECU holds, and the vehicle's demands.
+        Pressure [Pa] that the rear brake's ECU holds, and the vehicle's demands.
     """
     warm = cold_start(par.front.heat, par.rear.heat) if heat is None else heat
     vehicle, brake = rolling_start(v, par.vehicle), par.rear.actuator
-    own = awake(v, par.vehicle, par.ecu.T_s)._replace(p_r_ref=p_rear, p_r_most=p_rear)
+    memory = awake(v, par.vehicle, par.ecu.T_s)._replace(p_r_ref=p_rear, p_r_most=p_rear)
     return (
         TwoWheelerWholeRear.state(**vehicle, **warm, actuator=resting_at(p_rear, brake)),
-        TwoWheelerWholeRear.memory(own, actuator=memory_at(p_rear, brake)),
+        TwoWheelerWholeRear.memory(memory, actuator=memory_at(p_rear, brake)),
     )

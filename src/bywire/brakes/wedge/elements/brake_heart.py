@@ -17,7 +17,7 @@ Loss = Annotated[
     float,
     Signal(
         "W",
-        "loss in the heart's contacts, less its energy at start",
+        "loss in the heart's contacts, minus its energy at start",
         role=Role("sink", "brake heart"),
     ),
 ]
@@ -135,7 +135,7 @@ def matrix(
 
 
 def depths(u: Input, par: Parameters) -> Overlaps:
-    """Return the overlaps without damping, which are negative where there is air."""
+    """Return the overlaps without damping, which are negative in a gap."""
     return Overlaps(
         d_1=u.x - u.X_1 - par.g_1,
         d_2=u.X_2 - u.x - par.g_2,
@@ -189,7 +189,7 @@ def output(f: Forces) -> Output:
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return how the travels move: the heart stores energy, and they are its ports."""
+    """Return the rates of the travels, the ports of the heart's stored energy."""
     return InputRate(X_1=u.V_1, X_2=u.V_2, x=u.v)
 
 
@@ -206,5 +206,5 @@ def power_in(u: Input, f: Forces) -> Work:
 
 
 def power_loss(u: Input, f: Forces, par: Parameters) -> Loss:
-    """Return what the contacts take and do not store, >= 0."""
+    """Return the power that the contacts dissipate, >= 0."""
     return power_in(u, f) - power_in(u, solve(depths(u, par), par))

@@ -29,7 +29,7 @@ class Parameters(ParameterSet):
     k_return: SpringRate
     """return spring toward the middle; 0 for none"""
     x_stop: Length
-    """travel at which the end stops stand, on either side"""
+    """travel of the end stops, on either side"""
 
 
 FAULTS = (
@@ -53,14 +53,14 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What drives travel and velocity."""
+    """Right-hand sides of travel and velocity."""
 
     x: Annotated[float, Signal("m/s", "wedge velocity", 0.02)]
     v: Annotated[float, Signal("N", "accelerating force", 100.0)]
 
 
 class Input(NamedTuple):
-    """Forces on the wedge, the side on which it stands, and the disc's direction."""
+    """Forces on the wedge, its side, and the disc's direction."""
 
     F_M: Annotated[float, Signal("N", "actuation force", 400.0)]
     F_N: Annotated[float, Signal("N", "normal force", 3e3)]

@@ -19,7 +19,7 @@ Work = Annotated[float, Signal("W", "work on the caliper")]
 Loss = Annotated[
     float,
     Signal(
-        "W", "loss in the caliper, less its energy at start", role=Role("sink", "caliper damping")
+        "W", "loss in the caliper, minus its energy at start", role=Role("sink", "caliper damping")
     ),
 ]
 NormalForce = Annotated[float, Signal("N", "normal force", 3e3)]
@@ -29,11 +29,11 @@ class Parameters(ParameterSet):
     """Pads, disc and caliper as one spring that presses and never pulls.
 
     ``law``: ``"linear"`` is the stiffness; ``"table"`` interpolates a measured curve of force and
-    travel and goes on beyond its end with its last slope.
+    travel and continues beyond its end with its last slope.
     """
 
     law: Literal["linear", "table"]
-    """which relation of travel and force holds"""
+    """relation of travel and force"""
     K_cal: Stiffness
     """stiffness of caliper and pads; used by law "linear" only"""
     n_table: Annotated[Nodes, Unit("m", 1e-4)]
@@ -74,19 +74,19 @@ FAULTS = (
 def _require_rising(name: str, unit: str, nodes: Nodes) -> None:
     if not nodes:
         return
-    wanted = f"{name} must hold 2 nodes or more, from 0 {unit} and increasing"
+    rule = f"{name} must hold 2 nodes or more, from 0 {unit} and increasing"
     if len(nodes) < 2 or nodes[0] != 0.0:
-        raise ValueError(f"{wanted}: it holds {len(nodes)}, the first is {nodes[0]:g} {unit}")
+        raise ValueError(f"{rule}: it holds {len(nodes)}, the first is {nodes[0]:g} {unit}")
     for k, (a, b) in enumerate(pairwise(nodes), 2):
         if b <= a:
             raise ValueError(
-                f"{wanted}, but as node {k} of {len(nodes)}, {b:g} {unit} follows {a:g} {unit}: "
+                f"{rule}, but as node {k} of {len(nodes)}, {b:g} {unit} follows {a:g} {unit}: "
                 "sort the nodes, and leave out those where the curve does not rise"
             )
 
 
 class Input(NamedTuple):
-    """Wedge, its slope and side, the disc's run-out, and what an adjuster took away."""
+    """Wedge, its slope and side, the disc's run-out, and the adjuster's travel."""
 
     x: Annotated[float, Signal("m", "wedge travel", 5e-3)]
     v: Annotated[float, Signal("m/s", "wedge velocity", 0.02)]
@@ -99,7 +99,7 @@ class Input(NamedTuple):
 
 
 class InputRate(NamedTuple):
-    """Derivatives of what the stored energy depends on; slope and side stand still."""
+    """Derivatives of the arguments of the stored energy; slope and side are constant."""
 
     x: Annotated[float, Signal("m/s", "wedge velocity", 0.02)]
     side: Annotated[float, Signal("1/s", "rate of the side")]
@@ -150,9 +150,9 @@ def normal_force(
 
     Notes
     -----
-    Contacts have constant compliances, which decides on touching. The table bends what they give:
-    C f is the overlap, damped, so that the damping takes tau times the slope of the curve at small
-    rates, never pulls, and never gives energy, for the curve rises.
+    Contacts have constant compliances, which decide on touching. The table bends their forces:
+    C f is the damped overlap. So the damping is tau times the slope of the curve at small rates.
+    It never pulls and never adds energy, because the curve rises.
     """
     if par.law == "linear":
         return f
@@ -195,7 +195,7 @@ def moment(
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return how wedge, disc and adjuster move."""
+    """Return the rates of wedge, disc and adjuster."""
     return InputRate(x=u.v, side=0.0, tan_alpha=0.0, runout=u.runout_rate, taken=u.taking)
 
 
@@ -217,7 +217,7 @@ def power_in(u: Input, f: Forces) -> Work:
 
 
 def power_loss(u: Input, f: Forces, par: Parameters) -> Loss:
-    """Return what the damping takes, >= 0."""
+    """Return the power that the damping dissipates, >= 0."""
     return (f.F_N - _elastic_force(ops.fmax(depth(u, par), 0.0), par)) * closing(u)
 
 
@@ -229,7 +229,7 @@ def _elastic_force(n: float, par: Parameters) -> float:
 
 
 def _bent(n: float, par: Parameters) -> float:
-    """Return what the table gives beyond its first slope [N]."""
+    """Return the force of the table in excess of its first slope [N]."""
     force = 0.0 * n / compliance(par)
     for (n_k, _), before, after in _bends(par):
         force = force + (after - before) * ops.fmax(n - n_k, 0.0)

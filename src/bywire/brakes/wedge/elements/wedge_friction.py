@@ -14,8 +14,8 @@ from bywire.core.signals import Power, Signal
 class Parameters(ParameterSet):
     """Coulomb friction, set-valued at rest.
 
-    ``stopped_disc``: ``"drop"`` leaves the pad's friction out once the disc stands, as the paper
-    does (worst case for the actuator); ``"stick"`` lets the standing disc hold the wedge.
+    ``stopped_disc``: ``"drop"`` drops the pad's friction once the disc stands, as in the paper
+    (worst case for the actuator); ``"stick"`` lets the standing disc hold the wedge.
     """
 
     mu_int: Gain
@@ -23,7 +23,7 @@ class Parameters(ParameterSet):
     mu_R: Gain
     """coefficient of friction of the rollers"""
     stopped_disc: Literal["drop", "stick"]
-    """what the pad does to the wedge while the disc stands"""
+    """friction of the pad on the wedge while the disc stands"""
 
 
 FAULTS = (
@@ -32,7 +32,7 @@ FAULTS = (
 
 
 class Input(NamedTuple):
-    """Forces that press, the wedge's slope and the pad's friction."""
+    """Pressing forces, the wedge's slope and the pad's friction."""
 
     squeeze: Annotated[float, Signal("N", "sum of the screws' forces on the wedge", 800.0)]
     F_N: Annotated[float, Signal("N", "normal force", 3e3)]

@@ -1,100 +1,119 @@
-"""Corner stop: the wedge brake stops a quarter of a car, holds it, and lets go.
-
-The moment is demanded until the vehicle stands and beyond. What the tyre does to the brake at the
-end is the subject: it rocks back, and the wheel with it as far as the pads let it.
-"""
+"""Stops of a car's corner: a stop that is held, and a panic stop beyond the road's adhesion."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.kpis.vehicle_stop import standstill
+from bywire.bench.kpis.vehicle_stop import SLOW, standstill
 from bywire.brakes.wedge.case import mean, steps, swing
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCorner, WedgeCornerParameters, at_speed
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Temperature
+from bywire.plant import adhesion, road
 from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
 from bywire.vehicle.surfaces import laid
 
-_CALM = 1.0  # s from the stop on, in which tyre and brake come to rest
 
-FIGURES = Figures(
-    undefined="the vehicle does not stop before the brake lets go",
-    stopping_distance=("m", "Distance from the demand to the first standstill."),
-    stopping_time=("s", "Time from the demand to the first standstill."),
-    moment_before_stop=("N*m", "Mean moment of the sensor in the last half second of braking."),
-    peak_slip=("1", "Largest slip above a tenth of the speed at the start."),
-    rebound_speed=("m/s", "Largest speed backward after the stop."),
-    wheel_reversal=("rad", "How far the wheel turns back after the stop."),
-    force_held=("N", f"Mean normal force from {_CALM:g} s after the stop to the release."),
-    force_change=("N", "Normal force peak to peak in that time."),
-    creep_speed=("m/s", "Largest speed of the vehicle in that time."),
-    energy_braked=("J", "Energy taken from the wheel until the stop."),
-    disc_temperature=("K", "Temperature of the disc at the stop."),
-    contact_angle=("rad", "Where the moment control believes the pads to touch, from parking."),
-)
-
-
-class Options(ParameterSet):
-    """The stop."""
+class StopOptions(ParameterSet):
+    """Start, demand and road of both stops."""
 
     v_0: RidingSpeed
     """speed at the start"""
     M_brake: SomeMoment
     """moment demanded from time zero on"""
     surface: SurfaceName
-    """what the road is made of"""
+    """surface of the road"""
     T_disc: Temperature
     """temperature of the disc at the start, where heat counts (corner.heat.law)"""
+
+
+def _stop_case(
+    par: WedgeCornerParameters,
+    options: StopOptions,
+    changes: Mapping[str, str],
+    levels: Mapping[float, float],
+    duration: float,
+) -> Case:
+    """Return a stop with moments [N m] that are demanded from their times [s] on."""
+    given = {"command.mode": "moment", "flywheel.law": "coasting", **changes}
+    changed = par.replace(given | laid("corner.road", options.surface))
+    state, memory = at_speed(options.v_0, changed, options.T_disc)
+    return Case(
+        "run",
+        WedgeCorner(),
+        changed,
+        state,
+        memory,
+        lambda t: {"M_set": steps(t, levels)},
+        duration,
+        start=lambda par: at_speed(options.v_0, par, options.T_disc),
+    )
+
+
+# --- Stop, hold and release: the tyre rocks back, and the wheel with it as far as the pads let it
+
+_CALM = 1.0  # s from the stop on, in which tyre and brake come to rest
+
+STOP_FIGURES = Figures(
+    undefined="the vehicle does not stop before the brake lets go",
+    stopping_distance=("m", "Distance from the demand to the first standstill."),
+    stopping_time=("s", "Time from the demand to the first standstill."),
+    moment_before_stop=("N*m", "Mean moment of the sensor in the last half second of braking."),
+    peak_slip=("1", "Largest slip above a tenth of the speed at the start."),
+    rebound_speed=("m/s", "Largest speed backward after the stop."),
+    wheel_reversal=("rad", "Angle by which the wheel turns back after the stop."),
+    force_held=("N", f"Mean normal force from {_CALM:g} s after the stop to the release."),
+    force_change=("N", "Normal force peak to peak in that time."),
+    creep_speed=("m/s", "Largest speed of the vehicle in that time."),
+    energy_braked=("J", "Energy taken from the wheel until the stop."),
+    disc_temperature=("K", "Temperature of the disc at the stop."),
+    contact_angle=("rad", "Estimated motor angle at which the pads touch, from parking."),
+)
+
+
+class CornerStopOptions(StopOptions):
+    """The stop."""
+
     t_hold: Duration
     """time until the demand falls to zero"""
     t_end: Duration
     """time recorded after it"""
 
 
-def cases(par: WedgeCornerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the one run."""
-    given = {"command.mode": "moment", "flywheel.law": "coasting", "ecu.abs": "off"}
-    changed = par.replace(given | laid("corner.road", options.surface))
-    state, memory = at_speed(options.v_0, changed, options.T_disc)
+def corner_stop(
+    par: WedgeCornerParameters, options: CornerStopOptions, _: object = None
+) -> tuple[Case, ...]:
+    """Return the single run."""
     levels = {0.0: options.M_brake, options.t_hold: 0.0}
-    return (
-        Case(
-            "run",
-            WedgeCorner(),
-            changed,
-            state,
-            memory,
-            lambda t: {"M_set": steps(t, levels)},
-            options.t_hold + options.t_end,
-            start=lambda par: at_speed(options.v_0, par, options.T_disc),
-        ),
-    )
+    return (_stop_case(par, options, {"ecu.abs": "off"}, levels, options.t_hold + options.t_end),)
 
 
-def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return how the corner stops, and what is held then."""
+def judge_stop(recordings: Recordings, options: CornerStopOptions) -> tuple[Kpi, ...]:
+    """Return the key figures of the stop and of the hold after it."""
     run = recordings["run"]
     held = run.sel(time=slice(None, options.t_hold - 1e-9))
     end = standstill(held["time"].values, held["v_x"].values)
     if math.isnan(end):
-        return FIGURES(**dict.fromkeys(FIGURES.units, math.nan))
-    return FIGURES(**_stop(held, end, options))
+        return STOP_FIGURES(**dict.fromkeys(STOP_FIGURES.units, math.nan))
+    return STOP_FIGURES(**_stop(held, end, options))
 
 
-def _stop(held: xr.Dataset, end: float, options: Options) -> dict[str, float | tuple[float, str]]:
+def _stop(
+    held: xr.Dataset, end: float, options: CornerStopOptions
+) -> dict[str, float | tuple[float, str]]:
     t, v = held["time"].values, held["v_x"].values
     begin, last = end + _CALM, options.t_hold
     late = t >= begin
     fast = v > 0.1 * options.v_0
-    short = (math.nan, f"less than {_CALM:g} s are held after the stop")
+    short = (math.nan, f"the brake holds for less than {_CALM:g} s after the stop")
     return {
         "stopping_distance": float(np.interp(end, t, held["s"].values)),
         "stopping_time": end,
@@ -111,16 +130,111 @@ def _stop(held: xr.Dataset, end: float, options: Options) -> dict[str, float | t
     }
 
 
-EXPERIMENT = Experiment(
+CORNER_STOP = Experiment(
     name="corner-stop",
     assembly="wedge-corner",
     summary="the wedge brake stops a quarter of a car from {v_0:km/h} with {M_brake}, and holds it",
-    options=Options,
-    defaults=Options(
+    options=CornerStopOptions,
+    defaults=CornerStopOptions(
         v_0=50.0 / 3.6, M_brake=600.0, surface="dry-asphalt", T_disc=293.15, t_hold=5.5, t_end=0.5
     ),
-    cases=cases,
-    judge=judge,
-    kpis=FIGURES.units,
+    cases=corner_stop,
+    judge=judge_stop,
+    kpis=STOP_FIGURES.units,
+    figures=("time-traces", "energy-balance"),
+)
+
+
+# --- Panic stop: more moment is demanded than the road holds
+
+PANIC_FIGURES = Figures(
+    undefined="the vehicle does not stop in the recorded time: give a longer options.duration",
+    stopping_distance=("m", "Distance from the demand to the first standstill."),
+    stopping_time=("s", "Time from the demand to the first standstill."),
+    braking_efficiency=("%", "Ideal stopping distance on this road over the distance."),
+    first_bite=("s", "Time from the demand until the pads touch."),
+    peak_slip=("1", f"Largest slip above {SLOW:g} m/s."),
+    locked_time=("s", f"Time in which the wheel stands, above {SLOW:g} m/s."),
+    peak_moment=("N*m", "Largest moment of the brake."),
+    supply_energy=("J", "Energy that the drives take until the stop."),
+    disc_energy=("J", "Energy taken from the wheel until the stop."),
+    disc_temperature=("K", "Highest temperature of the disc until the stop."),
+)
+
+
+class CornerPanicOptions(StopOptions):
+    """The stop; slip control is a parameter, ``ecu.abs``."""
+
+    duration: Duration
+    """time recorded"""
+
+
+def corner_panic(
+    par: WedgeCornerParameters, options: CornerPanicOptions, _: object = None
+) -> tuple[Case, ...]:
+    """Return the single run."""
+    return (_stop_case(par, options, {}, {0.0: options.M_brake}, options.duration),)
+
+
+def judge_panic(recordings: Recordings, options: CornerPanicOptions) -> tuple[Kpi, ...]:
+    """Return the key figures of the stop."""
+    run = recordings["run"]
+    t, v = run["time"].values, run["v_x"].values
+    end = standstill(t, v)
+    braked = (t >= 0) & (t <= end if math.isfinite(end) else np.isfinite(t))
+    fast = braked & (v > SLOW)
+    stands = fast & (run["Omega"].values == 0)
+    touches = braked & (run["F_N"].values > 0)
+    never = (math.nan, "the pads never touch")
+    figures: dict[str, float | tuple[float, str]] = {
+        "stopping_time": end,
+        "first_bite": float(t[np.argmax(touches)]) if touches.any() else never,
+        "peak_slip": float(np.max(run["slip"].values[fast], initial=0.0)),
+        "locked_time": float(np.sum(np.diff(t)[stands[:-1]])),
+        "peak_moment": float(np.max(run["M_B"].values[braked])),
+        "disc_temperature": float(np.max(run["T_disc"].values[braked])),
+    }
+    return PANIC_FIGURES(**figures, **_at_the_end(run, end, options.v_0))
+
+
+def _at_the_end(run: xr.Dataset, end: float, v_0: float) -> dict[str, float]:
+    if not math.isfinite(end):
+        names = ("stopping_distance", "braking_efficiency", "supply_energy", "disc_energy")
+        return dict.fromkeys(names, math.nan)
+
+    def spent(name: str) -> float:
+        at = np.interp([0.0, end], run["time"].values, run[name].values)
+        return float(at[1] - at[0])
+
+    distance = spent("s")
+    par = WedgeCornerParameters.model_validate_json(run.attrs["parameters"])
+    return {
+        "stopping_distance": distance,
+        "braking_efficiency": 100.0 * _ideal(v_0, par) / distance,
+        "supply_energy": spent("W_supply"),
+        "disc_energy": spent("E_brake"),
+    }
+
+
+def _ideal(v_0: float, par: WedgeCornerParameters) -> float:
+    """Return the shortest stopping distance [m]: the tyre at its peak from the demand on."""
+    corner = par.corner
+    ground, slope = road.surface(0.0, corner.road), road.slope(0.0, corner.road)
+    mu = adhesion.adhesion(adhesion.peak_slip(ground, corner.tyre), ground, corner.tyre)
+    a = corner.body.g * (mu * slope.cosine + slope.sine)
+    return v_0 * v_0 / (2.0 * a) if a > 0 else math.inf
+
+
+CORNER_PANIC = Experiment(
+    name="corner-panic",
+    assembly="wedge-corner",
+    summary="the wedge brake stops a quarter of a car from {v_0:km/h} on {surface} by slip control",
+    options=CornerPanicOptions,
+    defaults=CornerPanicOptions(
+        v_0=100.0 / 3.6, M_brake=1500.0, surface="wet-asphalt", T_disc=293.15, duration=5.0
+    ),
+    cases=corner_panic,
+    judge=judge_panic,
+    kpis=PANIC_FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )

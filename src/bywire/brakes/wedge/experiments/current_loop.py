@@ -11,8 +11,8 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import step_response
+from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.brakes.wedge.case import steps
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import check_current, shaft_case
@@ -30,7 +30,7 @@ _UNITS = {name: units_of("step_response")[name] for name in _FIGURES} | LAG.unit
 
 
 class Options(ParameterSet):
-    """The step, and what it is repeated with.
+    """The step, and the windings and gains with which it is repeated.
 
     A motor unit has two stators: both in parallel, one alone, or both in series.
     """
@@ -78,7 +78,7 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the figures of all steps, their names with the case's label behind."""
+    """Return the figures of all steps, each name followed by the label of its case."""
     kpis: list[Kpi] = []
     for label in _LABELS:
         setting = step_response.Setting("i_1", 0.0, 0.0, options.i_step)

@@ -1,7 +1,7 @@
 """Disc stop: a disc of little energy is braked to standstill, held, and released.
 
 Roberts et al. (2003), section "Wedge and calliper", drop the pad's friction on the wedge once the
-disc stands; that the standing pad sticks is the other reading. Both are run.
+disc stands. In the other reading the standing pad sticks. The experiment runs both.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ _CALM = 0.05  # time after the stop [s] in which wedge and current may still mov
 
 FIGURES = Figures(
     stopping_time=("s", "Time from the demand until the disc stands."),
-    stopping_angle=("rad", "Angle of the disc until then."),
-    moment_before_stop=("N*m", "Mean moment in the last tenth of braking; the run-out is in it."),
+    stopping_angle=("rad", "Angle that the disc turns until then."),
+    moment_before_stop=("N*m", "Mean moment in the last tenth of braking, run-out included."),
     force_before_stop=("N", "Mean normal force in the last tenth of braking."),
     force_held=("N", f"Mean normal force from {_CALM:g} s after the stop to the release."),
     force_change=("N", "Normal force peak to peak in that time."),
     reference_change=(
         "rad",
-        "How far the common reference moves toward clamping while the disc stands: wind-up.",
+        "Wind-up: travel of the common reference toward clamping while the disc stands.",
     ),
-    hold_power=("W", "Mean input power in the time of the held force, standby included."),
+    hold_power=("W", "Mean input power in that time, standby included."),
 )
 _UNITS = {**FIGURES.units, "release_time": "s", "parking_time": "s"}
 
@@ -53,7 +53,7 @@ class Options(ParameterSet):
     M_brake: SomeMoment
     """moment demanded"""
     Omega_0: DiscSpeed
-    """speed of the disc at the start; with the flywheel's inertia the energy to take"""
+    """speed of the disc at the start; with the flywheel's inertia it sets the energy to absorb"""
     t_hold: Duration
     """time from the start of braking until the demand falls to zero"""
     t_end: Duration
@@ -63,7 +63,7 @@ class Options(ParameterSet):
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return one run for each reading of what the pads do to the wedge on a standing disc."""
+    """Return one run for each reading of the pads' effect on the wedge while the disc stands."""
     levels = {0.0: options.M_brake, options.t_hold: 0.0}
     return tuple(
         case_from_parked(
@@ -84,7 +84,7 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def stop_figures(run: xr.Dataset, options: Options) -> dict[str, float] | str:
-    """Return key figures around the standstill of a run, or why there is none to judge."""
+    """Return key figures around the standstill of a run, or why it has none."""
     braked = run.sel(time=slice(-1e-9, options.t_hold - 1e-9))
     turns = np.abs(braked["Omega"].values) > parameters_of(run).flywheel.Omega_still
     if not turns[:1].any():
@@ -117,7 +117,7 @@ def _last_tenth(turning: xr.Dataset, signal: str) -> float:
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return how the disc stops, what is held on it, and how the brake lets go, per reading."""
+    """Return the figures of stop, hold and release for each reading."""
     kpis: list[Kpi] = []
     for reading in READINGS:
         run = recordings[reading]

@@ -1,4 +1,4 @@
-"""Force fight: two motors follow one reference, and differ; a force sensor between their screws."""
+"""Force fight: two unequal motors follow one reference, a force sensor between their screws."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pydantic import Field
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.wedge.case import mean
+from bywire.brakes.wedge.experiments.screw_position import SomeAngle
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.position_steps import SomeAngle
 from bywire.brakes.wedge.rigs.rig_case import peak, screw_case
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
@@ -32,7 +32,7 @@ APART = Figures(peak_difference=("rad", "Largest difference of the encoders."))
 
 
 class Options(ParameterSet):
-    """Three motions of the common reference, and by which shares motor 2 is changed."""
+    """Three motions of the common reference, and relative changes of motor 2."""
 
     a_step: SomeAngle
     """step of the reference"""
@@ -43,13 +43,13 @@ class Options(ParameterSet):
     f_sine: Frequency
     """frequency of the sine"""
     more_K: Share
-    """torque constant of motor 2 over that of the parameter set, less one"""
+    """torque constant of motor 2 over that of the parameter set, minus one"""
     more_J: Share
-    """inertia of motor 2 over that of the parameter set, less one"""
+    """inertia of motor 2 over that of the parameter set, minus one"""
     more_R: Share
-    """resistance of motor 2 over that of the parameter set, less one"""
+    """resistance of motor 2 over that of the parameter set, minus one"""
     more_D: Share
-    """viscous damping of motor 2 over that of the parameter set, less one"""
+    """viscous damping of motor 2 over that of the parameter set, minus one"""
     duration: Duration
     """time recorded of each motion"""
     record: Duration
@@ -57,7 +57,7 @@ class Options(ParameterSet):
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return every motion with the motors of the parameter set, and with motor 2 different."""
+    """Return every motion with equal motors, and with a changed motor 2."""
     modes = {"rig.mode_1": "position", "rig.mode_2": "position"}
     motor = par.motor_2
     different = {
@@ -81,7 +81,7 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the largest forces, with and without the difference between the motors."""
+    """Return the largest forces with equal and with unequal motors."""
     kpis: list[Kpi] = []
     for label in _LABELS:
         kpis += PEAK(f"_{label}", peak_force=peak(recordings[label], "y_F"))

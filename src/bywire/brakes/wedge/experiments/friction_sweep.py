@@ -14,25 +14,32 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi, Undefined
-from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.kpis.step_response import Setting
-from bywire.brakes.wedge.case import case_from_parked, mean, steps
+from bywire.brakes.wedge.case import (
+    FRICTIONLESS,
+    Coefficients,
+    case_from_parked,
+    mean,
+    steps,
+    tag,
+    with_friction,
+)
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.panels import COMPARED
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.series import FRICTIONLESS, Coefficients, tag, with_friction
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 
 _BAND = 0.05  # of the step: half width of the band in which a stable loop ends
 _LAST = 0.2  # of the hold
-_NO_ROW = "no row of the recording lies there: record more often"
+_NO_ROW = "the recording has no row in this time: record more often"
 
 EACH = Figures(
     stable=(
         "1",
-        "1 where the last fifth of the hold stays within 5 % of the step, no end stop met.",
+        "1 where the last fifth of the hold stays within 5 % of the step, without an end stop.",
     ),
     hold_power=("W", "Mean input power in the last fifth of the hold, standby included."),
     undefined=_NO_ROW,
@@ -48,11 +55,11 @@ ALL = Figures(
 
 
 class Options(ParameterSet):
-    """The step and what is varied.
+    """The step, and the variations.
 
-    ``slope``: ``"known"`` lets the controller believe in the slope of moment over angle that
-    belongs to each coefficient; ``"fixed"`` leaves it the slope of the parameter set.
-    ``friction``: ``"none"`` takes the brake's dry friction away, which helps to hold.
+    ``slope``: with ``"known"`` the controller assumes the slope of moment over angle that belongs
+    to each coefficient; with ``"fixed"`` it keeps the slope of the parameter set.
+    ``friction``: ``"none"`` removes the brake's dry friction, which helps to hold.
     """
 
     M_step: SomeMoment
@@ -70,7 +77,7 @@ class Options(ParameterSet):
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return one run for each friction coefficient, on a true disc: its ripple would hide all."""
+    """Return one run for each friction coefficient, on a true disc: run-out would hide the rest."""
     levels = {0.0: options.M_step}
     changes: dict[str, Any] = {"flywheel.runout": 0.0}
     if options.friction == "none":
@@ -90,12 +97,12 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def _stable(run: xr.Dataset, options: Options) -> tuple[float, str]:
-    """Return whether a moment ends within 5 % of the step, without the help of an end stop."""
+    """Return 1 where a moment ends within 5 % of the step, without the help of an end stop."""
     last = run.sel(time=slice((1.0 - _LAST) * options.t_hold, None))
     if not last.sizes["time"]:
         return math.nan, _NO_ROW
     if not last["F_N"].values.any():
-        return math.nan, "the pads do not press: there is no loop to judge"
+        return math.nan, "the pads do not press: the moment loop is open"
     away = np.abs(np.abs(last["M_B"].values) - options.M_step).max()
     return float(away <= _BAND * options.M_step and not run["F_end"].values.any()), ""
 
@@ -124,7 +131,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     slow = [f"{m:g}" for m, t in zip(options.mu_B, settling, strict=True) if math.isnan(t)]
     unjudged = sum(math.isnan(value) for value in stable)
     overall = ALL(
-        unstable=(math.nan, f"{unjudged} of them cannot be judged")
+        unstable=(math.nan, f"{unjudged} coefficients cannot be judged")
         if unjudged
         else float(sum(value == 0 for value in stable)),
         overshoot_max=Undefined(f"open at mu_B = {', '.join(unknown)}", is_open=True)

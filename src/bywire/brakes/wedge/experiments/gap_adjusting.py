@@ -1,6 +1,6 @@
-"""Gap adjusting: some applications with more clearance than there should be, and an adjuster.
+"""Gap adjusting: several applications with excess clearance, which an adjuster removes.
 
-Roberts et al. (2003) want an adjustment mechanism for their next prototype; the maneuver is ours.
+Roberts et al. (2003) plan an adjustment mechanism for their next prototype; the maneuver is ours.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import case_from_parked, first, steps
+from bywire.brakes.wedge.case import along_disc, case_from_parked, first, steps
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rows import along_disc
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Unit
 
@@ -24,15 +23,15 @@ Growth = Annotated[float, Unit("m", 2e-4), Field(ge=-1e-2, le=1e-2, allow_inf_na
 
 FIGURES = Figures(
     clicks=("1", "Teeth that the adjuster has turned."),
-    teeth_counted=("1", "Teeth that it believes to have turned: its log of the wear."),
-    turned_after=("1", "Applications before it turns for the first time."),
+    teeth_counted=("1", "Teeth that it counted: its log of the wear."),
+    turned_after=("1", "Applications before its first turn."),
     clearance_start=("m", "Clearance at the start."),
     clearance_end=("m", "Clearance at the end."),
-    gap_error=("m", "Clearance as the adjuster believes it at the end, less what it is."),
+    gap_error=("m", "Clearance estimated by the adjuster at the end, minus the true one."),
     contact_first=("s", "Time until the pads press, first application."),
     contact_last=("s", "Time until the pads press, last application."),
-    adjuster_work=("J", "Work of the adjuster on the caliper: 0 where it turns in the gap."),
-    undefined="the pads do not press, or nothing turns",
+    adjuster_work=("J", "Work of the adjuster on the caliper: 0 where it turns within the gap."),
+    undefined="the pads do not press, or the adjuster does not turn",
 )
 
 
@@ -42,7 +41,7 @@ class Options(ParameterSet):
     M_brake: SomeMoment
     """moment of every application"""
     more: Growth
-    """clearance beyond the bench's own, as wear leaves it; the brake knows where its pads touch"""
+    """clearance in excess of the bench's, as wear leaves it; the brake knows its contact angle"""
     applications: Count
     """number of applications"""
     t_hold: Duration
@@ -58,7 +57,7 @@ def _begins(options: Options) -> list[float]:
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the one run; the disc is driven, so that every application is like the last."""
+    """Return the single run; the disc is driven, so that all applications are alike."""
     begins = _begins(options)
     levels = {begin: options.M_brake for begin in begins}
     levels |= {begin + options.t_hold: 0.0 for begin in begins}
@@ -80,7 +79,7 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return what the adjuster turned, and what that makes of the clearance."""
+    """Return the adjuster's turns and their effect on the clearance."""
     run = along_disc(recordings["run"])
     after = run.sel(time=slice(-1e-9, None))
     clicks, clearance = after["clicks"].values, after["clearance"].values
@@ -107,7 +106,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="gap-adjusting",
     assembly="wedge-brake",
-    summary="applications with {more} too much clearance, which the adjuster takes away",
+    summary="applications with {more} of excess clearance, which the adjuster removes",
     options=Options,
     defaults=Options(
         M_brake=200.0, more=0.25e-3, applications=5, t_hold=0.25, t_pause=0.25, settle=0.05

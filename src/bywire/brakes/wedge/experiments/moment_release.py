@@ -1,11 +1,13 @@
-"""Moment release: the demand falls to zero; how fast the brake lets go, and how freely it stands.
+"""Endings of a braking: the demand falls to zero, or the power stages go off under load.
 
-Roberts et al. (2003) show the end of a pulse in Fig. 9; the maneuver and its figures are ours.
+Roberts et al. (2003) show the end of a pulse in Fig. 9; the release and its figures are ours.
+Without power, dry friction holds the brake.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import xarray as xr
@@ -13,6 +15,7 @@ import xarray as xr
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.wedge.case import (
+    along_disc,
     case_from_parked,
     clearance,
     parameters_of,
@@ -22,18 +25,31 @@ from bywire.brakes.wedge.case import (
 )
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rows import along_disc
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
+from bywire.core.typing import Array
+
+
+def _braked_case(
+    par: WedgeParameters,
+    stimulus: Callable[[Array], Mapping[str, Array]],
+    settle: float,
+    duration: float,
+) -> Case:
+    """Return a run whose braking begins with the settling time [s] and ends at time zero."""
+    return case_from_parked(par, stimulus, duration, settle=settle, keep=min(settle, 0.1))
+
+
+# --- Release: how fast the brake lets go, and how freely the pads stand
 
 _LOW = 0.05  # of the moment at the release
 
 FALL = Figures(
     moment_start=("N*m", "Moment when the demand falls."),
-    time_to_5=("s", "Time until the moment has fallen to 5 % of its start for good."),
+    time_to_5=("s", "Time until the moment has fallen permanently below 5 % of its start."),
 )
 FREEDOM = Figures(
-    drag_moment=("N*m", "Largest moment from parking on: residual drag."),
+    drag_moment=("N*m", "Residual drag: largest moment from parking on."),
     travel_left=("m", "Distance of the wedge from its middle at the end."),
     clearance_regained=(
         "m",
@@ -46,7 +62,7 @@ FREEDOM = Figures(
 )
 
 
-class Options(ParameterSet):
+class ReleaseOptions(ParameterSet):
     """The maneuver."""
 
     M_hold: SomeMoment
@@ -57,22 +73,16 @@ class Options(ParameterSet):
     """time recorded after the demand fell to zero"""
 
 
-def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the one run: braking from the start of the settling time, no demand from zero on."""
+def release(par: WedgeParameters, options: ReleaseOptions, _: object = None) -> tuple[Case, ...]:
+    """Return the single run: braking during the settling time, no demand from zero on."""
     levels = {-options.settle: options.M_hold, 0.0: 0.0}
     return (
-        case_from_parked(
-            par,
-            lambda t: {"M_set": steps(t, levels)},
-            options.duration,
-            settle=options.settle,
-            keep=min(options.settle, 0.1),
-        ),
+        _braked_case(par, lambda t: {"M_set": steps(t, levels)}, options.settle, options.duration),
     )
 
 
-def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return how fast the moment falls, what drags afterwards, and what the release costs."""
+def judge_release(recordings: Recordings, options: ReleaseOptions) -> tuple[Kpi, ...]:
+    """Return fall time of the moment, residual drag, and energy of the release."""
     run = along_disc(recordings["run"]).sel(time=slice(-1e-9, None))
     par = parameters_of(run)
     home = parking_time(run, 0.0)
@@ -81,7 +91,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     end = float(run["x"].values[-1])
     until = run.sel(time=slice(None, home.value)) if parked is not None else run
     energy = float(until["W_supply"].values[-1] - until["W_supply"].values[0])
-    counted = "" if parked is not None else "not parked: counted until the end of the recording"
+    counted = "" if parked is not None else "not parked: energy until the end of the recording"
     return (
         *FALL(moment_start=run["M_B"].values[0], time_to_5=_fall(run)),
         release_time(run, 0.0),
@@ -104,7 +114,7 @@ def _toward(run: xr.Dataset) -> xr.DataArray:
 
 
 def _fall(run: xr.Dataset) -> tuple[float, str]:
-    """Return the time until the moment has fallen to a twentieth for good."""
+    """Return the time until the moment has fallen permanently to a twentieth."""
     t, M = run["time"].values, np.abs(run["M_B"].values)
     level = _LOW * M[0]
     above = np.flatnonzero(level < M)
@@ -112,18 +122,88 @@ def _fall(run: xr.Dataset) -> tuple[float, str]:
         return math.nan, "there is no moment at the release"
     k = int(above[-1])
     if k + 1 == t.size:
-        return math.nan, "the moment does not fall that far in time"
+        return math.nan, "the moment does not fall to 5 % in the recorded time"
     return float(t[k] + (t[k + 1] - t[k]) * (M[k] - level) / (M[k] - M[k + 1])), ""
 
 
-EXPERIMENT = Experiment(
+MOMENT_RELEASE = Experiment(
     name="moment-release",
     assembly="wedge-brake",
     summary="release from {M_hold}: times, residual drag, clearance regained, energy",
-    options=Options,
-    defaults=Options(M_hold=500.0, settle=0.6, duration=0.4),
-    cases=cases,
-    judge=judge,
+    options=ReleaseOptions,
+    defaults=ReleaseOptions(M_hold=500.0, settle=0.6, duration=0.4),
+    cases=release,
+    judge=judge_release,
     kpis=FALL.units | {"release_time": "s", "parking_time": "s"} | FREEDOM.units,
+    figures=("time-traces", "energy-balance"),
+)
+
+
+# --- Power off: what dry friction holds, for how long
+
+POWER_OFF_FIGURES = Figures(
+    time_to_rest=("s", "Time from power off until shafts and wedge stick permanently."),
+    drift=("m", "Largest change of the wedge's travel after that."),
+    relaxation=("m", "Change of the wedge's travel before that."),
+    moment_start=("N*m", "Moment at power off."),
+    moment_end=("N*m", "Moment at the end, run-out included."),
+    preload_end=("N", "Preload of the wedge at the end."),
+    end_stop_force=("N", "Largest force of an end stop."),
+    undefined="the brake does not come to rest in the recorded time",
+)
+
+
+class PowerOffOptions(ParameterSet):
+    """The maneuver."""
+
+    M_hold: SomeMoment
+    """moment at which the power goes off"""
+    settle: Duration
+    """time of controlled braking before"""
+    duration: Duration
+    """time recorded without power"""
+
+
+def power_off(par: WedgeParameters, options: PowerOffOptions, _: object = None) -> tuple[Case, ...]:
+    """Return the single run: braking during the settling time, power off at zero."""
+    levels, off = {-options.settle: options.M_hold}, {0.0: 1.0}
+    return (
+        _braked_case(
+            par,
+            lambda t: {"M_set": steps(t, levels), "power_off": steps(t, off)},
+            options.settle,
+            options.duration,
+        ),
+    )
+
+
+def judge_power_off(recordings: Recordings, options: PowerOffOptions) -> tuple[Kpi, ...]:
+    """Return relaxation, time to rest, and creep afterwards."""
+    after = along_disc(recordings["run"]).sel(time=slice(-1e-9, None))
+    t, x, stuck = (after[name].values for name in ("time", "x", "stuck"))
+    moving = np.flatnonzero(stuck == 0)
+    rest = 0 if moving.size == 0 else int(moving[-1]) + 1
+    rests = rest < t.size
+    squeeze = np.minimum(after["f_1"].values, after["f_2"].values)
+    return POWER_OFF_FIGURES(
+        time_to_rest=t[rest] if rests else math.nan,
+        drift=np.abs(x[rest:] - x[rest]).max() if rests else math.nan,
+        relaxation=x[rest] - x[0] if rests else math.nan,
+        moment_start=after["M_B"].values[0],
+        moment_end=after["M_B"].values[-1],
+        preload_end=max(0.0, float(squeeze[-1])),
+        end_stop_force=np.abs(after["F_end"].values).max(),
+    )
+
+
+POWER_OFF_HOLD = Experiment(
+    name="power-off-hold",
+    assembly="wedge-brake",
+    summary="power off at {M_hold}: what dry friction holds, for how long",
+    options=PowerOffOptions,
+    defaults=PowerOffOptions(M_hold=500.0, settle=0.6, duration=2.0),
+    cases=power_off,
+    judge=judge_power_off,
+    kpis=POWER_OFF_FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )

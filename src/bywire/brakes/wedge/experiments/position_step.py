@@ -1,7 +1,7 @@
 """Position step: both motors of the assembled brake follow a step within the clearance.
 
 Roberts et al. (2003), section "Position control of wedge": very little difference to the motors
-with their screws alone, because of the large reduction. Both are run beside the brake.
+with their screws alone, because of the large reduction. The experiment runs both for comparison.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import xarray as xr
 from pydantic import AfterValidator, Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.kpis.step_response import Setting
 from bywire.brakes.wedge.case import case_from_parked, parameters_of, steps
 from bywire.brakes.wedge.elements import brake_heart
@@ -54,12 +54,12 @@ def _distinct(values: tuple[float, ...]) -> tuple[float, ...]:
     tags = [_tag(value) for value in values]
     for k, value in enumerate(values):
         if tags[k] in tags[:k]:
-            raise ValueError(f"{value:g} rad stands there twice: leave one out")
+            raise ValueError(f"{value:g} rad is given twice: leave one out")
     return values
 
 
 def _tag(amplitude: float) -> str:
-    """Return what labels and key figures call an amplitude, in thousandths of a radian."""
+    """Return the name of an amplitude in labels and key figures, in thousandths of a radian."""
     return f"{1e3 * amplitude:.10g}mrad".replace(".", "p")
 
 
@@ -95,7 +95,7 @@ def following(par: WedgeParameters) -> Mapping[str, Any]:
 
 
 def _arrangements(par: WedgeParameters, delta: float) -> dict[str, dict[str, float]]:
-    """Return the changes that take the wedge, and then the other motor's screw, away.
+    """Return the changes that remove the wedge, and then the other motor's screw.
 
     The screws alone push on each other, tip to tip, with the force that they had on the wedge.
     """
@@ -174,7 +174,7 @@ def _each(run: xr.Dataset, amplitude: float, ending: str) -> tuple[Kpi, ...]:
 
 
 def _over(recordings: Recordings, band: str, options: Options) -> tuple[Kpi, ...]:
-    """Return how far the brake and the arrangements without wedge differ, over all amplitudes."""
+    """Return the largest differences from the arrangements without wedge, over all amplitudes."""
     worst, touching = {SCREWS: 0.0, MOTORS: 0.0}, 0.0
     for amplitude in options.amplitudes:
         ending = f"-{band}-{_tag(amplitude)}"
@@ -193,7 +193,7 @@ def _over(recordings: Recordings, band: str, options: Options) -> tuple[Kpi, ...
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return each step's figures, and how little the wedge matters."""
+    """Return each step's figures, and the effect of the wedge."""
     each = [
         kpi
         for band, amplitude in product(_BANDS, options.amplitudes)
@@ -222,7 +222,7 @@ _DEFAULTS = Options(
 EXPERIMENT = Experiment(
     name="position-step",
     assembly="wedge-brake",
-    summary="steps of both motors within the clearance, low and high bandwidth, beside no wedge",
+    summary="steps of both motors within the clearance, two bandwidths, with and without the wedge",
     options=Options,
     defaults=_DEFAULTS,
     cases=cases,

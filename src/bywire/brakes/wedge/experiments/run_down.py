@@ -1,7 +1,7 @@
 """Run-down: a motor coasts to rest, alone, with a known inertia added, and with a known torque.
 
-From a run-down alone follow friction and damping per inertia only. What is known beside it sets
-the scale: an inertia on the shaft, or the torque of a current.
+A run-down alone determines friction and damping per inertia only. A known inertia on the shaft, or
+the torque of a known current, sets the scale.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ FIGURES = Figures(
         "the added one.",
     ),
     inertia_by_torque=("kg*m**2", "The same by the known current's torque."),
-    inertia_true=("kg*m**2", "What was put in."),
+    inertia_true=("kg*m**2", "True value."),
     undefined=STOPPING.undefined,
 )
 
@@ -51,9 +51,9 @@ class Options(ParameterSet):
     i_spin: Current
     """current of the spin-up"""
     t_spin: Duration
-    """time of the spin-up; with the added inertia as much longer as it is more"""
+    """time of the spin-up; with the added inertia longer in proportion"""
     J_added: Inertia
-    """inertia put on the shaft in the second run"""
+    """inertia added to the shaft in the second run"""
     i_brake: Current
     """current against the motion in the third run; less than friction holds at rest"""
     duration: Duration
@@ -90,7 +90,7 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def _spun(options: Options, i_after: float) -> Stimuli:
-    """Return the current of the spin-up, and of what follows."""
+    """Return the current of the spin-up and of the coasting."""
 
     def stimulus(t: Array) -> dict[str, Array]:
         return {"i_1_set": np.where(t < -1e-9, options.i_spin, i_after)}
@@ -99,7 +99,7 @@ def _spun(options: Options, i_after: float) -> Stimuli:
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return how long the shaft turns, and its inertia by what was known beside the run-down."""
+    """Return how long the shaft turns, and its inertia by the added inertia and by the torque."""
     par = parameters_of(recordings["free"])
     rate = {label: _deceleration(recordings, label) for label in LABELS}
     J = par.motor_1.J_M + par.rig.J_dummy
@@ -127,7 +127,7 @@ def _first(run: xr.Dataset) -> float:
 
 
 def _deceleration(recordings: Recordings, label: str) -> float:
-    """Return the mean deceleration [rad/s^2] between two speeds that all runs pass."""
+    """Return the mean deceleration [rad/s^2] between two speeds that all runs pass through."""
     high = min(_first(recordings[each]) for each in LABELS)
     speed = _speed(recordings[label])
     t = recordings[label]["time"].sel(time=slice(-1e-9, None)).values

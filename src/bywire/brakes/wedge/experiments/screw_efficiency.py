@@ -1,11 +1,8 @@
-"""Screw efficiency: a motor in current control against one in position control, a sensor between.
+"""Efficiency of the roller screw: two motors against each other, a force sensor between.
 
-Two such motors cannot back-drive each other at full current: of the torque of one, 0.65 x 0.46
-arrive at the other. So the one in position control moves, and the other follows or is pushed back.
-
-The bearings' friction grows with the square of the force. The torque without load does not show
-that: taken off alone it leaves an efficiency too low by F C_2 / k, a percent or more. So each
-motion runs under two forces, and what a torque per force has left without force is the screw's.
+Two such motors cannot back-drive each other at full current: 0.65 x 0.46 of the torque of one
+arrives at the other. So a motor in position control moves, and one in current control follows or
+is pushed back.
 """
 
 from __future__ import annotations
@@ -33,38 +30,43 @@ from bywire.core.quantities import Current, Duration, Unit
 from bywire.core.signals import Signal
 from bywire.core.typing import Array
 
+# --- Efficiency at two forces
+
 SlowSpeed = Annotated[float, Unit("rad/s", 10.0), Field(gt=0, allow_inf_nan=False)]
 
 _SETTLED = 0.3  # of the time in motion: what comes before is left out of the means
-_LESS = 0.5  # of the currents, in the motions under less force
+_LESS = 0.5  # share of the currents in the motions under less force
 _SPEED = 0.05  # by which mean speeds may differ from what is demanded
-FIGURES = Figures(
-    eta_f=("1", "Torque by the force over motor torque less the bearings', motor 1 driving."),
-    eta_f_no_load=("1", "The same with the bearing torque without load alone taken off."),
+EFFICIENCY_FIGURES = Figures(
+    eta_f=("1", "Torque by the force over motor torque minus the bearings', motor 1 driving."),
+    eta_f_no_load=("1", "The same, with only the bearing torque without load subtracted."),
     eta_f_raw=("1", "Torque by the force over motor torque, motor 1 driving."),
     eta_f_reverse=("1", "As eta_f, motor 2 driving."),
-    eta_f_true=("1", "What was put in."),
+    eta_f_true=("1", "True value."),
     eta_b=("1", "Holding torque and the bearings' over torque by the force, motor 2 driven."),
-    eta_b_no_load=("1", "The same with the bearing torque without load alone added."),
+    eta_b_no_load=("1", "The same, with only the bearing torque without load added."),
     eta_b_raw=("1", "Holding torque over torque by the force, motor 2 driven."),
     eta_b_reverse=("1", "As eta_b, motor 1 driven."),
-    eta_b_true=("1", "What was put in."),
+    eta_b_true=("1", "True value."),
     force=("N", "Mean force while motor 1 drives."),
     force_reverse=("N", "Mean force while motor 1 is driven back."),
     bearing_torque=("N*m", "Motor torque without load at the same speed."),
-    bearing_growth=("N*m/N**2", "Growth of it with the square of the force, motor 1 driving."),
-    bearing_growth_true=("N*m/N**2", "What was put in."),
-    undefined="no steady motion under compression: a motor cannot do its part",
+    bearing_growth=(
+        "N*m/N**2",
+        "Growth of that torque with the square of the force, motor 1 driving.",
+    ),
+    bearing_growth_true=("N*m/N**2", "True value."),
+    undefined="no steady motion under compression: a motor cannot hold its speed or force",
 )
 
 
-class Options(ParameterSet):
+class EfficiencyOptions(ParameterSet):
     """Currents and slow motion; at a speed where the friction no longer falls with it."""
 
     i_drive: Current
     """current of motor 1 while it drives and motor 2 gives way"""
     i_back: Current
-    """current of motor 1 while motor 2 pushes it back; small, see the experiment's text"""
+    """current of motor 1 while motor 2 pushes it back; small, so that motor 2 can"""
     omega_slow: SlowSpeed
     """speed of the motion"""
     settle: Duration
@@ -74,7 +76,7 @@ class Options(ParameterSet):
 
 
 class Reading(NamedTuple):
-    """What a run in motion reads, friction counted against the motion."""
+    """Mean readings of a run in motion, friction counted against the motion."""
 
     F: Annotated[float, Signal("N", "force", 1000.0)]
     T_1: Annotated[float, Signal("N*m", "torque of motor 1 by its current", 1.0)]
@@ -82,8 +84,18 @@ class Reading(NamedTuple):
     steady: Annotated[float, Signal("1", "1 in steady motion under compression, else NaN")]
 
 
-def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the motion without load, and motor 1 driving and driven back under two forces each."""
+def efficiency(
+    par: WedgeParameters, options: EfficiencyOptions, _: object = None
+) -> tuple[Case, ...]:
+    """Return the motion without load, and motor 1 driving and driven back under two forces each.
+
+    Notes
+    -----
+    The bearings' friction grows with the square of the force. The torque without load does not
+    contain that growth: subtracting it alone leaves an efficiency too low by F C_2 / k, a percent
+    or more. So each motion runs under two forces. A torque per force, extrapolated to zero force,
+    is the screw's alone.
+    """
     for name in ("i_drive", "i_back"):
         check_current(name, getattr(options, name), par)
     modes = {"rig.mode_1": "current", "rig.mode_2": "position"}
@@ -111,8 +123,8 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     )
 
 
-def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the efficiencies in both directions, with and without what the bearings take."""
+def judge_efficiency(recordings: Recordings, options: EfficiencyOptions) -> tuple[Kpi, ...]:
+    """Return the efficiencies in both directions, with and without the bearings' friction."""
     no_load = recordings["no_load"]
     par = parameters_of(no_load)
     k = slope_of(par)
@@ -128,7 +140,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     driven, _ = _without_force((there, T_b - there.T_2), (there_less, T_b - there_less.T_2))
     drive_2, _ = _without_force((back, -back.T_2 - T_b), (back_less, -back_less.T_2 - T_b))
     driven_1, _ = _without_force((back, back.T_1 + T_b), (back_less, back_less.T_1 + T_b))
-    return FIGURES(
+    return EFFICIENCY_FIGURES(
         eta_f=_ratio(k, drive),
         eta_f_no_load=there.steady * _ratio(k * there.F, there.T_1 - T_b),
         eta_f_raw=there.steady * _ratio(k * there.F, there.T_1),
@@ -147,7 +159,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     )
 
 
-def _pushed(i: float, speed: float, options: Options) -> Any:
+def _pushed(i: float, speed: float, options: EfficiencyOptions) -> Any:
     """Return motor 1 pushing and, from time zero on, motor 2 moving."""
 
     def stimulus(t: Array) -> dict[str, Array]:
@@ -157,7 +169,7 @@ def _pushed(i: float, speed: float, options: Options) -> Any:
     return stimulus
 
 
-def _read(run: xr.Dataset, speed: float, options: Options) -> Reading:
+def _read(run: xr.Dataset, speed: float, options: EfficiencyOptions) -> Reading:
     K = torque_constant_of(parameters_of(run))
     T_1, T_2 = (K * _mean(run, name, options) for name in ("i_1", "i_2"))
     steady = all(abs(_speed(run, name, options) / speed - 1.0) < _SPEED for name in ("q_1", "q_2"))
@@ -165,19 +177,19 @@ def _read(run: xr.Dataset, speed: float, options: Options) -> Reading:
     return Reading(F, T_1, T_2, 1.0 if steady and F > 0 else math.nan)
 
 
-def _speed(run: xr.Dataset, name: str, options: Options) -> float:
+def _speed(run: xr.Dataset, name: str, options: EfficiencyOptions) -> float:
     """Return the mean speed [rad/s] by an encoder."""
     window = run.sel(time=slice(_SETTLED * options.duration, None))
     t, q = window["time"].values, window[name].values
     return float((q[-1] - q[0]) / (t[-1] - t[0])) if t.size > 1 else math.nan
 
 
-def _mean(run: xr.Dataset, name: str, options: Options) -> float:
+def _mean(run: xr.Dataset, name: str, options: EfficiencyOptions) -> float:
     return mean(run, name, _SETTLED * options.duration, options.duration)
 
 
 def _without_force(full: tuple[Reading, float], less: tuple[Reading, float]) -> tuple[float, float]:
-    """Return a torque per force as it is without force, and its growth; NaN where not steady."""
+    """Return a torque per force, extrapolated to zero force, and its growth; NaN if not steady."""
     (there, T), (below, T_less) = full, less
     steady = there.steady * below.steady
     if not steady > 0 or there.F == below.F:
@@ -190,14 +202,148 @@ def _ratio(above: float, below: float) -> float:
     return above / below if below > 0 else math.nan
 
 
-EXPERIMENT = Experiment(
+SCREW_EFFICIENCY = Experiment(
     name="screw-efficiency",
     assembly="wedge-brake",
     summary="efficiency of the roller screw, from motor currents and the force between two screws",
-    options=Options,
-    defaults=Options(i_drive=12.0, i_back=3.0, omega_slow=10.0, settle=0.4, duration=1.0),
-    cases=cases,
-    judge=judge,
-    kpis=FIGURES.units,
+    options=EfficiencyOptions,
+    defaults=EfficiencyOptions(i_drive=12.0, i_back=3.0, omega_slow=10.0, settle=0.4, duration=1.0),
+    cases=efficiency,
+    judge=judge_efficiency,
+    kpis=EFFICIENCY_FIGURES.units,
+    figures=("time-traces", "energy-balance"),
+)
+
+
+# --- Load sweep: many forces separate the friction with load from that without
+
+Levels = Annotated[int, Unit("1", 3.0), Field(ge=1, le=100)]
+
+_TURN = 0.2  # of a stroke's time, at rest after it, while the current changes
+_RAMP = 0.2  # of a stroke's time, in which the speed rises, and falls again
+_SWEEP_SETTLED = 0.4  # of a stroke, left out of the means
+LOAD_SWEEP_FIGURES = Figures(
+    force_max=("N", "Largest mean force of a stroke."),
+    force_min=("N", "Smallest mean force of a stroke."),
+    eta_f_slope=("1", "Torque by the force over motor torque, by their growth; motor 1 driving."),
+    eta_f_true=("1", "True value."),
+    eta_b_slope=("1", "The same, inverse, motor 1 driven back."),
+    eta_b_true=("1", "True value."),
+    undefined="the force does not grow with the current: take more levels",
+)
+
+
+class LoadSweepOptions(ParameterSet):
+    """Strokes of motor 2 there and back, at currents of motor 1 that grow from pair to pair."""
+
+    i_drive: Current
+    """largest current of motor 1 while it drives"""
+    i_back: Current
+    """largest current while motor 2 pushes it back; small, so that motor 2 can"""
+    levels: Levels
+    """number of currents, evenly spaced up to the largest"""
+    omega_slow: SlowSpeed
+    """speed of the motion"""
+    t_stroke: Duration
+    """time of one stroke"""
+
+
+class Stroke(NamedTuple):
+    """One motion: when it begins [s], its direction, and the current of motor 1 [A]."""
+
+    begin: float
+    sign: float
+    i: float
+
+
+def strokes(options: LoadSweepOptions) -> tuple[Stroke, ...]:
+    """Return the strokes: at every level one that motor 1 drives, and one that drives it back."""
+    period = (1.0 + _TURN) * options.t_stroke
+    moves = []
+    for k in range(options.levels):
+        share = (k + 1.0) / options.levels
+        for way, (sign, i) in enumerate(((1.0, options.i_drive), (-1.0, options.i_back))):
+            moves.append(Stroke((2 * k + way + _TURN) * period, sign, share * i))
+    return tuple(moves)
+
+
+def load_sweep(
+    par: WedgeParameters, options: LoadSweepOptions, _: object = None
+) -> tuple[Case, ...]:
+    """Return the single run; motor 1 in current, motor 2 in position control."""
+    for name in ("i_drive", "i_back"):
+        check_current(name, getattr(options, name), par)
+    moves = strokes(options)
+    corners = [
+        0.0,
+        *(t for stroke in moves for t in (stroke.begin, stroke.begin + options.t_stroke)),
+    ]
+    levels = [0.0, *(i for stroke in moves for i in (stroke.i, stroke.i))]
+
+    def stimulus(t: Array) -> dict[str, Array]:
+        moved = np.zeros(t.shape)
+        for stroke in moves:
+            moved = moved + stroke.sign * _moved(t - stroke.begin, options.t_stroke)
+        return {
+            "i_1_set": np.interp(t, corners, levels),
+            "theta_2_set": options.omega_slow * moved,
+        }
+
+    modes = {"rig.mode_1": "current", "rig.mode_2": "position"}
+    return (screw_case("run", par, stimulus, corners[-1], modes),)
+
+
+def _moved(t: Array, T: float) -> Array:
+    """Return the travel of a stroke of speed one, which rises and falls gently."""
+    ramp = _RAMP * T
+    rising, falling = np.clip(t, 0.0, ramp), np.clip(t - (T - ramp), 0.0, ramp)
+    steady = np.clip(t - ramp, 0.0, T - 2.0 * ramp)
+    return np.asarray(0.5 * rising**2 / ramp + steady + falling - 0.5 * falling**2 / ramp)
+
+
+def judge_load_sweep(recordings: Recordings, options: LoadSweepOptions) -> tuple[Kpi, ...]:
+    """Return the efficiencies by the slope of motor 1's torque over the force, both ways."""
+    run = recordings["run"]
+    par = parameters_of(run)
+    k, K = slope_of(par), torque_constant_of(par)
+    rows = [
+        (stroke.sign, *(_stroke_mean(run, stroke, name, options) for name in ("y_F", "i_1")))
+        for stroke in strokes(options)
+    ]
+    driving = _line([row[1:] for row in rows if row[0] > 0])
+    back = _line([row[1:] for row in rows if row[0] < 0])
+    forces = [row[1] for row in rows]
+    return LOAD_SWEEP_FIGURES(
+        force_max=max(forces),
+        force_min=min(forces),
+        eta_f_slope=k / (K * driving) if driving > 0 else math.nan,
+        eta_f_true=par.screw.eta_f,
+        eta_b_slope=K * back / k,
+        eta_b_true=par.screw.eta_b,
+    )
+
+
+def _stroke_mean(run: xr.Dataset, stroke: Stroke, name: str, options: LoadSweepOptions) -> float:
+    begin, end = (
+        stroke.begin + share * options.t_stroke for share in (_SWEEP_SETTLED, 1.0 - _RAMP)
+    )
+    return mean(run, name, begin, end)
+
+
+def _line(rows: list[tuple[float, ...]]) -> float:
+    """Return current over force, the slope of a line."""
+    F, i = np.array(rows).T
+    return float(np.polyfit(F, i, 1)[0]) if len(rows) > 1 and np.ptp(F) > 0 else math.nan
+
+
+LOAD_SWEEP = Experiment(
+    name="load-sweep",
+    assembly="wedge-brake",
+    summary="screw driving and driven back under growing forces: friction with and without load",
+    options=LoadSweepOptions,
+    defaults=LoadSweepOptions(i_drive=12.0, i_back=3.0, levels=6, omega_slow=10.0, t_stroke=0.6),
+    cases=load_sweep,
+    judge=judge_load_sweep,
+    kpis=LOAD_SWEEP_FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )

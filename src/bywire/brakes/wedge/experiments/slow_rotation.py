@@ -1,7 +1,6 @@
-"""Slow rotation: a single motor turns once forward and once back, slowly; its current shows all.
+"""Slow rotation: a single motor turns slowly once forward and once back; its current is measured.
 
-Cogging depends on the angle alone, dry friction on the direction: turning both ways tells them
-apart.
+Cogging depends on the angle alone, dry friction on the direction: turning both ways separates them.
 """
 
 from __future__ import annotations
@@ -26,13 +25,13 @@ FIGURES = Figures(
     torque_backward=("N*m", "The same backward."),
     friction_torque=("N*m", "Half of their difference."),
     ripple=("N*m", "Amplitude of a sine of the torque's deviation from its mean."),
-    cogging_true=("N*m", "Amplitude of the cogging torque that was put in."),
-    undefined="no row in the time in which the torque is taken",
+    cogging_true=("N*m", "True amplitude of the cogging torque."),
+    undefined="the recording has no row in the time of steady motion",
 )
 
 
 class Options(ParameterSet):
-    """One revolution each way; fast enough not to stick, slow beside the position loop."""
+    """One revolution each way; fast enough not to stick, slow compared with the position loop."""
 
     omega_slow: AngularSpeed
     """speed of the motion"""
@@ -48,7 +47,7 @@ def stroke(options: Options) -> float:
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the one run, on a dummy shaft."""
+    """Return the single run, on a dummy shaft."""
     T = stroke(options)
 
     def there_and_back(t: Array) -> dict[str, Array]:
@@ -63,7 +62,7 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return mean torques both ways, the friction between them, and the ripple around them."""
+    """Return mean torques both ways, half their difference as friction, and the ripple."""
     run, T = recordings["run"], stroke(options)
     par = parameters_of(run)
     K = torque_constant_of(par)

@@ -14,19 +14,25 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import case_from_parked, parameters_of
+from bywire.brakes.wedge.case import (
+    FRICTIONLESS,
+    Coefficients,
+    case_from_parked,
+    parameters_of,
+    tag,
+    with_friction,
+)
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.panels import COMPARED
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.series import FRICTIONLESS, Coefficients, tag, with_friction
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 
 FREE, DRY = "frictionless", "friction"
 _SHARE = 0.2  # of the moment: how far the ramps go to either side
-_NO_FORCE = 1.0  # actuation force [N] below which the brake factor says nothing
+_NO_FORCE = 1.0  # actuation force [N] below which the brake factor is meaningless
 
 EACH = Figures(
     F_M=("N", "Actuation force at the end, without friction."),
@@ -55,7 +61,7 @@ class Options(ParameterSet):
     """A moment, approached slowly from below and from above, then held."""
 
     M_hold: SomeMoment
-    """moment at which the force is taken"""
+    """moment at which the force is read"""
     mu_B: Coefficients
     """friction coefficients of the pads"""
     t_start: Duration
@@ -92,7 +98,7 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def _sign(run: xr.Dataset) -> float:
-    """Return the side of the wedge: forces count toward clamping."""
+    """Return the side of the wedge; forces count positive toward clamping."""
     return -1.0 if float(run["x"].values[-1]) < 0 else 1.0
 
 
@@ -158,7 +164,7 @@ def _neutral(options: Options, F_M: list[float]) -> tuple[float, str]:
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return forces and brake factors for every friction coefficient, and how they agree."""
+    """Return forces and brake factors for every friction coefficient, and their deviations."""
     each = [_each(recordings, mu_B, options) for mu_B in options.mu_B]
     column = {name: [kpis[k].value for kpis in each] for k, name in enumerate(EACH.units)}
     wrong = [
@@ -172,8 +178,10 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
         if math.isfinite(factor * closed)
     ]
     overall = ALL(
-        F_M_error=max(wrong) if wrong else (math.nan, "the pads press at no coefficient"),
-        C_star_error=100.0 * max(shares) if shares else (math.nan, "no brake factor is bounded"),
+        F_M_error=max(wrong) if wrong else (math.nan, "the pads do not press at any coefficient"),
+        C_star_error=100.0 * max(shares)
+        if shares
+        else (math.nan, "every brake factor is unbounded"),
         neutral_mu=_neutral(options, column["F_M"]),
         neutral_mu_closed=wedge.slope(parameters_of(next(iter(recordings.values()))).wedge),
         neutral_mu_rising=_neutral(options, column["F_M_rising"]),

@@ -1,11 +1,4 @@
-"""Drive-train stiffness in two stages: screws on a force sensor, then in the brake heart.
-
-Friction is kept out as on a real rig: stage 1 reads force and travel both at the line, beyond all
-friction. Stage 2 has no force sensor; there the current tells the force, by a calibration of
-stage 1 that holds for rising current, with the friction of rising current in it. As in the paper,
-symmetry is assumed: unequal motors drag the wedge along, and its friction then counts as stiffness
-(K_W reads 5 % high where the torque constants are 10 % apart).
-"""
+"""Stiffness of the drive train, on a force sensor between the screws and in the brake heart."""
 
 from __future__ import annotations
 
@@ -20,36 +13,41 @@ from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.wedge.case import parameters_of
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import (
+    Stimuli,
     check_current,
     heart_case,
     screw_case,
     slope_of,
     squeezing_current,
+    torque_constant_of,
 )
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Current, Duration
+from bywire.core.quantities import Current, Duration, Length
 from bywire.core.typing import Array
 from bywire.plant import shaft_encoder
+from bywire.plant.axial_bearing import AngularSpeed
+
+# --- In current control: ramps of opposite currents
 
 _UPPER = 0.35  # of the largest current: below, bearings and free-play bend the line
 _HOLD = 0.2  # of the ramp's time, at the largest current and between the directions
-FIGURES = Figures(
+STIFFNESS_FIGURES = Figures(
     K_line_compression=("N/m", "Force over travel, sensor between, compression."),
     K_line_tension=("N/m", "Force over travel, sensor between, tension."),
     force_per_current=("N/A", "Force over rising current, mean of compression and tension."),
-    K_S=("N/m", "Stiffness of one screw: the line's, the sensor allowed for."),
-    K_S_true=("N/m", "What was put in."),
+    K_S=("N/m", "Stiffness of one screw: that of the line, corrected for the sensor."),
+    K_S_true=("N/m", "True value."),
     K_heart_compression=("N/m", "Force by current over travel, tip to tip."),
     K_heart_tension=("N/m", "Force by current over travel, through the wedge."),
-    K_W=("N/m", "Stiffness of one interface to the wedge: tension, less the screws."),
-    K_W_true=("N/m", "What was put in."),
+    K_W=("N/m", "Stiffness of one interface to the wedge: tension, corrected for the screws."),
+    K_W_true=("N/m", "True value."),
     free_play=("m", "Travel between the lines of compression and tension at no force."),
-    free_play_true=("m", "What was put in."),
+    free_play_true=("m", "True value."),
     undefined="no travel under load: take a larger current",
 )
 
 
-class Options(ParameterSet):
+class StiffnessOptions(ParameterSet):
     """Ramps of the current, up and down: first compression, then tension."""
 
     i_max: Current
@@ -66,8 +64,19 @@ class Line(NamedTuple):
     """where it crosses zero"""
 
 
-def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return both stages under the same currents; the wedge stays in its clearance."""
+def stiffness(
+    par: WedgeParameters, options: StiffnessOptions, _: object = None
+) -> tuple[Case, ...]:
+    """Return both stages under the same currents; the wedge stays in its clearance.
+
+    Notes
+    -----
+    Friction is kept out as on a real rig. Stage 1 reads force and travel both at the line, beyond
+    all friction. Stage 2 has no force sensor: there the current gives the force, by a calibration
+    of stage 1 that holds for rising current, with the friction of rising current in it. As in the
+    paper, symmetry is assumed: unequal motors drag the wedge along, and its friction then counts
+    as stiffness (K_W reads 5 % high where the torque constants are 10 % apart).
+    """
     check_current("i_max", options.i_max, par)
     t = options.t_ramp
 
@@ -83,8 +92,8 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     )
 
 
-def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the stiffnesses of screws and wedge, and the free-play, beside what was put in."""
+def judge_stiffness(recordings: Recordings, options: StiffnessOptions) -> tuple[Kpi, ...]:
+    """Return stiffnesses of screws and wedge and the free-play, with their true values."""
     sensor, heart = recordings["sensor"], recordings["heart"]
     par = parameters_of(sensor)
     lines, calibrations, loaded = [], [], []
@@ -100,7 +109,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     c_S = 0.5 * (0.5 * sum(1.0 / line.slope for line in lines) - c_F)
     c_W = 0.5 / loaded[1].slope - c_S
     truth = par.heart
-    return FIGURES(
+    return STIFFNESS_FIGURES(
         K_line_compression=lines[0].slope,
         K_line_tension=lines[1].slope,
         force_per_current=0.5 * sum(line.slope for line in calibrations),
@@ -115,7 +124,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     )
 
 
-def _profile(options: Options) -> tuple[list[float], list[float]]:
+def _profile(options: StiffnessOptions) -> tuple[list[float], list[float]]:
     """Return times [s] and currents [A] of the corners."""
     i, hold = options.i_max, _HOLD
     corners = [
@@ -131,7 +140,7 @@ def _profile(options: Options) -> tuple[list[float], list[float]]:
     return [options.t_ramp * c for c in corners], [0.0, i, i, 0.0, 0.0, -i, -i, 0.0]
 
 
-def _rising(run: xr.Dataset, sign: float, options: Options) -> Any:
+def _rising(run: xr.Dataset, sign: float, options: StiffnessOptions) -> Any:
     """Return which rows lie in the upper part of one direction's rising current."""
     times = _profile(options)[0]
     begin, end = (times[0], times[1]) if sign > 0 else (times[4], times[5])
@@ -140,7 +149,7 @@ def _rising(run: xr.Dataset, sign: float, options: Options) -> Any:
 
 
 def _closer(run: xr.Dataset) -> Array:
-    """Return how much closer the encoders say the nuts are [m]."""
+    """Return by how much the nuts have come closer, by the encoders [m]."""
     par = parameters_of(run)
     angles: list[Any] = [run["theta_1"].values, run["theta_2"].values]
     q_1, q_2 = (shaft_encoder.reading(angle, par.encoder) for angle in angles)
@@ -154,14 +163,103 @@ def _line(x: Array, y: Array) -> Line:
     return Line(float(slope), float(-level / slope))
 
 
-EXPERIMENT = Experiment(
+STIFFNESS = Experiment(
     name="stiffness",
     assembly="wedge-brake",
     summary="stiffnesses of screws and wedge and the free-play, motors against each other",
-    options=Options,
-    defaults=Options(i_max=15.0, t_ramp=2.0),
-    cases=cases,
-    judge=judge,
-    kpis=FIGURES.units,
+    options=StiffnessOptions,
+    defaults=StiffnessOptions(i_max=15.0, t_ramp=2.0),
+    cases=stiffness,
+    judge=judge_stiffness,
+    kpis=STIFFNESS_FIGURES.units,
+    figures=("time-traces", "energy-balance"),
+)
+
+
+# --- In position control: a slow cycle of travel
+
+LABELS = ("sensor", "heart")
+FORCE_CYCLE_FIGURES = Figures(
+    force_compression=("N", "Largest force on the sensor."),
+    force_tension=("N", "Largest tension on the sensor."),
+    stiffness=("N/m", "Force over travel with the sensor between, by a straight line."),
+    peak_current_sensor=("A", "Largest mean current of both motors, on the sensor."),
+    peak_current_heart=("A", "The same in the brake heart."),
+    hysteresis=("N*m", "Friction torque, half the loop's width, mean over the cycle."),
+    undefined="no travel: give larger options",
+)
+
+
+class ForceCycleOptions(ParameterSet):
+    """Travels of one nut toward the other: zero, compression, tension, zero."""
+
+    c_sensor: Length
+    """closest, and farthest, with the force sensor between the screws"""
+    c_close: Length
+    """closest in the brake heart, tip to tip"""
+    c_apart: Length
+    """farthest in the brake heart, through the wedge"""
+    omega_slow: AngularSpeed
+    """speed of both motors"""
+
+
+def force_cycle(
+    par: WedgeParameters, options: ForceCycleOptions, _: object = None
+) -> tuple[Case, ...]:
+    """Return both stages; the wedge stays in its clearance.
+
+    Motors that turn steadily neither stick nor slip. So force over current shows the friction's
+    hysteresis, and force over travel the stiffness, in both directions and through the free-play.
+    """
+    modes = {"rig.mode_1": "position", "rig.mode_2": "position"}
+    squeeze, t_sensor = _cycle(par, options.c_sensor, options.c_sensor, options)
+    seize, t_heart = _cycle(par, options.c_close, options.c_apart, options)
+    return (
+        screw_case("sensor", par, squeeze, t_sensor, modes),
+        heart_case(par, seize, t_heart, "position"),
+    )
+
+
+def _cycle(
+    par: WedgeParameters, close: float, apart: float, options: ForceCycleOptions
+) -> tuple[Stimuli, float]:
+    """Return the stimulus of one stage, and its duration [s]."""
+    k = slope_of(par)
+    angles = np.array([0.0, 0.5 * close / k, -0.5 * apart / k, 0.5 * close / k, 0.0])
+    times = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(angles)) / options.omega_slow)))
+
+    def opposite(t: Array) -> dict[str, Array]:
+        angle = np.interp(t, times, angles)
+        return {"theta_1_set": angle, "theta_2_set": -angle}
+
+    return opposite, math.ceil(1e3 * float(times[-1])) * 1e-3
+
+
+def judge_force_cycle(recordings: Recordings, options: ForceCycleOptions) -> tuple[Kpi, ...]:
+    """Return the forces reached, the line's stiffness, and the hysteresis of a cycle."""
+    run = recordings["sensor"]
+    par = parameters_of(run)
+    F, i = run["y_F"].values, squeezing_current(run)
+    d = slope_of(par) * (run["q_1"].values - run["q_2"].values)
+    work = 0.5 * abs(float(np.trapezoid(torque_constant_of(par) * i, F)))
+    return FORCE_CYCLE_FIGURES(
+        force_compression=F.max(),
+        force_tension=-F.min(),
+        stiffness=np.polyfit(d, F, 1)[0] if np.ptp(d) > 0 else math.nan,
+        peak_current_sensor=np.abs(i).max(),
+        peak_current_heart=np.abs(squeezing_current(recordings["heart"])).max(),
+        hysteresis=work / max(float(np.ptp(F)), 1e-9),
+    )
+
+
+FORCE_CYCLE = Experiment(
+    name="force-cycle",
+    assembly="wedge-brake",
+    summary="two motors squeeze and pull by position: stiffness, free-play, force over current",
+    options=ForceCycleOptions,
+    defaults=ForceCycleOptions(c_sensor=1.5e-4, c_close=1.4e-4, c_apart=3e-4, omega_slow=0.3),
+    cases=force_cycle,
+    judge=judge_force_cycle,
+    kpis=FORCE_CYCLE_FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )

@@ -1,7 +1,7 @@
-"""The wedge brake's adjuster in its ECU: it reads the gap from the moment control, which it tells.
+"""Law of the wedge brake's adjuster: it reads the gap from the moment control, and corrects it.
 
-The way from parking to contact is what the moment control believes. What the adjuster means to take
-away comes off that, so that the next application does not creep through a gap that is gone.
+The moment control estimates the travel from parking to contact. The adjuster subtracts from it the
+teeth that it commands, so that the next application does not creep through a gap that is gone.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ FAULTS = tuple(
 
 
 class Parameters(wear_adjuster.Parameters):
-    """The adjuster's law, when it runs, and what it believes."""
+    """The adjuster's law, its sample time, and its assumptions."""
 
     T_adjust: Duration
-    """sample time, in which all teeth turn that are due"""
+    """sample time, in which all due teeth turn"""
     gap_slope_hat: Slope
-    """clearance per motor angle, as it believes it"""
+    """assumed clearance per motor angle"""
     T_disc_hat: Temperature
-    """temperature for which it takes the disc"""
+    """assumed temperature of the disc"""
 
 
 class State(NamedTuple):
-    """What the adjuster remembers."""
+    """Memory of the adjuster."""
 
     applied: Annotated[float, Signal("1", "the brake was applied since it was parked last")]
     wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
@@ -52,7 +52,7 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Contact and mode of the moment control, and whether it is to brake."""
+    """Contact and mode of the moment control, and its demand."""
 
     theta_c: Annotated[float, Signal("rad", "contact position, estimated", 1.7)]
     mode: Annotated[float, Signal("1", "mode of the moment control", 3.0)]
@@ -60,7 +60,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Teeth that it means to turn, and that do; mode; clearance of the cold brake behind them."""
+    """Teeth commanded, and turned; mode; clearance of the cold brake after them."""
 
     teeth: wear_adjuster.Teeth
     turned: wear_adjuster.Teeth
@@ -77,9 +77,9 @@ def output(x: State, u: Input, par: Parameters) -> tuple[State, Output]:
         parked=ops.where(u.mode < 0.5, 1.0, 0.0),
         wanted=u.wanted,
     )
-    own, out = wear_adjuster.output(wear_adjuster.State(*x), seen, par)
+    state, out = wear_adjuster.output(wear_adjuster.State(*x), seen, par)
     gap = wear_adjuster.cold_gap(seen, par) - par.tooth * out.teeth
-    return State(*own), Output(out.teeth, out.turned, out.mode, gap)
+    return State(*state), Output(out.teeth, out.turned, out.mode, gap)
 
 
 def contact(
@@ -88,5 +88,5 @@ def contact(
     T: Annotated[float, Signal("s", "sample time of the moment control", 1e-3)],
     par: Parameters,
 ) -> Annotated[float, Signal("rad", "contact position, estimated", 1.7)]:
-    """Return where the moment control believes the pads to touch, a sample of turning later."""
+    """Return the estimated contact position after one sample of turning."""
     return theta_c - par.tooth / par.gap_slope_hat * rate * T

@@ -36,7 +36,7 @@ class Parameters(ParameterSet):
     f_c: Frequency
     """crossover frequency of the moment loop"""
     slope_hat: MomentSlope
-    """moment per angle in contact, as the controller believes it"""
+    """moment per angle in contact, assumed by the controller"""
     rate_max: SpeedLimit
     """software rate limit of the moment mode"""
     omega_gap: SpeedLimit
@@ -44,13 +44,13 @@ class Parameters(ParameterSet):
     a_gap: Acceleration
     """acceleration while crossing the gap"""
     omega_creep: SpeedLimit
-    """speed at the estimated contact position, kept until contact shows"""
+    """speed at the estimated contact position, kept until contact is detected"""
     M_on: SomeMoment
     """moment demand from which the brake leaves its parking position"""
     M_contact: SomeMoment
     """measured moment that counts as contact: threshold of the gap mode"""
     Omega_still: SpeedLimit
-    """disc speed below which the moment sensor cannot be used"""
+    """disc speed below which the control does not use the moment sensor"""
 
 
 class State(NamedTuple):
@@ -62,7 +62,7 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Demand, measurements, and where the reference stands; toward clamping."""
+    """Demand, measurements, and the reference; positive toward clamping."""
 
     M_set: Annotated[float, Signal("N*m", "moment demand", 300.0)]
     M_meas: Annotated[float, Signal("N*m", "measured moment", 300.0)]
@@ -77,7 +77,7 @@ def observed(x: State, u: Input, par: Parameters) -> Moment:
     Notes
     -----
     Standstill logic (our choice): a sensor on a standing disc reads zero, and an integral law
-    would wind up. The believed stiffness serves instead.
+    would wind up. The control uses the assumed stiffness instead.
     """
     still = ops.fabs(u.Omega) < par.Omega_still
     believed = ops.fmax(par.slope_hat * (u.theta - x.theta_c), 0.0)
@@ -85,7 +85,7 @@ def observed(x: State, u: Input, par: Parameters) -> Moment:
 
 
 def next_mode(mode: Flag, wanted: Flag, touching: Flag, home: Flag) -> Flag:
-    """Return the mode that follows, by flags of 0 or 1.
+    """Return the next mode, by flags of 0 or 1.
 
     ``wanted``, ``touching``, ``home``: whether braking is demanded, the pads touch, the reference
     is back at its parking position.
@@ -115,7 +115,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> State:
 
     .. math:: \omega_{ref} = \mathrm{sat}\left(2 \pi f_c (M_{set} - M) / S\right)
 
-    in mode "moment" with the believed slope S. The contact position is taken from angle and
+    in mode "moment" with the assumed slope S. The contact position is updated from angle and
     moment whenever the moment mode begins.
 
     References

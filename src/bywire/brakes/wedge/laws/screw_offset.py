@@ -24,7 +24,7 @@ class Parameters(ParameterSet):
     """
 
     law: Literal["preload", "scheduled"]
-    """whether the offset depends on the actuation force"""
+    """dependence of the offset on the actuation force"""
     delta_preload: Position
     """offset of each screw from the middle, preload"""
     delta_together: Position
@@ -36,7 +36,7 @@ class Parameters(ParameterSet):
     T_change: Duration
     """time constant with which the offset changes, slow against the position loop"""
     k_hat: GearRatio
-    """travel per shaft angle as the controller believes it"""
+    """travel per shaft angle, assumed by the controller"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:

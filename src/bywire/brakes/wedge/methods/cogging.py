@@ -1,6 +1,6 @@
 """Cogging torque of a motor from slow rotation both ways (Roberts 2003, section "Motor").
 
-Cogging depends on the angle and is the same both ways; dry friction changes its sign.
+Cogging depends on the angle and is the same in both directions; dry friction changes its sign.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.brakes.wedge.experiments import slow_rotation
-from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.core.errors import ParameterError
+from bywire.brakes.wedge.rigs.rig_case import turned
+from bywire.core.errors import ParameterError, not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.core.typing import Array
@@ -36,12 +36,10 @@ from bywire.identification.unknown import Unknown
 from bywire.plant import axial_bearing, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
 
-# The fit of cogging and friction to the torque of a shaft that turns slowly both ways.
-
-_LEVEL = 1e-3  # of a false alarm
-_OTHER = 0.1  # of the cogging, that the friction's slope may leave to doubt
+_LEVEL = 1e-3  # significance level: share of false alarms
+_OTHER = 0.1  # largest share of the cogging that the friction's slope may explain
 _FRICTION = ("T_forward", "T_backward", "friction_slope")
-_FALSE = 1e-3  # chance that noise alone shows an order
+_FALSE = 1e-3  # chance of an order by noise alone
 _MOST = 8
 
 
@@ -50,8 +48,8 @@ class Turning:
     """A shaft that turns slowly, sample by sample, shapes (n,).
 
     ``angle``: [rad]; ``way``: 1 forward, -1 backward; ``speed``: magnitude [rad/s]; ``torque``: of
-    the motor, less what accelerates the inertia [N m]; ``waves``: ``waves(order) -> (cosine,
-    sine)`` of the angle, filtered like the torque.
+    the motor, minus the torque that accelerates the inertia [N m]; ``waves``: ``waves(order) ->
+    (cosine, sine)`` of the angle, filtered like the torque.
     """
 
     angle: Array
@@ -62,7 +60,7 @@ class Turning:
 
     @cached_property
     def leveled(self) -> Array:
-        """Torque less its mean of each way."""
+        """Torque minus its mean of each direction."""
         rest = self.torque.copy()
         for way in (1.0, -1.0):
             rest[self.way == way] -= rest[self.way == way].mean()
@@ -70,7 +68,7 @@ class Turning:
 
     @cached_property
     def friction_columns(self) -> Array:
-        """Forward, backward, and the speed's deviation from its mean of each way."""
+        """Forward, backward, and the speed's deviation from its mean of each direction."""
         ways = [self.way == way for way in (1.0, -1.0)]
         ripple = sum(way * (self.speed - self.speed[way].mean()) for way in ways)
         return np.column_stack((1.0 * ways[0], -1.0 * ways[1], self.way * ripple))
@@ -78,9 +76,9 @@ class Turning:
 
 @dataclass(frozen=True)
 class CoggingFit:
-    """What was fitted.
+    """Fit of cogging and friction.
 
-    ``turning``: to what; ``orders``: strongest first; ``estimate``: of ``cogging_problem``.
+    ``turning``: data; ``orders``: strongest first; ``estimate``: of ``cogging_problem``.
     """
 
     turning: Turning
@@ -135,9 +133,9 @@ def cogging_problem(turning: Turning, orders: tuple[int, ...]) -> Problem:
 def same_both_ways(cogging: CoggingFit) -> Check:
     r"""Return whether the main order changes with the direction, as cogging does not.
 
-    Two more columns, cosine and sine with the sign of the direction, on what is left over: their
-    coefficients c over their covariance C, :math:`c^T C^{-1} c / 2`, is of size one where friction
-    does not depend on the angle.
+    Two more columns, cosine and sine with the sign of the direction, are fitted to the residual.
+    With their coefficients c and covariance C, :math:`c^T C^{-1} c / 2` is about one where
+    friction does not depend on the angle.
     """
     from scipy import stats
 
@@ -154,11 +152,10 @@ def same_both_ways(cogging: CoggingFit) -> Check:
 
 
 def slope_as_known(cogging: CoggingFit, known: float) -> Check:
-    """Return how much of the ripple is left to a slope of the friction that is not the known one.
+    """Return the share of the ripple that the fit explains by friction beyond its known slope.
 
-    Friction that depends on the angle, and friction that falls with the speed while cogging makes
-    the speed ripple, look alike: what the fit gives to the slope beyond the known one may be
-    either.
+    Friction that depends on the angle looks like friction that falls with the speed while cogging
+    makes the speed ripple. The fitted slope in excess of the known one may be either.
 
     ``known``: slope of the friction over speed by its law [N m s/rad].
     """
@@ -166,7 +163,7 @@ def slope_as_known(cogging: CoggingFit, known: float) -> Check:
     slope = fit["friction_slope"] if "friction_slope" in fit.names else known
     ripple = float(np.sqrt(2.0) * np.std(cogging.turning.friction_columns[:, 2]))
     share = abs(slope - known) * ripple / max(fit["motor_1.T_cog"], 1e-300)
-    note = "ripple given to the friction's slope beyond its law, over the cogging: angular friction"
+    note = "ripple explained by friction beyond its law, over the cogging: angular friction"
     return Check("slope_beyond_law", share, limit=_OTHER, note=note)
 
 
@@ -178,7 +175,7 @@ def amplitudes(angle: Array, torque: Array, highest: int) -> Array:
     angle
         [rad], shape (n,); spread evenly over whole revolutions, or nearly so.
     torque
-        Its mean taken off, shape (n,).
+        Without its mean, shape (n,).
     """
     sizes = np.empty(highest)
     turn = np.exp(-1j * angle)
@@ -192,40 +189,41 @@ def amplitudes(angle: Array, torque: Array, highest: int) -> Array:
 def standing_out(angle: Array, torque: Array, highest: int) -> tuple[int, ...]:
     """Return the orders that stand out of the noise, strongest first.
 
-    The power of noise at an order is distributed exponentially, and its mean is the median over
-    all orders by log 2; what exceeds it more than chance lets any order do counts. One after the
-    other is taken off, so that a strong one does not leak into others.
+    The power of noise at an order has an exponential distribution; its mean is the median over all
+    orders divided by log 2. An order counts if its power exceeds that mean more than chance allows
+    for any order. Orders are subtracted one after the other, so that a strong one does not leak
+    into others.
     """
-    left, orders = torque - torque.mean(), list[int]()
+    residual, orders = torque - torque.mean(), list[int]()
     limit = math.log(highest / _FALSE) / math.log(2.0)
     while len(orders) < _MOST:
-        power = amplitudes(angle, left, highest) ** 2
+        power = amplitudes(angle, residual, highest) ** 2
         best = int(np.argmax(power)) + 1
         if best in orders or power[best - 1] <= limit * float(np.median(power)):
             break
         orders.append(best)
         A = np.column_stack([f(n * angle) for n in orders for f in (np.cos, np.sin)])
         A = np.column_stack((np.ones(angle.size), A))
-        left = torque - A @ np.linalg.lstsq(A, torque, rcond=None)[0]
+        residual = torque - A @ np.linalg.lstsq(A, torque, rcond=None)[0]
     return tuple(orders)
 
 
 _ADVICE = "turn the shaft slowly by whole revolutions both ways, as 'bywire run slow-rotation' does"
 _BINS = 36
-_THINNED = 0.8  # of half the new sample rate: what the low-pass lets pass
+_THINNED = 0.8  # cutoff of the low-pass over half the new sample rate
 
 
 class Options(ParameterSet):
-    """How the signals are filtered, which orders are looked for, and the synthetic noise."""
+    """Filters, orders, and the synthetic noise."""
 
     cutoff: Frequency
-    """low-pass of torque and angle; cogging has to pass it"""
+    """low-pass of torque and angle; it must pass the cogging"""
     slowest: AngularSpeed
-    """speed below which the shaft counts as turning round"""
+    """speed below which the shaft counts as reversing"""
     margin: Duration
     """time left out at either end of a motion"""
     highest: Annotated[int, Unit("1", 400.0), Field(ge=1, le=10000)]
-    """highest order of a revolution that is looked for"""
+    """highest order of a revolution in the search"""
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
     """noise of the measured current in synthetic measurements"""
 
@@ -239,18 +237,19 @@ def identify(
         K_T i - J \dot\omega = \sum_n T_n \sin(n \theta + \varphi_n)
         \pm T_{FRICT} + d\,(\omega \mp \bar\omega)
 
-    The last term is what friction changes with the ripple of the speed.
+    The last term is the change of friction with the ripple of the speed.
 
     Parameters
     ----------
     data
         ``i_1`` [A], ``q_1`` [rad]. Torque constant and inertia, the
-        dummy shaft's included, are known.
+        dummy shaft's included, must be known.
 
     Raises
     ------
     ParameterError
-        When the shaft turns one way only, too little, no order stands out, or a sign is wrong.
+        When the shaft turns in one direction only or too little, no order exceeds the noise, or a
+        sign is wrong.
 
     References
     ----------
@@ -261,8 +260,10 @@ def identify(
     orders = standing_out(turning.angle, turning.leveled, options.highest)
     if not orders:
         raise ParameterError(
-            f"no order up to {options.highest} stands out of the noise: turn slower or by more "
-            "revolutions, or raise options.highest"
+            f"no order up to {options.highest} exceeds the noise: turn slower or by more "
+            "revolutions, or raise options.highest",
+            name="options.highest",
+            value=str(options.highest),
         )
     best = estimate(cogging_problem(turning, orders))
     cogging = CoggingFit(turning, orders, best)
@@ -284,7 +285,7 @@ def identify(
 
 
 def _require_braking(turning: Turning) -> None:
-    """Refuse a motor that the friction drives: it has to push the shaft both ways."""
+    """Require that the motor drives the shaft in both directions, against the friction."""
     forward, backward = (float(turning.torque[turning.way == w].mean()) for w in (1.0, -1.0))
     friction = 0.5 * (forward - backward)
     if friction < 0.0:
@@ -292,13 +293,13 @@ def _require_braking(turning: Turning) -> None:
 
 
 def _slope(par: WedgeParameters, turning: Turning) -> float:
-    """Return the slope of the known friction over the speed at the test's."""
+    """Return the slope of the known friction over speed, at the speed of the test."""
     speed = float(turning.speed.mean())
-    beside = [
+    friction = [
         axial_bearing.friction(axial_bearing.Input(0.0, share * speed), par.bearing)
         for share in (0.9, 1.1)
     ]
-    return float((beside[1] - beside[0]) / (0.2 * speed)) + par.motor_1.D_M
+    return float((friction[1] - friction[0]) / (0.2 * speed)) + par.motor_1.D_M
 
 
 def _notes(best: Estimate, orders: tuple[int, ...]) -> tuple[str, ...]:
@@ -306,7 +307,7 @@ def _notes(best: Estimate, orders: tuple[int, ...]) -> tuple[str, ...]:
     notes = [f"the cogging's zero lies {-turned_by:.4g} degrees of shaft angle from the encoder's"]
     if len(orders) > 1:
         notes.append(
-            f"orders {', '.join(map(str, orders[1:]))} show as well; the model has one, the "
+            f"orders {', '.join(map(str, orders[1:]))} are present too; the model has only the "
             f"strongest ({orders[0]})"
         )
     return tuple(notes)
@@ -325,23 +326,26 @@ def _turning(data: xr.Dataset, par: WedgeParameters, options: Options) -> Turnin
     strokes = windows(omega, interval, options.slowest, options.margin, every * interval)
     if not strokes:
         raise ParameterError(
-            f"the shaft never turns faster than {options.slowest:g} rad/s: {_ADVICE}"
+            f"by q_1 the shaft never turns faster than {options.slowest:g} rad/s: {_ADVICE}",
+            name="q_1",
+            valid=f"{options.slowest:g} rad/s",
         )
     rows = np.array([w.rows.start for w in strokes])
     ways = np.sign(omega[rows])
     if np.all(ways > 0) or np.all(ways < 0):
         raise ParameterError(
-            "the shaft turns one way only: dry friction and an offset of the current cannot be "
-            f"told apart; {_ADVICE}"
+            "by q_1 the shaft turns in one direction only, so that dry friction and an offset of "
+            f"the current cannot be separated: {_ADVICE}",
+            name="q_1",
         )
     fastest = float(np.abs(omega[rows]).max())
     passes = 2.0 * np.pi * options.cutoff / fastest
     if options.highest > passes:
-        raise ParameterError(
-            f"options.highest = {options.highest} is not valid: at {fastest:.3g} rad/s the "
-            f"low-pass of {options.cutoff:g} Hz lets orders up to {passes:.0f} pass; turn slower, "
-            "raise options.cutoff, or ask for lower orders"
+        advice = (
+            f"the highest order that a low-pass of {options.cutoff:g} Hz passes at {fastest:.3g} "
+            "rad/s; turn slower, or raise options.cutoff"
         )
+        raise not_valid("options.highest", str(options.highest), f"<= {passes:.0f}", advice)
     angle = data["q_1"].values
 
     def passed(values: Array) -> Array:
@@ -357,7 +361,7 @@ def _turning(data: xr.Dataset, par: WedgeParameters, options: Options) -> Turnin
 
 
 def _folded(cogging: CoggingFit) -> Curve:
-    """Return torque over one period of the main order, friction taken off, both ways."""
+    """Return torque without friction over one period of the main order, both directions."""
     turning, order = cogging.turning, cogging.orders[0]
     x = np.mod(order * turning.angle, 2.0 * np.pi)
     middle = (np.arange(_BINS) + 0.5) * 2.0 * np.pi / _BINS
@@ -385,7 +389,7 @@ def _folded(cogging: CoggingFit) -> Curve:
 
 
 def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return the slow rotation, simulated, with the sensor's noise, from any angle."""
+    """Return the simulated slow rotation with sensor noise, from a random angle."""
     experiment = slow_rotation.EXPERIMENT
     case = experiment.cases(par, experiment.defaults, None)[0]
     random = np.random.default_rng(seed)
@@ -394,7 +398,7 @@ def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
 
 
 def truth(par: WedgeParameters, options: Options) -> dict[str, float]:
-    """Return phase and friction that ``synthetic`` puts in."""
+    """Return the true phase and friction of ``synthetic``."""
     speed = slow_rotation.EXPERIMENT.defaults.omega_slow  # type: ignore[attr-defined]
     bearing = axial_bearing.friction(axial_bearing.Input(0.0, speed), par.bearing)
     friction = float(bearing) + par.motor_1.D_M * speed
@@ -404,7 +408,7 @@ def truth(par: WedgeParameters, options: Options) -> dict[str, float]:
 METHOD = Method(
     name="cogging",
     assembly="wedge-brake",
-    summary="orders of the cogging torque, amplitude and phase, and dry friction apart from them",
+    summary="orders of the cogging torque, amplitude and phase, and the dry friction",
     experiment="slow-rotation",
     signals={"i_1": "A", "q_1": "rad"},
     options=Options,
@@ -419,6 +423,6 @@ METHOD = Method(
         "amplitude.N": ("N*m", "of a weaker order N, with its phase.N"),
         "T_forward": ("N*m", "dry friction forward"),
         "T_backward": ("N*m", "dry friction backward"),
-        "friction_slope": ("N*m*s/rad", "friction over speed, at the test's"),
+        "friction_slope": ("N*m*s/rad", "friction over speed, at the speed of the test"),
     },
 )

@@ -24,7 +24,7 @@ _CLAMPED = {"rig.load": "dummy", "rig.clamp": "closed", "rig.mode_1": "current"}
 
 
 class Options(LoopOptions):
-    """What is unknown, and the synthetic experiment."""
+    """Unknowns, and the synthetic experiment."""
 
     i_step: Current
     """synthetic: largest demand"""
@@ -51,7 +51,7 @@ LOOP = CurrentLoop(
 
 
 def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return steps of the demand on the rig of one motor, simulated, with the sensor's noise."""
+    """Return simulated steps of the demand on the rig of one motor, with sensor noise."""
     check_current("i_step", options.i_step, par)
     T = par.control.T_fast
     demand = levels(-options.i_step, options.i_step, options.duration, options.dwell, T, seed=1)

@@ -1,40 +1,326 @@
-"""Force over current of a screw drive: calibration line, friction to either side, offset.
-
-For a brake without a force sensor: what force a current means, and how far friction may be off.
-"""
+"""Force over current of a screw drive: calibration line, friction to either side, offset."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Annotated
+
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
+from pydantic import Field
 
-from bywire.brakes.wedge.experiments import force_cycle
-from bywire.brakes.wedge.methods.drive_train import cogging_waves, force_current
-from bywire.brakes.wedge.methods.drive_train.force_current import (
-    Reading,
-    Squeeze,
-    branches,
-    law,
-    squeeze,
-)
-from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
-    SIGNALS,
-    SIMULATED,
-    RigOptions,
-    drive_sensors,
-)
-from bywire.brakes.wedge.methods.turned import turned
+from bywire.brakes.wedge.experiments.stiffness import FORCE_CYCLE
 from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.rigs.rig_case import turned
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.core.typing import Array
 from bywire.data.labeled import at_own_places, over
+from bywire.identification.differentiation import low_passed
+from bywire.identification.equation import windows
 from bywire.identification.least_squares import Problem, estimate
+from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Curve, Effort, Identified, Method
+from bywire.identification.output_error import even_interval
 from bywire.identification.residuals import lack_of_fit
-from bywire.identification.sensed import sensed
-from bywire.plant import roller_screw, servo_motor
+from bywire.identification.sensed import Sensor, sensed
+from bywire.identification.unknown import Unknown
+from bywire.plant import axial_bearing, roller_screw, servo_motor
+from bywire.plant.axial_bearing import AngularSpeed
+
+SIGNALS: Mapping[str, str] = {"i_1": "A", "i_2": "A", "q_1": "rad", "q_2": "rad", "y_F": "N"}
+"""currents, angles, compressive force: name -> SI unit"""
+
+SIMULATED = ("sigma_i", "sigma_F")
+"""options that synthetic measurements alone use"""
+
+
+class RigOptions(ParameterSet):
+    """Part of the motion that counts, and the synthetic noise."""
+
+    cutoff: Frequency
+    """low-pass of the speed"""
+    slowest: AngularSpeed
+    """speed of one motor toward the other that counts as motion"""
+    margin: Duration
+    """time left out at either end of a motion"""
+    window: Duration
+    """time over which signals are averaged"""
+    sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
+    """noise of the measured currents in synthetic measurements"""
+    sigma_F: Annotated[float, Unit("N", 5.0), Field(ge=0)]
+    """noise of the force sensor in synthetic measurements"""
+
+
+def drive_sensors(options: RigOptions) -> dict[str, Sensor]:
+    """Return the sensors of a synthetic measurement: currents, angles of the shafts, force."""
+    sensors = {name: Sensor(name, options.sigma_i) for name in ("i_1", "i_2")}
+    sensors |= {name: Sensor(name) for name in ("q_1", "q_2")}
+    return sensors | {"y_F": Sensor("y_F", options.sigma_F)}
+
+
+# --- Cogging of two motors that squeeze a force between their screws
+
+_WAVES = {
+    "cos": "cogging of known order over the motors' angle against each other, cosine",
+    "sin": "the same, sine",
+    "cos_drift": "effect of a drift of both motors in the same direction, cosine",
+    "sin_drift": "the same, sine",
+}
+
+
+def cogging_waves(q_1: Array, q_2: Array, order: float) -> Array:
+    r"""Return the waves that cogging makes in the current that squeezes, shape (n, 4).
+
+    .. math::
+        \{\cos\psi, \sin\psi\} \times \{\cos\delta, \sin\delta\}, \qquad
+        \psi = N \frac{q_1 - q_2}{2}, \quad \delta = N \frac{q_1 + q_2}{2}
+
+    with :math:`\delta` minus its mean: every :math:`a \cos(N q_1 + \varphi_1) + b \cos(N q_2 +
+    \varphi_2)` is a sum of them. The motors turn against each other, and :math:`\delta` is only
+    the common motion that cogging causes; its waves vanish with it.
+
+    Where one motor stands, its cogging is a part of the offset and not a wave: the result is then
+    the waves of the other, and zeros.
+
+    ``q_1``, ``q_2``: angles [rad], shape (n,); ``order``: periods per revolution, N.
+    """
+    moving = [q for q in (q_1, q_2) if order * np.ptp(q) > np.pi]
+    if len(moving) == 1:
+        none = np.zeros_like(q_1)
+        return np.column_stack((np.cos(order * moving[0]), np.sin(order * moving[0]), none, none))
+    psi, both = 0.5 * order * (q_1 - q_2), 0.5 * order * (q_1 + q_2)
+    delta = both - both.mean()
+    wave = np.column_stack((np.cos(psi), np.sin(psi)))
+    return np.hstack((np.cos(delta)[:, None] * wave, np.sin(delta)[:, None] * wave))
+
+
+def cogging_unknowns(par: WedgeParameters, stage: str) -> tuple[Unknown, ...]:
+    """Return the unknown amplitudes of the waves in the current of a stage."""
+    K = servo_motor.torque_constant(par.motor_1)
+    size = max(par.motor_1.T_cog, par.motor_2.T_cog, 1e-4) / K
+    return tuple(
+        Unknown(name, 0.0, scale=10.0 * size, unit=unit)
+        for name, (unit, _) in cogging_meanings(stage).items()
+    )
+
+
+def cogging_meanings(stage: str) -> dict[str, tuple[str, str]]:
+    """Return SI unit and meaning of the unknowns of a stage, by name."""
+    return {f"cogging.{stage}.{name}": ("A", text) for name, text in _WAVES.items()}
+
+
+# --- Current over force: a mean line, and friction to either side of it
+# Two motors squeeze a force between their screws; one of them at rest is the same.
+
+LAW_MEANINGS: Mapping[str, tuple[str, str]] = {
+    "offset": ("A", "current at zero force, i_0"),
+    "force_per_current": ("N/A", "slope of the line, c"),
+    "half_width": ("A", "friction to either side without force, w_0"),
+    "half_width_slope": ("A/N", "its growth with force, w_1"),
+    "half_width_curvature": ("A/N**2", "and with the square of force, w_2"),
+}
+"""unknowns of the law -> SI unit and meaning"""
+
+LAW_NAMES = tuple(LAW_MEANINGS)
+_AGAINST = -0.5  # correlation of current and force that is not by chance
+
+
+@dataclass(frozen=True)
+class Squeeze:
+    """Steady motion of two screws toward each other or apart, by window, shapes (n,).
+
+    Parameters
+    ----------
+    i
+        Current that squeezes, mean of both motors, at the reference speed [A].
+    F
+        Force by the sensor, corrected for the lag of its amplifier, compression positive [N].
+    d
+        Approach of the nuts by the encoders [m].
+    way
+        1 closing, -1 opening.
+    waves
+        Of the cogging, shape (n, 4).
+    reach
+        Travel one margin before a window begins, and at its end [m], shape (n, 2): events in
+        between affect the window.
+    each
+        Speed of one motor in each window [rad/s].
+    speed
+        Reference speed of one motor, to which the current is corrected [rad/s].
+    """
+
+    i: Array
+    F: Array
+    d: Array
+    way: Array
+    waves: Array
+    reach: Array
+    each: Array
+    speed: float
+
+    def only(self, rows: NDArray[np.bool_]) -> Squeeze:
+        """Return some of the windows."""
+        columns = {f.name: getattr(self, f.name)[rows] for f in fields(self) if f.name != "speed"}
+        return replace(self, **columns)
+
+    def under(self, F: Array, par: WedgeParameters) -> Squeeze:
+        """Return the same with other forces, and the current corrected for them."""
+        before = _speed_effect(self.F, self.each, self.speed, par)
+        after = _speed_effect(F, self.each, self.speed, par)
+        return replace(self, i=self.i + self.way * (before - after), F=F)
+
+
+def squeeze(
+    data: xr.Dataset,
+    par: WedgeParameters,
+    options: RigOptions,
+    where: str,
+    reference_speed: float | None = None,
+) -> Squeeze:
+    """Return the steady motions of a record.
+
+    Parameters
+    ----------
+    data
+        ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N].
+    par
+        Lead of the screw, order of the cogging, corner of the force sensor, and how the friction
+        of bearings and motors changes with speed.
+    options
+        How the record is filtered and cut into windows.
+    where
+        Name of the record in messages.
+    reference_speed
+        Speed of one motor [rad/s] to which the current is corrected; the record's mean by default.
+
+    Raises
+    ------
+    ParameterError
+        When the motors do not move both ways, or their currents go against the force.
+    """
+    interval = even_interval(data["time"].values)
+    q_1, q_2 = data["q_1"].values, data["q_2"].values
+    speed = np.gradient(low_passed(q_1 - q_2, interval, options.cutoff), interval)
+    steady = windows(speed, interval, options.slowest, options.margin, options.window)
+    side = np.sign(low_passed(data["y_F"].values, interval, options.cutoff))
+    # Where the force changes its sign, friction has a kink, and a mean over it violates the law.
+    steady = [w for w in steady if abs(float(side[w.rows].mean())) in (0.0, 1.0)]
+    ways = np.array([np.sign(speed[w.rows].mean()) for w in steady])
+    if not (np.any(ways > 0) and np.any(ways < 0)):
+        raise ParameterError(
+            f"{where}: the screws do not move both toward each other and apart at more than "
+            f"{options.slowest:g} rad/s, so that friction and force cannot be separated: squeeze "
+            "and let go slowly, as 'bywire run force-cycle' does",
+            name=where,
+        )
+
+    def means(values: Array) -> Array:
+        return np.array([values[w.rows].mean(axis=0) for w in steady])
+
+    # The sensor's amplifier lags, one way while the force rises, the other while it falls.
+    lag = 1.0 / (2.0 * np.pi * par.rig.sensor.f_F)
+    rate = np.gradient(low_passed(data["y_F"].values, interval, options.cutoff), interval)
+    F = means(data["y_F"].values + lag * rate)
+    i = means(0.5 * (data["i_1"].values - data["i_2"].values))
+    _require_along(i, F, where)
+    each = 0.5 * np.abs(means(speed))
+    stated = float(each.mean()) if reference_speed is None else reference_speed
+    beyond = _speed_effect(F, each, stated, par)
+    d = roller_screw.slope(par.screw) * (q_1 - q_2)
+    skip = round(options.margin / interval)
+    return Squeeze(
+        i=i - ways * beyond,
+        F=F,
+        d=means(d),
+        way=ways,
+        waves=means(cogging_waves(q_1, q_2, par.motor_1.N_cog)),
+        reach=np.array([(d[w.rows.start - skip], d[w.rows.stop - 1]) for w in steady]),
+        each=each,
+        speed=stated,
+    )
+
+
+def _require_along(i: Array, F: Array, where: str) -> None:
+    """Require currents that squeeze where the sensor shows compression."""
+    together = float(np.corrcoef(i, F)[0, 1]) if np.ptp(F) > 0.0 and np.ptp(i) > 0.0 else 0.0
+    if together < _AGAINST:
+        raise wrong_sign(
+            f"i_1 - i_2 of {where}", "y_F", f"correlation {together:.2f}, compression positive"
+        )
+
+
+def _speed_effect(F: Array, speed: Array, stated: float, par: WedgeParameters) -> Array:
+    """Return the current by which friction at each speed exceeds that at the reference speed [A].
+
+    A position loop yields under load, so that the screws close slower than they open. The friction
+    of bearings and motors changes with the speed, which would turn the line.
+    """
+    motor = par.motor_1
+    bearing = np.array(
+        [
+            axial_bearing.friction(axial_bearing.Input(float(f), float(w)), par.bearing)
+            - axial_bearing.friction(axial_bearing.Input(float(f), stated), par.bearing)
+            for f, w in zip(F, speed, strict=True)
+        ]
+    )
+    return (bearing + motor.D_M * (speed - stated)) / servo_motor.torque_constant(motor)
+
+
+def law_unknowns(par: WedgeParameters) -> tuple[Unknown, ...]:
+    r"""Return the unknowns of the law, with starting values of the parameter set.
+
+    .. math::
+        i = i_0 + F/c \pm (w_0 + w_1 |F| + w_2 F^2), \quad
+        \frac{1}{c} = \frac{L}{2\pi} \frac{1/\eta_f + \eta_b}{2 K_T}, \quad
+        w_1 = \frac{L}{2\pi} \frac{1/\eta_f - \eta_b}{2 K_T} + \frac{C_1}{K_T}
+
+    with :math:`w_0 = C_0 (1 + G_S) / K_T` and :math:`w_2 = C_2 / K_T` of the bearings' friction.
+    """
+    K = 0.5 * sum(servo_motor.torque_constant(m) for m in (par.motor_1, par.motor_2))
+    k, screw, bearing = roller_screw.slope(par.screw), par.screw, par.bearing
+    c = 2.0 * K / (k * (1.0 / screw.eta_f + screw.eta_b))
+    half = bearing.C_0 * (1.0 + bearing.G_S) / K
+    slope = 0.5 * k * (1.0 / screw.eta_f - screw.eta_b) / K + bearing.C_1 / K
+    curvature = bearing.C_2 / K
+    return (
+        Unknown(LAW_NAMES[0], 0.0, scale=half, unit="A"),
+        Unknown(LAW_NAMES[1], c, low=1e-3 * c, high=1e3 * c, scale=c, unit="N/A"),
+        Unknown(LAW_NAMES[2], half, scale=half, unit="A"),
+        Unknown(LAW_NAMES[3], slope, scale=max(slope, 0.1 / c), unit="A/N"),
+        Unknown(LAW_NAMES[4], curvature, scale=max(curvature, 1e-4 / c), unit="A/N**2"),
+    )
+
+
+def law(F: Array, way: Array, values: Array) -> tuple[Array, Array, Array]:
+    """Return the current, its derivatives by the unknowns (n, 5), and by the force (n,)."""
+    c = values[1]
+    size = np.abs(F)
+    columns = np.column_stack((np.ones_like(F), -F / c**2, way, way * size, way * size**2))
+    w_0, w_1, w_2 = values[2:5]
+    i = values[0] + F / c + way * (w_0 + w_1 * size + w_2 * size**2)
+    return i, columns, 1.0 / c + way * np.sign(F) * (w_1 + 2.0 * w_2 * size)
+
+
+def branches(squeezed: Squeeze, power: int, x: Array) -> Array:
+    """Return separate polynomials over x for closing and opening, below, at and above zero."""
+    scaled = x / max(float(np.abs(x).max()), 1e-300)
+    groups = [
+        (squeezed.way == way) & (np.sign(x) == side) for way in (1, -1) for side in (1, 0, -1)
+    ]
+    of_groups = [g[:, None] * np.vander(scaled, power + 1) for g in groups if g.any()]
+    return np.hstack(of_groups)
+
+
+# --- The method
+# For a brake without a force sensor: what force a current means, and how far friction may be off.
 
 _GAP = np.full((2, 1), np.nan)
-_LAW = len(force_current.NAMES)
+_LAW = len(LAW_NAMES)
 
 
 def identify(
@@ -44,7 +330,7 @@ def identify(
 
     .. math:: i = i_0 + F/c \pm (w_0 + w_1 |F| + w_2 F^2)
 
-    with the upper sign while the screws close; cogging of known order is fitted beside it.
+    with the upper sign while the screws close. Cogging of known order is fitted at the same time.
 
     Parameters
     ----------
@@ -55,15 +341,14 @@ def identify(
     Raises
     ------
     ParameterError
-        When they move one way only.
+        When the motors move in one direction only.
 
     References
     ----------
     Roberts et al. (2003), section "Rollerscrew and bearings": loss of the screw, bearing friction.
     """
-    reading = Reading(options.cutoff, options.slowest, options.margin, options.window)
-    cycle = squeeze(data, par, reading, "the record")
-    unknowns = force_current.unknowns(par) + cogging_waves.unknowns(par, "sensor")
+    cycle = squeeze(data, par, options, "the record")
+    unknowns = law_unknowns(par) + cogging_unknowns(par, "sensor")
     scatter = _scatter(cycle)
 
     def evaluate(values: Array) -> tuple[Array, Array]:
@@ -72,8 +357,10 @@ def identify(
         return e / scatter, np.hstack((columns, cycle.waves)) / scatter
 
     best = estimate(Problem(unknowns, evaluate))
-    known = {u.label: u.start for u in unknowns} | dict(zip(best.names, best.values, strict=True))
-    values = np.array([known[u.label] for u in unknowns])
+    estimates = {u.label: u.start for u in unknowns} | dict(
+        zip(best.names, best.values, strict=True)
+    )
+    values = np.array([estimates[u.label] for u in unknowns])
     return Identified(
         estimates={"force over current": best},
         parameters={},
@@ -85,14 +372,14 @@ def identify(
                 np.ones(cycle.i.size),
                 np.hstack((branches(cycle, 3, cycle.F), cycle.waves)),
                 len(best.values),
-                "whether current over force bends in a way that the law does not",
+                "whether current over force deviates from the law",
             ),
         ),
         curves=(_curve(cycle, values),),
         notes=(
             "half widths hold at the mean speed of the test; at rest the force may be anywhere "
-            "between",
-            "how the bearings' friction changes with speed is taken from the parameter set",
+            "within them",
+            "the change of the bearings' friction with speed is that of the parameter set",
         ),
     )
 
@@ -121,7 +408,7 @@ def _curve(cycle: Squeeze, values: Array) -> Curve:
     places, rows = [], []
     for sign in (1.0, -1.0):
         F, i = cycle.F[cycle.way == sign], measured[cycle.way == sign]
-        # A gap at zero force: nothing was read right at the kink there.
+        # A gap at zero force: no window lies at the kink there.
         places.append(np.append(F, 0.0))
         branch = np.array((i, law(F, np.full(F.size, sign), values)[0]))
         rows.append(np.append(branch, _GAP, axis=1))
@@ -131,12 +418,12 @@ def _curve(cycle: Squeeze, values: Array) -> Curve:
     F, table = at_own_places(places, rows)
     return Curve(
         "current-over-force",
-        "Current over force, closing and opening, with the calibration line between.",
+        "Current over force, closing and opening, with the calibration line in the middle.",
         over(
             ("F", F, "N", "force"),
             {"measured": table[0], "modeled": table[1]},
             "A",
-            "current, cogging taken off",
+            "current without cogging",
             ("direction", ("closing", "opening", "mean line")),
         ),
         "F",
@@ -144,17 +431,16 @@ def _curve(cycle: Squeeze, values: Array) -> Curve:
 
 
 def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Dataset:
-    """Return the force cycle on the sensor, simulated, with the sensors' noise."""
-    experiment = force_cycle.EXPERIMENT
-    case = experiment.cases(par, experiment.defaults, None)[0]
+    """Return the simulated force cycle on the sensor, with sensor noise."""
+    case = FORCE_CYCLE.cases(par, FORCE_CYCLE.defaults, None)[0]
     random = np.random.default_rng(seed)
     begun = turned(case, random.uniform(0.0, 2.0 * np.pi))
     return sensed(begun, drive_sensors(options), random)
 
 
 def truth(par: WedgeParameters, options: RigOptions) -> dict[str, float]:
-    """Return the line and the growth of the friction that the laws of screw and bearing mean."""
-    known = {u.label: u.start for u in force_current.unknowns(par)}
+    """Return the true line and growth of the friction by the laws of screw and bearing."""
+    known = {u.label: u.start for u in law_unknowns(par)}
     return {name: known[name] for name in ("offset", "force_per_current", "half_width_slope")}
 
 
@@ -172,5 +458,5 @@ METHOD = Method(
     synthetic=synthetic,
     simulated=SIMULATED,
     truth=truth,
-    further={**force_current.MEANINGS, **cogging_waves.meanings("sensor")},
+    further={**LAW_MEANINGS, **cogging_meanings("sensor")},
 )

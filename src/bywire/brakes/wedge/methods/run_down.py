@@ -1,8 +1,7 @@
 """Inertia and friction from run-downs of a motor (Roberts 2003, sections "Motor", "Bearings").
 
-A run-down alone tells friction and damping per inertia only: with all of them twice as large the
-shaft stops just the same. What is known beside it sets the scale: an inertia that is added, or the
-torque of a current.
+A run-down alone determines friction and damping per inertia only: with all of them twice as large
+the shaft stops in the same way. An added inertia, or the torque of a known current, sets the scale.
 """
 
 from __future__ import annotations
@@ -16,9 +15,9 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.brakes.wedge.experiments import run_down
-from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
+from bywire.brakes.wedge.rigs.rig_case import turned
+from bywire.brakes.wedge.rigs.shaft_rig import DrivenShaft
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
@@ -43,36 +42,15 @@ from bywire.identification.unknown import Unknown, parameters_of
 from bywire.plant import servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
 
-# Run-downs of a motor as records: their motion, what was known on the shaft, and the fit.
-
 INERTIA = "motor_1.J_M"
 NAMES = (INERTIA, "bearing.C_0", "bearing.T_nu", "motor_1.D_M")
 _ADVICE = "let a fast shaft coast, as 'bywire run run-down' does"
-_SCALE = 0.02  # of the torque that decelerates: what a known one has to be to set the scale
-
-
-@dataclass(frozen=True)
-class Reading:
-    """How a record is read.
-
-    Parameters
-    ----------
-    cutoff
-        Low-pass before the angle is differentiated [Hz].
-    slowest, margin, length
-        Of the motion [rad/s], and times [s]; see
-        :func:`bywire.identification.equation.windows`.
-    """
-
-    cutoff: float
-    slowest: float
-    margin: float
-    length: float
+_SCALE = 0.02  # least known torque that sets the scale, over the decelerating torque
 
 
 @dataclass(frozen=True)
 class RunDown:
-    """One record: its motion, what was on the shaft, and the equation's error over it."""
+    """One record: its motion, the load on the shaft, and the equation of motion."""
 
     label: str
     par: WedgeParameters
@@ -86,16 +64,18 @@ class RunDown:
         return window_residuals(self.equation, self.par, unknowns, self.motion)
 
 
-def read_run(label: str, data: xr.Dataset, par: WedgeParameters, reading: Reading) -> RunDown:
-    """Return a record's motion; what is added to the shaft counts as part of the dummy."""
+def read_run(label: str, data: xr.Dataset, par: WedgeParameters, options: Options) -> RunDown:
+    """Return a record's motion; an inertia added to the shaft counts as part of the dummy."""
     seen = data.rename({"q_1": "theta", "i_1": "i"})
-    moved = differentiated(seen[["theta", "i"]], "theta", ("omega", "alpha"), reading.cutoff)
+    moved = differentiated(seen[["theta", "i"]], "theta", ("omega", "alpha"), options.cutoff)
     moved["F"] = ("time", np.zeros(moved.sizes["time"]), {"units": "N"})
-    motion = motions(moved, "omega", reading.slowest, reading.margin, reading.length)
+    motion = motions(moved, "omega", options.slowest, options.margin, options.window)
     if len(motion.windows) < len(NAMES):
         raise ParameterError(
-            f"record {label} keeps above {reading.slowest:g} rad/s for {len(motion.windows)} "
-            f"windows of {1e3 * reading.length:g} ms: too few; {_ADVICE}"
+            f"record {label} has too few windows of {1e3 * options.window:g} ms above "
+            f"{options.slowest:g} rad/s, {len(motion.windows)}: {_ADVICE}",
+            name=f"record {label}",
+            value=str(len(motion.windows)),
         )
     added = float(data["J_added"].values[0])
     run_par = par.replace(
@@ -103,7 +83,7 @@ def read_run(label: str, data: xr.Dataset, par: WedgeParameters, reading: Readin
     )
     K_T = servo_motor.torque_constant(par.motor_1)
     torque = K_T * float(np.mean(motion.means(moved["i"].values)))
-    equation = Equation(DrivenShaft(), "omega", "alpha", reading.slowest)
+    equation = Equation(DrivenShaft(), "omega", "alpha", options.slowest)
     return RunDown(label, run_par, motion, added, torque, equation)
 
 
@@ -117,11 +97,11 @@ def _deceleration(run: RunDown) -> float:
     return float(np.mean(np.abs(run.motion.means(run.motion.data["alpha"].values))))
 
 
-def scale_is_told(runs: Sequence[RunDown]) -> bool:
-    """Return whether an inertia or a torque that is known weighs beside what is not.
+def has_scale(runs: Sequence[RunDown]) -> bool:
+    """Tell whether a known inertia or torque is large enough to set the scale.
 
-    The current that the back-EMF drives through the loop is in proportion to the deceleration: it
-    counts like inertia, and sets no scale worth the name.
+    The current that the back-EMF drives through the loop is proportional to the deceleration. It
+    acts like inertia and does not set a useful scale.
     """
     J = [run.par.motor_1.J_M + run.par.rig.J_dummy for run in runs]
     if max(J) - min(J) > _SCALE * min(J):
@@ -131,7 +111,7 @@ def scale_is_told(runs: Sequence[RunDown]) -> bool:
 
 
 def by_source(runs: Sequence[RunDown]) -> dict[str, tuple[float, float]]:
-    """Return the inertia and its deviation by the added inertia alone, by the current alone."""
+    """Return the inertia and its deviation, by the added inertia alone and by the current alone."""
     quiet = min(abs(run.torque) for run in runs)
     J = min(run.par.motor_1.J_M + run.par.rig.J_dummy for run in runs)
     small = _SCALE * J * max(map(_deceleration, runs))
@@ -140,7 +120,7 @@ def by_source(runs: Sequence[RunDown]) -> dict[str, tuple[float, float]]:
     same = [run for run in runs if run.added == first]
     inertias = {}
     for name, chosen in (("added_inertia", bare), ("current", same)):
-        if not 1 < len(chosen) < len(runs) or not scale_is_told(chosen):
+        if not 1 < len(chosen) < len(runs) or not has_scale(chosen):
             continue
         best = fitted(chosen, NAMES)
         if INERTIA in best.names:
@@ -149,14 +129,14 @@ def by_source(runs: Sequence[RunDown]) -> dict[str, tuple[float, float]]:
     return inertias
 
 
-def left_over(runs: Sequence[RunDown], best: Estimate) -> list[Array]:
-    """Return what is left over of every record [N m], by window."""
+def residuals_of(runs: Sequence[RunDown], best: Estimate) -> list[Array]:
+    """Return the residual torques of every record [N m], by window."""
     values = best.parameters()
     unknowns = [u for u in best.unknowns if u.name in values]
     at = np.array([values[u.name] for u in unknowns])
-    kept = {k.unknown.name: k.unknown.start for k in best.kept}
+    fixed = {k.unknown.name: k.unknown.start for k in best.kept}
     return [
-        replace(run, par=run.par.replace(kept)).problem(unknowns).evaluate(at)[0] for run in runs
+        replace(run, par=run.par.replace(fixed)).problem(unknowns).evaluate(at)[0] for run in runs
     ]
 
 
@@ -165,10 +145,10 @@ _AGREE = 3.0  # standard deviations
 
 
 class Options(ParameterSet):
-    """Which part of a run-down counts, how it is filtered, and the synthetic noise."""
+    """Part of a run-down that counts, filter, and the synthetic noise."""
 
     slowest: AngularSpeed
-    """speed down to which a run-down counts; slower, cogging and Stribeck effect rule it"""
+    """speed down to which a run-down counts; below, cogging and Stribeck effect dominate"""
     margin: Duration
     """time left out at either end of that part"""
     window: Duration
@@ -178,13 +158,13 @@ class Options(ParameterSet):
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
     """noise of the measured current in synthetic measurements"""
     sigma_q: Annotated[float, Unit("rad", 1e-4), Field(ge=0)]
-    """noise of the angle in synthetic measurements, beside whole counts"""
+    """noise of the angle in synthetic measurements, in addition to whole counts"""
 
 
 def identify(
     data: xr.Dataset, par: WedgeParameters, options: Options, effort: Effort
 ) -> Identified:
-    r"""Return inertia and friction, or their ratios where nothing known sets the scale.
+    r"""Return inertia and friction, or their ratios without a known scale.
 
     .. math::
         (J_M + J_{dummy} + J_{added}) \dot\omega
@@ -193,9 +173,9 @@ def identify(
     Parameters
     ----------
     data
-        One or several records: ``q_1`` [rad], ``i_1`` [A] as measured (a drive whose demand is
-        zero lets through what the falling back-EMF drives), and ``J_added`` [kg m^2], the known
-        inertia on the shaft beside the dummy's.
+        One or several records: ``q_1`` [rad], ``i_1`` [A] as measured (with zero demand, the
+        falling back-EMF still drives a current), and ``J_added`` [kg m^2], the known inertia
+        on the shaft in addition to the dummy's.
 
     Raises
     ------
@@ -206,9 +186,8 @@ def identify(
     ----------
     Roberts et al. (2003), sections "Motor", "Rollerscrew and bearings".
     """
-    reading = Reading(options.cutoff, options.slowest, options.margin, options.window)
-    runs = [read_run(label or "run", record, par, reading) for label, record in split(data).items()]
-    names = NAMES if scale_is_told(runs) else NAMES[1:]
+    runs = [read_run(label or "run", record, par, options) for label, record in split(data).items()]
+    names = NAMES if has_scale(runs) else NAMES[1:]
     best = fitted(runs, names)
     is_scaled = INERTIA in best.names
     if not is_scaled and INERTIA in names:
@@ -221,16 +200,16 @@ def identify(
         | {f"inertia_by_{k}": (value, "kg*m**2") for k, (value, _) in sources.items()},
         checks=(_fits(runs, best), *_agreement(sources)),
         curves=(_curve(runs, best),),
-        notes=() if is_scaled else (_untold(par),),
+        notes=() if is_scaled else (_no_scale(par),),
     )
 
 
-def _untold(par: WedgeParameters) -> str:
+def _no_scale(par: WedgeParameters) -> str:
     return (
-        "the inertia is not told: a run-down alone tells friction and damping per inertia only. "
-        "Those ratios are right; the torques hold for motor_1.J_M = "
-        f"{shown(par.motor_1.J_M, 'kg*m**2')} as given. Add a record with a known inertia on the "
-        "shaft (J_added), or with a known current while it coasts"
+        "the data do not determine the inertia: a run-down alone determines friction and damping "
+        "per inertia only. Those ratios are valid; the torques assume motor_1.J_M = "
+        f"{shown(par.motor_1.J_M, 'kg*m**2')}. Add a record with a known inertia on the shaft "
+        "(J_added), or with a known current while it coasts"
     )
 
 
@@ -238,17 +217,17 @@ def _agreement(sources: dict[str, tuple[float, float]]) -> tuple[Check, ...]:
     if len(sources) < 2:
         return ()
     (a, da), (b, db) = sources.values()
-    note = "inertia by the added one less that by the current: is the torque constant right"
+    note = "inertia by the added one minus that by the current: is the torque constant right"
     value = abs(a - b) / float(np.hypot(da, db))
     return (Check("inertias_agree", value, limit=_AGREE, note=note),)
 
 
 def _fits(runs: Sequence[RunDown], best: Estimate) -> Check:
-    """Return whether a cubic over the speed of its own for every record would fit better."""
-    left = left_over(runs, best)
-    rows, columns, weights = sum(map(len, left)), [], []
+    """Return whether a separate cubic over speed for every record would fit better."""
+    residuals = residuals_of(runs, best)
+    rows, columns, weights = sum(map(len, residuals)), [], []
     begin = 0
-    for run, e in zip(runs, left, strict=True):
+    for run, e in zip(runs, residuals, strict=True):
         speed = run.motion.means(run.motion.data["omega"].values)
         cubic = np.zeros((rows, 4))
         cubic[begin : begin + e.size] = np.vander(speed / np.abs(speed).max(), 4)
@@ -257,11 +236,11 @@ def _fits(runs: Sequence[RunDown], best: Estimate) -> Check:
         begin += e.size
     return lack_of_fit(
         "torque_left_over",
-        np.concatenate(left),
+        np.concatenate(residuals),
         np.concatenate(weights),
         np.hstack(columns),
         len(best.values),
-        "whether friction over speed has another shape than the laws",
+        "whether friction over speed deviates from the laws",
     )
 
 
@@ -280,7 +259,7 @@ def _curve(runs: Sequence[RunDown], best: Estimate) -> Curve:
     """Return the decelerating torque over the speed, measured and modeled."""
     values = best.parameters()
     speeds, table = [], []
-    for run, e in zip(runs, left_over(runs, best), strict=True):
+    for run, e in zip(runs, residuals_of(runs, best), strict=True):
         J = values.get(INERTIA, run.par.motor_1.J_M) + run.par.rig.J_dummy
         moved = run.motion.data
         torque = run.motion.means(J * moved["alpha"].values)
@@ -302,7 +281,7 @@ def _curve(runs: Sequence[RunDown], best: Estimate) -> Curve:
 
 
 def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return the three run-downs, simulated, with the sensor's noise, from any angle."""
+    """Return the three simulated run-downs with sensor noise, from random angles."""
     experiment = run_down.EXPERIMENT
     random = np.random.default_rng(seed)
     sensors = {"q_1": Sensor("q_1", options.sigma_q), "i_1": Sensor("i_1", options.sigma_i)}

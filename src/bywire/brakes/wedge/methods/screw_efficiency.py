@@ -1,8 +1,7 @@
 """Roller-screw efficiency, driving and driven back, from a sweep of the load (Roberts 2003).
 
-Current and speed of both motors and the force between them give two torque balances. What grows
-with the force in proportion is the screw's loss, what is there without force or grows with its
-square the bearings'.
+Current and speed of both motors and the force between them give two torque balances. Friction
+proportional to the force is the screw's; friction without force, or with its square, the bearings'.
 """
 
 from __future__ import annotations
@@ -12,16 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from bywire.brakes.wedge.experiments import load_sweep
-from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
+from bywire.brakes.wedge.experiments.screw_efficiency import LOAD_SWEEP
+from bywire.brakes.wedge.methods.force_calibration import (
     SIGNALS,
     SIMULATED,
     RigOptions,
     drive_sensors,
 )
-from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
+from bywire.brakes.wedge.rigs.rig_case import turned
+from bywire.brakes.wedge.rigs.shaft_rig import DrivenShaft
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.core.units import shown
@@ -43,8 +42,6 @@ from bywire.identification.unknown import parameters_of
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
 
-# Strokes of a screw that drives and is driven back: what is read of each, and left over.
-
 
 @dataclass(frozen=True)
 class Stroke:
@@ -52,7 +49,7 @@ class Stroke:
 
     ``side``: motor, 1 or 2; ``omega``: speed [rad/s]; ``F``: magnitude of the force [N];
     ``drives``: whether the screw drives the load, or is driven back by it; ``torque``: of the
-    motor, along the motion [N m]; ``error``: what the fit leaves over of it [N m].
+    motor, along the motion [N m]; ``error``: residual torque of the fit [N m].
     """
 
     side: int
@@ -79,7 +76,7 @@ def strokes(shaft: Motions, residuals: Array, par: WedgeParameters, side: int) -
 
 
 def fits(strokes_read: list[Stroke], best: Estimate) -> Check:
-    """Return whether a curve of its own for every shaft and direction would fit better."""
+    """Return whether a separate curve for every shaft and direction would fit better."""
     F = np.array([s.F for s in strokes_read]) / max(s.F for s in strokes_read)
     kind = [(s.side, s.drives) for s in strokes_read]
     groups = [np.array([each == k for each in kind], dtype=float) for k in sorted(set(kind))]
@@ -93,20 +90,20 @@ def fits(strokes_read: list[Stroke], best: Estimate) -> Check:
         np.array([1.0 / scatter[s.side] for s in strokes_read]),
         np.column_stack([g * F**power for g in groups for power in (0, 1, 2)]),
         len(best.values),
-        "whether torque over force curves or shifts in a way that the laws do not have",
+        "whether torque over force deviates from the laws",
     )
 
 
 _NAMES = ("screw.eta_f", "screw.eta_b", "bearing.C_0", "bearing.C_2")
-_SPREAD = 1.5  # by which forces have to differ for friction with and without load to part
+_SPREAD = 1.5  # least ratio of forces that separates friction with and without load
 _ADVICE = "turn the screw both ways, slowly, under several forces, as 'bywire run load-sweep' does"
 
 
 class Options(RigOptions):
-    """Which strokes count, and the synthetic noise."""
+    """Strokes that count, and the synthetic noise."""
 
     slowest: AngularSpeed
-    """speed that a stroke keeps"""
+    """least speed of a stroke"""
 
 
 def identify(
@@ -121,8 +118,9 @@ def identify(
     Parameters
     ----------
     data
-        ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N], compression positive. Known are
-        torque constants, inertias, the lead, and how the bearings' friction changes with speed.
+        ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N], compression positive. Torque
+        constants, inertias, the lead, and the change of the bearings' friction with speed must be
+        known.
 
     Raises
     ------
@@ -141,8 +139,10 @@ def identify(
     for side, shaft in zip(("1", "2"), shafts, strict=True):
         if not shaft.windows:
             raise ParameterError(
-                f"motor {side} never turns faster than {options.slowest:g} rad/s for long: "
-                f"{_ADVICE}"
+                f"by q_{side}, motor {side} never keeps above {options.slowest:g} rad/s for long: "
+                f"{_ADVICE}",
+                name=f"q_{side}",
+                valid=f"above {options.slowest:g} rad/s",
             )
     _require_loads(shafts)
     _require_losses(shafts, rig_par)
@@ -163,9 +163,9 @@ def identify(
         checks=(fits(strokes_read, best),),
         curves=(_curve(strokes_read),),
         notes=(
-            "a part of the bearings' friction that grows in proportion to the force (C_1) shows "
-            f"as loss of the screw: taken as {shown(par.bearing.C_1, 'N*m/N')}",
-            "the growth of the bearings' friction with speed is taken from the parameter set",
+            "a part of the bearings' friction that is proportional to the force (C_1) looks like "
+            f"a loss of the screw: assumed {shown(par.bearing.C_1, 'N*m/N')}",
+            "the change of the bearings' friction with speed is that of the parameter set",
         ),
     )
 
@@ -173,7 +173,7 @@ def identify(
 def _moved(data: xr.Dataset, par: WedgeParameters, side: str, options: Options) -> Motions:
     """Return one shaft's motions, in terms of motor 1.
 
-    What differs between the motors goes into the current, so that one equation holds for both.
+    Differences between the motors are added to the current, so that one equation holds for both.
     """
     motor = par.motor_1 if side == "1" else par.motor_2
     force = -data["y_F"] if side == "1" else data["y_F"]
@@ -187,7 +187,7 @@ def _moved(data: xr.Dataset, par: WedgeParameters, side: str, options: Options) 
 
 
 def _require_loads(shafts: list[Motions]) -> None:
-    """Refuse strokes under one force only, where all friction looks alike."""
+    """Require strokes under several forces, which separate the kinds of friction."""
     forces: dict[bool, list[float]] = {True: [], False: []}
     for shaft in shafts:
         F = shaft.means(shaft.data["F"].values)
@@ -198,19 +198,16 @@ def _require_loads(shafts: list[Motions]) -> None:
         seen = forces[kind]
         if not seen or max(seen) < _SPREAD * min(seen):
             word = "driving" if kind else "driven back"
+            never = f"the screw is never {word}"
+            cause = f"{word}, the force stays near {max(seen):.3g} N" if seen else never
             raise ParameterError(
-                f"the data does not tell screw.{name} from bearing.C_0: "
-                + (
-                    f"{word}, the force stays near {max(seen):.3g} N"
-                    if seen
-                    else f"the screw is never {word}"
-                )
-                + f"; {_ADVICE}"
+                f"the data do not separate screw.{name} from bearing.C_0: {cause}; {_ADVICE}",
+                name=f"screw.{name}",
             )
 
 
 def _require_losses(shafts: list[Motions], par: WedgeParameters) -> None:
-    """Refuse a screw that gains power: both when it drives and when it is driven it loses some."""
+    """Require a screw that loses power, both when it drives and when it is driven."""
     k, K_T = roller_screw.slope(par.screw), servo_motor.torque_constant(par.motor_1)
     for side, shaft in zip(("1", "2"), shafts, strict=True):
         omega, F, i = (shaft.means(shaft.data[n].values) for n in ("omega", "F", "i"))
@@ -262,9 +259,8 @@ def _curve(strokes_read: list[Stroke]) -> Curve:
 
 
 def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return the load sweep, simulated, with the sensors' noise."""
-    experiment = load_sweep.EXPERIMENT
-    case = experiment.cases(par, experiment.defaults, None)[0]
+    """Return the simulated load sweep, with sensor noise."""
+    case = LOAD_SWEEP.cases(par, LOAD_SWEEP.defaults, None)[0]
     random = np.random.default_rng(seed)
     begun = turned(case, random.uniform(0.0, 2.0 * np.pi))
     return sensed(begun, drive_sensors(options), random)
@@ -273,7 +269,7 @@ def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
 METHOD = Method(
     name="screw-efficiency",
     assembly="wedge-brake",
-    summary="roller screw's efficiency driving and driven back, bearing friction apart",
+    summary="roller screw's efficiency driving and driven back, without the bearing friction",
     experiment="load-sweep",
     signals=SIGNALS,
     options=Options,

@@ -1,8 +1,8 @@
 """Stiffnesses and free-play of the drive train from the two-stage test (Roberts 2003).
 
-First the screws squeeze and pull a force sensor: stiffness of the screws, and what force a current
-means. Then they work in the brake heart, where the current tells the force: tip to tip while they
-close, through the wedge while they open, and nothing in between.
+First the screws squeeze and pull a force sensor, which gives their stiffness and the force per
+current. Then they work in the brake heart, where the current gives the force: tip to tip while they
+close, through the wedge while they open, and zero in between.
 """
 
 from __future__ import annotations
@@ -16,24 +16,20 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.brakes.wedge.experiments import force_cycle
-from bywire.brakes.wedge.methods.drive_train import cogging_waves, force_current
-from bywire.brakes.wedge.methods.drive_train.force_current import (
-    Reading,
-    Squeeze,
-    branches,
-    law,
-    squeeze,
-)
-from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
+from bywire.brakes.wedge.experiments.stiffness import FORCE_CYCLE, LABELS
+from bywire.brakes.wedge.methods import force_calibration
+from bywire.brakes.wedge.methods.force_calibration import (
     SIGNALS,
     SIMULATED,
     RigOptions,
+    Squeeze,
+    branches,
     drive_sensors,
+    law,
+    squeeze,
 )
-from bywire.brakes.wedge.methods.turned import turned
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import slope_of
+from bywire.brakes.wedge.rigs.rig_case import slope_of, turned
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.data.labeled import over
@@ -47,8 +43,6 @@ from bywire.identification.sensed import Sensor, sensed
 from bywire.identification.unknown import Unknown, parameters_of
 from bywire.plant import shaft_encoder
 
-# The two-stage stiffness test as one fit: force over travel, and current over force, in both.
-
 _STIFFNESS = ("heart.K_S", "heart.K_W", "heart.K_C")
 _S, _W, _C, _ZERO, _CLOSED, _PLAY = range(6)
 _LAW = slice(6, 11)
@@ -56,34 +50,34 @@ _SENSOR, _HEART, _LOOP = slice(11, 15), slice(15, 19), 19
 MEANINGS: Mapping[str, tuple[str, str]] = {
     "zero_of_travel": ("m", "travel without force on the sensor, d_0"),
     "tips_touch": ("m", "travel at which the tips touch, d_c"),
-    "free_play": ("m", "from there to where the wedge is pulled, d_c - d_t"),
-    **force_current.MEANINGS,
-    **cogging_waves.meanings("sensor"),
-    **cogging_waves.meanings("heart"),
-    "travel_loop": ("m", "by how much the encoders stay behind the motion, h"),
+    "free_play": ("m", "from there to the pull on the wedge, d_c - d_t"),
+    **force_calibration.LAW_MEANINGS,
+    **force_calibration.cogging_meanings("sensor"),
+    **force_calibration.cogging_meanings("heart"),
+    "travel_loop": ("m", "lag of the encoders behind the motion, h"),
 }
-"""unknowns beside the stiffnesses -> SI unit and meaning"""
+"""unknowns other than the stiffnesses -> SI unit and meaning"""
 
-_SHARE = 0.3  # of the largest current, beyond which a contact is surely closed
+_SHARE = 0.3  # share of the largest current above which a contact is surely closed
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """Rough travels at which the tips touch, and the wedge [m]."""
+    """Approximate travels at which the tips touch, and the wedge [m]."""
 
     closed: float
     apart: float
 
 
 def started(par: WedgeParameters, sensor: Squeeze, heart: Squeeze, advice: str) -> Contacts:
-    """Return where the contacts roughly are: where lines through loading cross no force.
+    """Return the approximate contacts: zero crossings of lines through the loading.
 
     Raises
     ------
     ParameterError
-        When one of them is not reached.
+        When the record does not reach one of them.
     """
-    values = np.array([u.start for u in force_current.unknowns(par)])
+    values = np.array([u.start for u in force_calibration.law_unknowns(par)])
     friction = values[2]
     unknowns = []
     for way, what in ((1.0, "tip to tip"), (-1.0, "through the wedge")):
@@ -91,23 +85,25 @@ def started(par: WedgeParameters, sensor: Squeeze, heart: Squeeze, advice: str) 
         loading = (heart.way == way) & (level > _SHARE * np.abs(sensor.i).max())
         if int(loading.sum()) < 3 or not np.ptp(heart.d[loading]) > 0.0:
             raise ParameterError(
-                f"record heart: the screws do not load each other {what}: travel further; {advice}"
+                f"record heart: the screws do not load each other {what}: travel further; {advice}",
+                name="record heart",
             )
         slope, start = np.polyfit(heart.d[loading], level[loading], 1)
         unknowns.append(float((friction - start) / slope))
     if not unknowns[0] > unknowns[1]:
         raise ParameterError(
-            "record heart: closing and opening load the screws at the same travel: there is no "
-            "free-play to find, or the currents' signs are wrong"
+            "record heart: closing and opening load the screws at the same travel: they have no "
+            "free-play, or the currents' signs are wrong",
+            name="record heart",
         )
     return Contacts(*unknowns)
 
 
 def clear_of(contacts: Contacts, heart: Squeeze) -> NDArray[np.bool_]:
-    """Return the windows in which no contact opens or closes, nor has done so just before.
+    """Return the windows without a contact that opens or closes in them or just before.
 
-    There force over travel has a kink, which a mean over a window rounds off, and the motors
-    change their speed.
+    At a contact, force over travel has a kink, which a mean over a window rounds off, and the
+    motors change their speed.
     """
     low, high = heart.reach.min(axis=1), heart.reach.max(axis=1)
     kinks = np.array([contacts.closed, contacts.apart])
@@ -117,10 +113,10 @@ def clear_of(contacts: Contacts, heart: Squeeze) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class TwoStages:
-    """What was measured in both stages, and the unknowns of the fit.
+    """Measurements of both stages, and the unknowns of the fit.
 
-    ``par``: what is known, the sensor's stiffness among it, and starts; ``sensor``, ``heart``: the
-    stages; ``contacts``: where the search begins.
+    ``par``: known parameters, the sensor's stiffness included, and starting values; ``sensor``,
+    ``heart``: the stages; ``contacts``: start of the search.
     """
 
     par: WedgeParameters
@@ -137,9 +133,9 @@ class TwoStages:
             Unknown("zero_of_travel", float(np.mean(self.sensor.d)), scale=play, unit="m"),
             Unknown("tips_touch", self.contacts.closed, scale=play, unit="m"),
             Unknown("free_play", play, low=0.0, scale=play, unit="m"),
-            *force_current.unknowns(self.par),
-            *cogging_waves.unknowns(self.par, "sensor"),
-            *cogging_waves.unknowns(self.par, "heart"),
+            *force_calibration.law_unknowns(self.par),
+            *force_calibration.cogging_unknowns(self.par, "sensor"),
+            *force_calibration.cogging_unknowns(self.par, "heart"),
             Unknown("travel_loop", 0.0, scale=1e-3 * play, unit="m"),
         )
 
@@ -151,7 +147,7 @@ class TwoStages:
         )  # type: ignore[return-value]
 
     def touching(self, values: Array) -> Contacts:
-        """Return where the contacts are."""
+        """Return the contacts."""
         return Contacts(float(values[_CLOSED]), float(values[_CLOSED] - values[_PLAY]))
 
     def slopes(self, values: Array) -> tuple[float, float]:
@@ -160,7 +156,7 @@ class TwoStages:
         return float(1.0 / (c_S + c_C)), float(1.0 / (c_S + c_W))
 
     def sensor_force(self, values: Array) -> tuple[Array, Array]:
-        """Return the straight line less the sensor's force, and its derivatives."""
+        """Return the straight line minus the sensor's force, and its derivatives."""
         stage, J = self.sensor, np.zeros((self.sensor.d.size, len(values)))
         K = 1.0 / (2.0 / values[_S] + 1.0 / self.par.rig.sensor.K_F)
         away = stage.d + stage.way * values[_LOOP] - values[_ZERO]
@@ -170,7 +166,7 @@ class TwoStages:
         return K * away - stage.F, J
 
     def sensor_current(self, values: Array) -> tuple[Array, Array]:
-        """Return the law's current at the sensor's force less the measured one."""
+        """Return the law's current at the sensor's force minus the measured one."""
         stage, J = self.sensor, np.zeros((self.sensor.d.size, len(values)))
         i, J[:, _LAW], _ = law(stage.F, stage.way, values[_LAW])
         J[:, _SENSOR] = stage.waves
@@ -191,7 +187,7 @@ class TwoStages:
         return K_c * close - K_t * apart, J
 
     def heart_current(self, values: Array) -> tuple[Array, Array]:
-        """Return the law's current at that force less the measured one."""
+        """Return the law's current at that force minus the measured one."""
         stage = self.heart
         F, J_F = self.heart_force(values, stage)
         i, columns, slope = law(F, stage.way, values[_LAW])
@@ -201,42 +197,42 @@ class TwoStages:
         return i + stage.waves @ values[_HEART] - stage.i, J
 
     def force_by_current(self, values: Array) -> Array:
-        """Return the force that the heart's current says, to first order around the fit."""
+        """Return the force by the heart's current, to first order around the fit."""
         F, _ = self.heart_force(values, self.heart)
         slope = law(F, self.heart.way, values[_LAW])[2]
         return np.asarray(F - self.heart_current(values)[0] / slope)
 
     def fits(self, values: Array, count: int) -> Check:
-        """Return whether curves of their own for every branch of both stages would fit better.
+        """Return whether separate curves for every branch of both stages would fit better.
 
-        ``count``: number of unknowns that were told.
+        ``count``: number of estimated unknowns.
         """
-        left = [part.evaluate(values)[0] for part in self.parts()]
+        residuals = [part.evaluate(values)[0] for part in self.parts()]
         F, d = self.heart_force(values, self.heart)[0], self.sensor.d
         richer = (
             np.column_stack((np.vander(d / np.ptp(d), 4), self.sensor.way)),
             np.hstack((branches(self.sensor, 3, self.sensor.F), self.sensor.waves)),
             np.hstack((branches(self.heart, 3, F), self.heart.waves)),
         )
-        rows, columns = sum(e.size for e in left), sum(A.shape[1] for A in richer)
+        rows, columns = sum(e.size for e in residuals), sum(A.shape[1] for A in richer)
         table, weights = np.zeros((rows, columns)), []
         row = column = 0
-        for e, A in zip(left, richer, strict=True):
+        for e, A in zip(residuals, richer, strict=True):
             table[row : row + e.size, column : column + A.shape[1]] = A
             row, column = row + e.size, column + A.shape[1]
             weights.append(np.full(e.size, 1.0 / max(float(np.sqrt(np.mean(e**2))), 1e-300)))
         return lack_of_fit(
             "left_over",
-            np.concatenate(left),
+            np.concatenate(residuals),
             np.concatenate(weights),
             table,
             count,
-            "whether force over travel or current over force bends or shifts otherwise",
+            "whether force over travel or current over force deviates from the laws",
         )
 
 
-_PASSES = 3  # a fit finds the contacts, one without their kinks the forces, one uses both
-_WITHIN = 0.5  # of the clearance, in which the wedge stands when the test begins
+_PASSES = 3  # fits: of the contacts, of the forces without kinks, and with both
+_WITHIN = 0.5  # share of the clearance in which the wedge starts the test
 _ADVICE = "squeeze and pull with and without the brake heart, as 'bywire run force-cycle' does"
 
 
@@ -251,16 +247,16 @@ def identify(
         d = d_q \pm h
 
     on the sensor and in the heart, with the travel d of one nut toward the other; the free-play is
-    :math:`d_c - d_t`. What the encoders show, :math:`d_q`, stays behind the motion by h, and the
-    damping of screws and sensor counts as more of it. In the heart F is what the current says, by
-    the law of ``methods.drive_train.force_current``, which is fitted to both stages at once;
-    windows in which a contact opens or closes, or has just done so, are left out.
+    :math:`d_c - d_t`. The encoders' :math:`d_q` lags behind the motion by h; the damping of screws
+    and sensor adds to h. In the heart F is the force by the current, by the law of
+    ``methods.force_calibration``, which is fitted to both stages at once. Windows in which a
+    contact opens or closes, or has just done so, are omitted.
 
     Parameters
     ----------
     data
         Two records, ``sensor`` and ``heart``: ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad],
-        ``y_F`` [N], which the second does not use. Known is the sensor's stiffness.
+        ``y_F`` [N], which the second does not use. The sensor's stiffness must be known.
 
     Raises
     ------
@@ -272,14 +268,16 @@ def identify(
     Roberts et al. (2003), section "Drive train stiffnesses".
     """
     records = split(data)
-    for label in force_cycle.LABELS:
+    for label in LABELS:
         if label not in records:
             raise ParameterError(
                 f"the measurement has no record {label} (it has {_named(records)}): "
-                f"give one file each, sensor and heart; {_ADVICE}"
+                f"give one file each, sensor and heart; {_ADVICE}",
+                name=f"record {label}",
+                value=_named(records),
             )
-    sensor = squeeze(records["sensor"], par, _reading(options, None), "record sensor")
-    heart = squeeze(records["heart"], par, _reading(options, sensor.speed), "record heart")
+    sensor = squeeze(records["sensor"], par, options, "record sensor")
+    heart = squeeze(records["heart"], par, options, "record heart", sensor.speed)
     stages, best, values, heart = _fitted(par, sensor, heart)
     F = stages.heart_force(values, stages.heart)[0]
     return Identified(
@@ -294,8 +292,8 @@ def identify(
         checks=(stages.fits(values, len(best.values)),),
         curves=(_curve(replace(stages, heart=heart), values),),
         notes=(
-            "free-play is told as a whole: g_1 + g_2 + g_12; how it is shared is not",
-            f"the sensor's stiffness is taken as {par.rig.sensor.K_F / 1e6:g} N/um",
+            "the data determine the whole free-play, g_1 + g_2 + g_12, but not its parts",
+            f"the sensor's stiffness is assumed as {par.rig.sensor.K_F / 1e6:g} N/um",
         ),
     )
 
@@ -305,16 +303,16 @@ def _fitted(
 ) -> tuple[TwoStages, Estimate, Array, Squeeze]:
     """Return stages, fit, its values, and all windows in the heart.
 
-    Where contacts change, and what force slows the motors, the fit before tells.
+    Each fit takes the contacts, and the force that slows the motors, from the one before.
     """
     contacts = started(par, sensor, heart, _ADVICE)
     for _ in range(_PASSES):
         clear = heart.only(clear_of(contacts, heart))
         stages = TwoStages(par, sensor, clear, contacts)
         best = steady_dynamics(stages.parts(), stages.unknowns, _ADVICE)
-        known = {u.label: u.start for u in stages.unknowns}
-        known |= dict(zip(best.names, best.values.tolist(), strict=True))
-        values = np.array([known[u.label] for u in stages.unknowns])
+        estimates = {u.label: u.start for u in stages.unknowns}
+        estimates |= dict(zip(best.names, best.values.tolist(), strict=True))
+        values = np.array([estimates[u.label] for u in stages.unknowns])
         contacts = stages.touching(values)
         heart = heart.under(stages.heart_force(values, heart)[0], par)
     return stages, best, values, heart
@@ -322,10 +320,6 @@ def _fitted(
 
 def _named(records: dict[str, xr.Dataset]) -> str:
     return ", ".join(name for name in records if name) or "one without a name"
-
-
-def _reading(options: RigOptions, speed: float | None) -> Reading:
-    return Reading(options.cutoff, options.slowest, options.margin, options.window, speed)
 
 
 def _curve(stages: TwoStages, values: Array) -> Curve:
@@ -346,9 +340,8 @@ def _curve(stages: TwoStages, values: Array) -> Curve:
 
 
 def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Dataset:
-    """Return both stages, simulated, with the sensors' noise; there is no force in the heart."""
-    experiment = force_cycle.EXPERIMENT
-    on_sensor, in_heart = experiment.cases(par, experiment.defaults, None)
+    """Return both simulated stages with sensor noise; the heart has no force sensor."""
+    on_sensor, in_heart = FORCE_CYCLE.cases(par, FORCE_CYCLE.defaults, None)
     random = np.random.default_rng(seed)
     sensors = drive_sensors(options)
     first = sensed(turned(on_sensor, random.uniform(0.0, 2.0 * np.pi)), sensors, random)
@@ -365,8 +358,8 @@ def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Datase
 
 
 def truth(par: WedgeParameters, options: RigOptions) -> dict[str, float]:
-    """Return free-play and calibration that ``synthetic`` puts in."""
-    known = {u.label: u.start for u in force_current.unknowns(par)}
+    """Return the true free-play and calibration of ``synthetic``."""
+    known = {u.label: u.start for u in force_calibration.law_unknowns(par)}
     heart = par.heart
     return {
         "free_play": heart.g_1 + heart.g_2 + heart.g_12,

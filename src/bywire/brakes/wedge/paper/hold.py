@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import xarray as xr
 
-from bywire.brakes.wedge.case import parameters_of
-from bywire.brakes.wedge.paper.facts import FACTS
-from bywire.brakes.wedge.paper.runs import (
+from bywire.brakes.wedge.case import parameters_of, with_friction
+from bywire.brakes.wedge.paper.statements import (
+    FACTS,
     MAIN,
     WITHOUT_RUNOUT,
     parameters,
@@ -15,7 +15,6 @@ from bywire.brakes.wedge.paper.runs import (
     standby,
     tan_alpha,
 )
-from bywire.brakes.wedge.series import with_friction
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
 
@@ -25,19 +24,19 @@ LOADED = {"M_high": 500.0, "t_hold": 2.0}
 
 
 def part(runs: Runs) -> Part:
-    """Return what holds the brake, and at which power."""
+    """Return the causes that hold the brake, and its power."""
     off = runs.bench("power-off-hold", MAIN)
     items = [*_power_off(runs), *_standing(runs), *_together(runs)]
     text = (
         "Without power the brake near its neutral point keeps its moment: dry friction of "
-        "bearings, screws and wedge holds what little the wedge asks for, and nothing creeps. Far "
+        "bearings, screws and wedge holds the small actuation force, and nothing creeps. Far "
         "below the neutral point the wedge pushes the motors back until friction holds it."
     )
     run = off.recordings["run"]
     exhibit = Exhibit(
         "power-off-hold",
         lambda: stacked(run),
-        "Power off at 500 Nm: what is left is the run-out's ripple.",
+        "Power off at 500 Nm: only the run-out's ripple remains.",
     )
     return Part("Holding", text, tuple(items), (exhibit,), {"power-off-hold": run})
 
@@ -49,7 +48,7 @@ def _power_off(runs: Runs) -> list[Item]:
     low = {**with_friction(parameters(), AWAY, known=True), **WITHOUT_RUNOUT}
     far = kpis(runs.bench("power-off-hold", MAIN, low))
     still = Fact(
-        0.0, "m", "physical bound: what dry friction holds does not creep", "physical bound"
+        0.0, "m", "physical bound: a body that dry friction holds does not creep", "physical bound"
     )
     return [
         compared(
@@ -71,7 +70,7 @@ def _power_off(runs: Runs) -> list[Item]:
             usual["relaxation"],
             "change of the wedge's travel from power off until all stick",
         ),
-        found("hold.preload", "N", usual["preload_end"], "preload that is left"),
+        found("hold.preload", "N", usual["preload_end"], "remaining preload"),
         found(
             "hold.far",
             "%",
@@ -86,7 +85,7 @@ def _share(values: dict[str, float]) -> float:
 
 
 def _standing(runs: Runs) -> list[Item]:
-    """Return what carries the wedge on a standing disc, for both readings of it."""
+    """Return the force balance of the wedge on a standing disc, for both readings."""
     result = runs.bench("disc-stop", MAIN)
     values = kpis(result)
     shares = {name: _self_reinforcement(run) for name, run in result.recordings.items()}
@@ -115,7 +114,7 @@ def _standing(runs: Runs) -> list[Item]:
 
 
 def _self_reinforcement(run: xr.Dataset) -> float:
-    """Return the share of the wedge's reaction that the motors need not give, disc at rest."""
+    """Return the share of the wedge's reaction that the motors do not supply, disc at rest."""
     still = parameters_of(run).flywheel.Omega_still
     standing = run.where((abs(run["Omega"]) <= still) & (run["M_set"] > 0.0), drop=True)
     last = standing.isel(time=-1)

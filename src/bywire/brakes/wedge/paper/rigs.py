@@ -1,12 +1,15 @@
-"""Section "Initial tests": current loop, screw efficiency, drive-train stiffness."""
+"""The drive train: current loop, efficiency, stiffness, position control, force fight."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
 
-from bywire.brakes.wedge.paper.facts import FACTS
-from bywire.brakes.wedge.paper.runs import MAIN, parameters
+import numpy as np
+import xarray as xr
+
+from bywire.brakes.wedge.paper.statements import FACTS, MAIN, parameters
+from bywire.plant import roller_screw
 from bywire.report.time_traces import time_traces
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
@@ -16,7 +19,7 @@ MICRON = 1e6
 
 
 def current_loop(runs: Runs) -> Part:
-    """Return how fast the current loop is, over windings and gains."""
+    """Return the bandwidth of the current loop, over windings and gains."""
     result = runs.bench("current-loop", MAIN)
     values = kpis(result)
     bandwidths = [value for name, value in values.items() if name.startswith("bandwidth")]
@@ -63,14 +66,14 @@ def efficiency(runs: Runs) -> Part:
             put_in,
             values["eta_f"],
             note=f"with the bearings' torque, {bearing} without load and its growth with the "
-            "force, taken off",
+            "force, subtracted",
         ),
         compared(
             "efficiency.no_load",
             put_in,
             values["eta_f_no_load"],
-            note="with the torque without load alone taken off: what grows with the square of the "
-            "force counts as loss of the screw",
+            note="with only the torque without load subtracted: friction that grows with the "
+            "square of the force counts as loss of the screw",
         ),
         compared(
             "efficiency.raw", put_in, values["eta_f_raw"], note="motor torque and force alone"
@@ -79,8 +82,8 @@ def efficiency(runs: Runs) -> Part:
             "efficiency.back_driven",
             "%",
             values["eta_b"],
-            f"the same for a screw that is driven back; {values['eta_b_true']:.3g} % put in, "
-            f"{values['eta_b_no_load']:.3g} % with the torque without load alone",
+            f"the same for a screw that is driven back; {values['eta_b_true']:.3g} % is true, "
+            f"{values['eta_b_no_load']:.3g} % with only the torque without load",
         ),
         found(
             "efficiency.back_driven.raw", "%", values["eta_b_raw"], "motor torque and force alone"
@@ -116,8 +119,8 @@ def stiffness(runs: Runs) -> Part:
     ]
     text = (
         "The motors are driven against each other: first with a force sensor between the screws, "
-        "which also tells the force per current, then in the brake heart, where tension flows "
-        "through the wedge. What the test finds is compared with what was put into the model."
+        "which also gives the force per current, then in the brake heart, where tension flows "
+        "through the wedge. The results of the test are compared with the values of the model."
     )
     exhibits = tuple(
         Exhibit(f"stiffness-{label}", partial(time_traces, result.recordings[label]), caption)
@@ -130,13 +133,13 @@ def stiffness(runs: Runs) -> Part:
 
 
 def _recovered(name: str, fact: Fact, values: dict[str, float], key: str, size: float) -> Item:
-    """Return a quantity as measured beside what was put in, in the unit of the statement."""
+    """Return a measured quantity and its true value, in the unit of the statement."""
     put_in = replace(fact, value=values[f"{key}_true"] / size)
     return compared(name, put_in, values[key] / size)
 
 
 def _directions(values: dict[str, float]) -> list[Item]:
-    """Return how compression and tension compare."""
+    """Return the comparison of compression and tension."""
     K_F = parameters().rig.sensor.K_F
     line = 1.0 / (1.0 / values["K_line_compression"] - 1.0 / K_F)
     same = replace(FACTS["same_compression"], value=line / MICRON)
@@ -161,3 +164,123 @@ def _directions(values: dict[str, float]) -> list[Item]:
             "the calibration that the second stage needs, for rising current",
         ),
     ]
+
+
+# --- Position control of the wedge, and the force fight
+
+MOTIONS = ("step", "ramp", "sine")
+WEAKER = 0.95
+"""torque constant of motor 2 over that of motor 1 where they differ"""
+
+
+def position(runs: Runs) -> Part:
+    """Return the effect of the wedge on the position response of the screws."""
+    result = runs.bench("position-step", MAIN)
+    values = kpis(result)
+    bands = kpis(runs.bench("screw-position", MAIN))
+    items: list[Item] = []
+    for controller in ("high", "low"):
+        items += [
+            compared(
+                f"position.wedge.{controller}",
+                FACTS["little"],
+                values[f"difference_screws_{controller}"],
+                note=f"{controller} bandwidth: largest difference over time and amplitudes",
+            ),
+            found(
+                f"position.motors.{controller}",
+                "%",
+                values[f"difference_motors_{controller}"],
+                f"{controller} bandwidth: the same against motors whose screws touch nothing",
+            ),
+            found(
+                f"position.dead_band.{controller}",
+                "rad",
+                bands[f"dead_band_{controller}"],
+                f"{controller} bandwidth: error that friction and cogging can hold at rest",
+            ),
+        ]
+    text = (
+        "Steps of the position within the clearance, with the wedge and without it. The paper "
+        "compares frequency responses."
+    )
+    return Part("Position control of the wedge", text, tuple(items))
+
+
+def force_fight(runs: Runs) -> Part:
+    """Return the forces between two motors that follow one reference."""
+    result = runs.bench("force-fight", MAIN)
+    values = kpis(result)
+    equal = max(values[f"peak_force_{motion}_equal"] for motion in MOTIONS)
+    o = result.bench.chosen_options.flat()
+    unequal = ", ".join(f"{100 * o[f'more_{key}']:+g} % {key}" for key in ("K", "J", "R", "D"))
+    items = [
+        compared(
+            "force_fight.equal",
+            FACTS["differences_fight"],
+            equal,
+            note="equal motors: largest force of step, ramp and sine",
+        ),
+        *(
+            found(
+                f"force_fight.{motion}",
+                "N",
+                values[f"peak_force_{motion}_unequal"],
+                f"largest force, motor 2 with {unequal}, our choice",
+            )
+            for motion in MOTIONS
+        ),
+        found(
+            "force_fight.static",
+            "N",
+            values["static_force_unequal"],
+            "remaining force after the step: friction holds the screws apart",
+        ),
+        *_speed(runs),
+    ]
+    text = (
+        "Both motors follow one reference, a force sensor between their screws. The paper prints "
+        "no forces. It explains the rate limit by higher speeds, which widen the angle between the "
+        "motors: Fig. 9's pulse with a weaker second motor tests that."
+    )
+    exhibit = Exhibit(
+        "force-fight",
+        lambda: time_traces(result.recordings["step_unequal"]),
+        "Force fight: step of both motors, of which the second one differs.",
+    )
+    return Part("Force fight", text, tuple(items), (exhibit,))
+
+
+def _speed(runs: Runs) -> list[Item]:
+    """Return the effect of a doubled rate limit on the angle between the motors."""
+    par = parameters()
+    weaker = {"motor_2.K_ref": WEAKER * par.motor_2.K_ref}
+    rate = par.control.moment.rate_max
+    swings = []
+    for limit in (rate, 2.0 * rate):
+        changed = {**weaker, "control.moment.rate_max": limit}
+        result = runs.bench("moment-pulse-950", MAIN, changed, {"omega_gap": limit})
+        swings.append(_swing(result.recordings["run"]))
+    # From nut to nut the screws and both interfaces to the wedge are in series.
+    stiffness = 0.5 / (1.0 / par.heart.K_S + 1.0 / par.heart.K_W)
+    per_angle = stiffness * roller_screw.slope(par.screw)
+    return [
+        compared(
+            "force_fight.speed",
+            FACTS["faster_fights"],
+            swings[1] / swings[0],
+            note=f"swings of {1e3 * swings[0]:.3g} mrad at {rate:g} rad/s, {1e3 * swings[1]:.3g} "
+            f"mrad at {2 * rate:g} rad/s; torque constant of motor 2 {WEAKER:g} times",
+        ),
+        found(
+            "force_fight.force_per_angle",
+            "N/rad",
+            per_angle,
+            "force through the wedge per angle between the motors: the drive train is stiff",
+        ),
+    ]
+
+
+def _swing(run: xr.Dataset) -> float:
+    """Return the peak-to-peak angle between the motors [rad]; their offset does not count."""
+    return float(np.ptp(run["theta_1"].values - run["theta_2"].values))

@@ -8,13 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bywire.analysis.linear.linearize import linearize
-from bywire.brakes.wedge.case import swing
-from bywire.brakes.wedge.figures.brake_factor import WedgeForces, brake_factor
-from bywire.brakes.wedge.model import WedgeBrake, state_at
-from bywire.brakes.wedge.paper.facts import ALLOWANCES, FACTS
-from bywire.brakes.wedge.paper.runs import IDEAL, MAIN, parameters, stacked, tan_alpha
-from bywire.brakes.wedge.series import tag, with_friction
-from bywire.brakes.wedge.start import memory_at, travel_for
+from bywire.brakes.wedge.case import swing, tag, with_friction
+from bywire.brakes.wedge.figures import WedgeForces, brake_factor
+from bywire.brakes.wedge.model import WedgeBrake, memory_at, state_at, travel_for
+from bywire.brakes.wedge.paper.statements import (
+    ALLOWANCES,
+    FACTS,
+    IDEAL,
+    MAIN,
+    parameters,
+    stacked,
+    tan_alpha,
+)
+from bywire.brakes.wedge.plants import MECHANICAL_STATES
 from bywire.reproduction.item import Fact, Item, compared, found, reading
 from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
 
@@ -26,7 +32,7 @@ COEFFICIENTS = (0.2, 0.35, 0.6)
 TRIED = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6)
 """coefficients at which the actuation force is computed"""
 LOWEST, HIGHEST = 0.32, 0.62
-"""coefficients between which the lowest that runs away is sought"""
+"""bounds of the search for the lowest coefficient that runs away"""
 GROWN = 1.05
 """moment over that at power-off from which the brake has run away"""
 VARIANTS = (
@@ -34,15 +40,14 @@ VARIANTS = (
     (".frictionless", "fixed", "none"),
     (".known", "known", "kept"),
 )
-"""ids' endings, whether the controller knows mu_B, and the brake's friction"""
+"""endings of ids, whether the controller knows mu_B, and the brake's friction"""
 FREE = {"control.offset.delta_preload": 0.0}
 HOLD = (0.1, 0.5)
 """times [s] between which changes of contact are counted"""
 BELOW, ABOVE = 0.2, 0.5
 """friction coefficients on both sides of the neutral point"""
 DEPTH = 5e-5
-"""wedge travel [m] beyond contact at which the brake is linearized; the model is linear there"""
-MECHANICAL = ("theta_1", "omega_1", "theta_2", "omega_2", "x", "v")
+"""wedge travel [m] beyond contact at the operating point; the model is linear there"""
 
 
 def part(runs: Runs) -> Part:
@@ -50,8 +55,8 @@ def part(runs: Runs) -> Part:
     items = [*_static(runs), *_poles(), *_runaway(runs), *_closed_loop(runs), *_free_play(runs)]
     text = (
         "The paper derives the brake factor and the neutral point without friction. Without "
-        "friction the model obeys both. With it the neutral point is a band: what friction holds "
-        "does not run away, and the more load the less of it."
+        "friction the model obeys both. With friction the neutral point is a band, which the "
+        "brake does not leave by itself; the band narrows with the load."
     )
 
     def pulses() -> Figure:
@@ -66,7 +71,7 @@ def part(runs: Runs) -> Part:
 
 
 def _at(mu_B: float, changes: dict[str, Any]) -> dict[str, Any]:
-    """Return overrides that set the pads' friction and let the controller know it."""
+    """Return overrides that set the pads' friction, known to the controller."""
     return {**with_friction(parameters(), mu_B, known=True), **changes}
 
 
@@ -180,7 +185,7 @@ def _lowest(runs: Runs, changes: dict[str, Any], M_hold: float) -> float:
 
 
 def _closed_loop(runs: Runs) -> list[Item]:
-    """Return whether the closed loop is stable at all coefficients, and how it overshoots."""
+    """Return stability and overshoot of the closed loop at all coefficients."""
     items: list[Item] = []
     for suffix, slope, friction in VARIANTS:
         values = kpis(
@@ -212,7 +217,7 @@ def _closed_loop(runs: Runs) -> list[Item]:
 
 
 def _free_play(runs: Runs) -> list[Item]:
-    """Return how often contacts change at the neutral point, with preload and with free-play."""
+    """Return the changes of contact at the neutral point, with preload and with free-play."""
     shaking = {"flywheel.runout": parameters().flywheel.runout}
     held = {}
     for name, preload in (("preload", {}), ("free_play", FREE)):
@@ -222,7 +227,7 @@ def _free_play(runs: Runs) -> list[Item]:
         name: int(np.count_nonzero(np.diff(run["contacts"].sel(time=slice(*HOLD)).values)))
         for name, run in held.items()
     }
-    note = "changes of contact seen at the rows of 0.4 s of a hold at tan(alpha), without friction"
+    note = "changes of contact between the rows of 0.4 s of a hold at tan(alpha), without friction"
     return [
         compared(
             "stability.contact_changes",
@@ -283,6 +288,6 @@ def slow_pole(mu_B: float) -> complex:
         WedgeBrake(), par, state, memory_at(state.x, par), inputs=("i_1_ref",), outputs=("x",)
     )
     # Held: the current loops, and the disc with its sensors, which do not feed back.
-    every = model.reduced(MECHANICAL, held=True).poles()
+    every = model.reduced(MECHANICAL_STATES, held=True).poles()
     slow = every[np.argsort(np.abs(every))][:2]
     return complex(max(slow, key=lambda s: (round(s.real, 6), s.imag)))

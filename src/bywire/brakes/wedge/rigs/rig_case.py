@@ -1,8 +1,9 @@
-"""What the rigs' experiments share: runs from rest, data sheets, readings of a recording."""
+"""Shared parts of the rigs' experiments: runs from rest, data sheets, readings of a recording."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from bywire.brakes.wedge.case import case_from_parked
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
 from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
-from bywire.core.errors import ParameterError
+from bywire.core.errors import not_valid
 from bywire.core.signals import zeros
 from bywire.core.typing import Array
 from bywire.plant import roller_screw
@@ -86,30 +87,28 @@ def squeezing_current(run: xr.Dataset) -> Array:
 
 
 def check_current(name: str, i: float, par: WedgeParameters) -> None:
-    """Refuse a current that the drives do not give.
+    """Require a current that the drives can give.
 
-    ``name``: the option that asks for it; ``i``: its value [A].
+    ``name``: option with the current; ``i``: its value [A].
 
     Raises
     ------
     ParameterError
-        Where it is above the drives' limit.
+        When it is above the drives' limit.
     """
     limit = par.drive.i_max
     if i > limit:
-        raise ParameterError(
-            f"options.{name} = {i:g} A is not valid: the drives give {limit:g} A at most "
-            "(drive.i_max); ask for less"
-        )
+        valid, advice = f"<= {limit:g} A", "the largest current of the drives (drive.i_max)"
+        raise not_valid(f"options.{name}", f"{i:g} A", valid, advice)
 
 
 def slope_of(par: WedgeParameters) -> float:
-    """Return the travel per angle [m/rad], which the screw's lead tells."""
+    """Return the travel per angle [m/rad] by the screw's lead."""
     return roller_screw.slope(par.screw)
 
 
 def torque_constant_of(par: WedgeParameters) -> float:
-    """Return the torque constant [N m/A] that the rig's control believes."""
+    """Return the torque constant [N m/A] assumed by the rig's control."""
     return par.control.position.K_hat
 
 
@@ -122,3 +121,31 @@ def share_at(run: xr.Dataset, name: str, limit: float) -> float:
 def peak(run: xr.Dataset, name: str) -> float:
     """Return the largest magnitude of a signal after time zero."""
     return float(np.abs(run[name].sel(time=slice(-1e-9, None)).values).max())
+
+
+# --- Runs of the rigs and the brake that begin at another angle of the shafts
+
+_ANGLES = ("theta_", "last_")
+
+
+def turned(case: Case, angle: float) -> Case:
+    """Return a rig's run that begins at another angle of the shafts and is otherwise equal.
+
+    Encoder counts and cogging then fall elsewhere, as they do on a bench from day to day.
+
+    ``case``: of a rig, or of the wedge brake, whose wedge moves along; ``angle``: added to every
+    shaft's angle [rad].
+    """
+
+    def shifted(row: Any) -> Any:
+        names = [n for n in row._fields if n.startswith(_ANGLES)]
+        row = row._replace(**{n: getattr(row, n) + angle for n in names})
+        if "x" in row._fields and isinstance(case.par, WedgeParameters):
+            row = row._replace(x=row.x + slope_of(case.par) * angle)
+        return row
+
+    def stimulus(t: Array) -> dict[str, Array]:
+        given = dict(case.stimulus(t))
+        return given | {n: v + angle for n, v in given.items() if n.startswith(_ANGLES)}
+
+    return replace(case, state=shifted(case.state), memory=shifted(case.memory), stimulus=stimulus)

@@ -25,7 +25,7 @@ LOSSES = {"E_copper": "copper_loss", "E_damping": "damping_loss"}
 
 
 class Memory(NamedTuple):
-    """What the controllers hold between their sampling instants."""
+    """Memory of the controllers between their sampling instants."""
 
     theta_1_ref: Annotated[float, Signal("rad", "angle reference 1", 3.0)]
     last_1: Annotated[float, Signal("rad", "encoder 1 at the last sample", 3.0)]
@@ -38,7 +38,7 @@ class Memory(NamedTuple):
 
 
 class Stimulus(NamedTuple):
-    """What the operator demands; ``rig.mode_1`` and ``rig.mode_2`` say which of them acts."""
+    """Demands of the operator; ``rig.mode_1`` and ``rig.mode_2`` select those that act."""
 
     theta_1_set: Annotated[float, Signal("rad", "demanded angle 1", 3.0)]
     theta_2_set: Annotated[float, Signal("rad", "demanded angle 2", 3.0)]
@@ -50,7 +50,7 @@ class ScrewRig(Assembly[WedgeParameters, Memory]):
     """Model of the rig.
 
     Two dry frictions: bearings and screw on each shaft. The sensor is bolted to both screws, so
-    that it takes tension as well: no contact opens.
+    that it also takes tension: no contact opens.
     """
 
     name: ClassVar[str] = "screw-rig"
@@ -110,7 +110,7 @@ class ScrewRig(Assembly[WedgeParameters, Memory]):
     )
 
     def wire(self, w: Self) -> None:
-        """Say what the line between the screws and both drives and motors feel."""
+        """Connect the line between the screws with both drives and motors."""
         k, left, right = roller_screw.slope(w.par.screw), w.motor_1.x, w.motor_2.x
         w.line.u = force_sensor.Input(
             k * left.theta,
@@ -131,7 +131,7 @@ class ScrewRig(Assembly[WedgeParameters, Memory]):
         )
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return what goes in, and what the frictions take."""
+        """Return the power that goes in, and the power of the frictions."""
         friction_1, friction_2 = w.reaction
         return {
             "W_electric": drive_train.power(w.motor_1) + drive_train.power(w.motor_2),
@@ -140,7 +140,7 @@ class ScrewRig(Assembly[WedgeParameters, Memory]):
         }
 
     def record(self, w: Self) -> dict[str, float]:
-        """Return what is recorded beside states, wires and losses."""
+        """Return the recorded signals other than states, wires and losses."""
         return {
             "q_1": shaft_encoder.reading(w.motor_1.x.theta, w.par.encoder),
             "q_2": shaft_encoder.reading(w.motor_2.x.theta, w.par.encoder),

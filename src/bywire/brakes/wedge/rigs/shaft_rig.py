@@ -10,14 +10,13 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from bywire.brakes.wedge import drive_train
 from bywire.brakes.wedge.drive_train import Command, Demand
-from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_parameters import dummy_inertia
+from bywire.brakes.wedge.parameters import WedgeParameters, dummy_inertia
 from bywire.core import ops
 from bywire.core.assembly import Assembly
 from bywire.core.model import Bounds, Task
 from bywire.core.parts import Integral, Part, Shown
 from bywire.core.signals import Role, Signal
-from bywire.plant import current_drive, servo_motor, shaft_encoder
+from bywire.plant import current_drive, driven_rotor, roller_screw, servo_motor, shaft_encoder
 
 Par = WedgeParameters
 ON = 1.0  # the rig's power stage is never switched off
@@ -25,7 +24,7 @@ NUT = 0.0  # net axial force: a preloaded nut is braced against itself
 
 
 class Memory(NamedTuple):
-    """What the controller holds between its sampling instants."""
+    """Memory of the controller between its sampling instants."""
 
     theta_1_ref: Annotated[float, Signal("rad", "angle reference 1", 3.0)]
     last_1: Annotated[float, Signal("rad", "encoder 1 at the last sample", 3.0)]
@@ -34,7 +33,7 @@ class Memory(NamedTuple):
 
 
 class Stimulus(NamedTuple):
-    """What the operator demands; ``rig.mode_1`` says which of them acts."""
+    """Demands of the operator; ``rig.mode_1`` selects the one that acts."""
 
     theta_1_set: Annotated[float, Signal("rad", "demanded angle 1", 3.0)]
     i_1_set: Annotated[float, Signal("A", "current demand 1", 5.0)]
@@ -93,7 +92,7 @@ class ShaftRig(Assembly[WedgeParameters, Memory]):
     )
 
     def wire(self, w: Self) -> None:
-        """Say what drive and motor feel."""
+        """Connect drive and motor."""
         drive_train.wire(w.drive, w.motor, w.m.i_1_ref, ON, NUT, w.par)
 
     def mass(self, xe: Any, par: Par) -> Any:
@@ -111,7 +110,7 @@ class ShaftRig(Assembly[WedgeParameters, Memory]):
         return (friction(w.motor.x.omega, drive_train.torque(w.motor), w.par),)
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return what goes in, and what the friction takes."""
+        """Return the power that goes in, and the power of the friction."""
         omega = w.motor.x.omega
         return {
             "W_electric": drive_train.power(w.motor),
@@ -120,7 +119,7 @@ class ShaftRig(Assembly[WedgeParameters, Memory]):
         }
 
     def record(self, w: Self) -> dict[str, float]:
-        """Return what is recorded beside states and losses."""
+        """Return the recorded signals other than states and losses."""
         limited = ops.fabs(w.m.i_1_ref) >= current_limit(w.par)
         return {
             "q_1": shaft_encoder.reading(w.motor.x.theta, w.par.encoder),
@@ -145,13 +144,13 @@ def friction(omega: float, torque: float, par: Par) -> Bounds:
     Notes
     -----
     A preloaded nut has two halves that push on each other through the screw: whichever way it
-    turns, one half drives and the other is driven. Both rub, and no net torque is left.
+    turns, one half drives and the other is driven. Both rub, and their net torque is zero.
     """
     T_p = T_n = drive_train.bearing_friction(omega, NUT, par)
     if par.rig.load == "screw":
         F_0 = par.rig.F_0
         halves = [drive_train.screw_friction(torque, force, par) for force in (F_0, -F_0)]
-        # A loss by the motor's torque does not see the preload: it must not count twice.
+        # A loss by the motor's torque does not depend on the preload: it must not count twice.
         once = drive_train.screw_friction(torque, 0.0 * F_0, par)
         T_p = T_p + halves[0].T_p + halves[1].T_p - once.T_p
         T_n = T_n + halves[0].T_n + halves[1].T_n - once.T_n
@@ -175,3 +174,62 @@ def tick(x: Any, m: Memory, u: Stimulus, par: Par) -> Memory:
             par.rig.mode_1, theta, Command._make(m), Demand(u.theta_1_set, u.i_1_set), par
         )
     )
+
+
+# --- One shaft alone: known current, known axial force
+# The drive, its current loop and the other shaft are left out: where current and force are
+# measured, nothing of them is needed. For identification.
+
+
+class Load(NamedTuple):
+    """Current and force on the shaft, held from one sample to the next."""
+
+    i: Annotated[float, Signal("A", "motor current", 5.0)]
+    F: Annotated[float, Signal("N", "axial force on the screw", 1000.0)]
+
+
+class DrivenShaft(Assembly[WedgeParameters, Load]):
+    """Model of one shaft.
+
+    One dry friction: bearings and screw together. ``rig.load`` determines whether the dummy
+    shaft's inertia counts. There is no cogging where ``motor_1.T_cog`` is zero.
+    """
+
+    name: ClassVar[str] = "driven-shaft"
+    Memory: ClassVar = Load
+    Stimulus: ClassVar = Load
+    frictions: ClassVar[tuple[str, ...]] = ("omega",)
+
+    rotor = Part(driven_rotor, par="motor_1", fixed=("theta",))
+    E_shaft = Integral(
+        "J", "friction of bearings and screw", role=Role("sink", "bearings and screws")
+    )
+    records: ClassVar[tuple[str, ...]] = ("theta", "omega")
+
+    def wire(self, w: Self) -> None:
+        """Apply the measured current and force to the shaft."""
+        load = roller_screw.load_torque(roller_screw.Input(w.m.F, 0.0), w.par.screw)
+        w.rotor.u = driven_rotor.Input(i=w.m.i, load=load, friction=0.0)
+
+    def mass(self, xe: Any, par: Par) -> Any:
+        """Return the inertia, that of the dummy shaft included."""
+        rotor = super().mass(xe, par)
+        return rotor._replace(omega=rotor.omega + dummy_inertia(par.rig))
+
+    def friction(self, w: Self) -> tuple[Bounds, ...]:
+        """Return the limits of the friction on the shaft."""
+        torque = servo_motor.torque_constant(w.rotor.par) * w.m.i
+        return (drive_train.bounds(w.rotor.x.omega, torque, w.m.F, w.par),)
+
+    def power(self, w: Self) -> dict[str, float]:
+        """Return the power of the friction."""
+        return {"E_shaft": -w.reaction[0] * w.rotor.x.omega}
+
+    def tasks(self, par: Par) -> tuple[Task, ...]:
+        """Return the hold of the measured current and force."""
+        return (Task("hold", par.control.T_fast, hold),)
+
+
+def hold(x: Any, m: Load, u: Load, par: Par) -> Load:
+    """Hold the measured current and force."""
+    return u

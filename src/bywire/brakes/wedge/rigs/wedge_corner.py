@@ -1,6 +1,6 @@
 """A car's corner with the wedge brake: its disc turns with a wheel on the road.
 
-At the end of a stop the tyre rocks back and the wheel would turn with it: what the pads do to the
+At the end of a stop the tyre rocks back and the wheel would turn with it: the pads' friction on the
 wedge then changes its sign, and self-reinforcement becomes release.
 """
 
@@ -11,17 +11,21 @@ from typing import Any, ClassVar, Self
 from bywire.brakes.wedge import control
 from bywire.brakes.wedge.elements import wedge_caliper
 from bywire.brakes.wedge.laws import moment_control
-from bywire.brakes.wedge.model import WedgeBrake, readings, state_at
+from bywire.brakes.wedge.model import WedgeBrake, memory_at, readings, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.start import memory_at
 from bywire.core import ops
 from bywire.core.model import Task
 from bywire.core.parts import Shown
 from bywire.core.signals import Role, joined
 from bywire.plant import flywheel, road, wheel_encoder
 from bywire.vehicle import corner_slip
-from bywire.vehicle.corner import WheelSpeed, rolling_states
-from bywire.vehicle.hot_corner import HotCorner, HotCornerParameters, warm_disc
+from bywire.vehicle.corner import (
+    HotCorner,
+    HotCornerParameters,
+    WheelSpeed,
+    rolling_states,
+    warm_disc,
+)
 from bywire.vehicle.slip_remarks import far_from_peak
 from bywire.vehicle.two_wheeler import BOOK
 
@@ -34,14 +38,14 @@ class WedgeCornerParameters(WedgeParameters):
 
 
 Memory: Any = joined(__name__, "Memory", control.Memory, corner_slip.Memory)
-"""what moment, position and slip control hold"""
+"""memory of moment, position and slip control"""
 
 
 class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
     """The brake with all its controllers; the flywheel is the wheel, the road turns it.
 
-    Slip control stands over the moment control: it lowers the moment that is demanded of it. Pads
-    that fade rub the wedge in less: the motors have to make up for it.
+    Slip control acts above the moment control: it lowers the demanded moment. Pads that fade
+    reinforce the wedge less: the motors have to compensate for it.
     """
 
     name: ClassVar[str] = "wedge-corner"
@@ -93,25 +97,25 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
         return self.tyre_torque(w)
 
     def braked(self, w: Self) -> float:
-        """Return what the pads have taken from the disc."""
+        """Return the energy that the pads have taken from the disc."""
         taken: float = w.flow.W_brake
         return taken
 
     def brake_torque(self, w: Self) -> float:
-        """Return what the pads can hold."""
+        """Return the largest moment that the pads can hold."""
         return wedge_caliper.moment(w.caliper.f.F_N, w.body.par.mu_B, 1.0, w.caliper.par)
 
     def wire(self, w: Self) -> None:
-        """Say what every part feels; the pads rub as they can at the heat of their disc."""
+        """Connect all parts; the pads' friction follows the temperature of their disc."""
         w.body.vary(mu_B=w.body.par.mu_B * self.pads_friction(w))
         super().wire(w)
 
     def record(self, w: Self) -> dict[str, float]:
-        """Return what is recorded beside states, wires and losses."""
+        """Return the recorded signals other than states, wires and losses."""
         return {**super().record(w), "E_wheel": flywheel.energy(w.disc.x, w.disc.par)}
 
     def tasks(self, par: Any) -> tuple[Task, ...]:
-        """Return slip control above the brake's own controllers, where it may lower a moment."""
+        """Return the brake's own controllers, with slip control above them if it can act."""
         brake = super().tasks(par)
         if par.ecu.abs == "off" or par.command.mode != "moment":
             return brake
@@ -122,7 +126,7 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
         return super()._moment(x, _contact_tracked(x, m, par), left, par)
 
     def remarks(self, recording: Any, par: Any) -> list[str]:
-        """Return where a slip is held that is far below that of the largest adhesion."""
+        """Return remarks on a slip that is held far below that of the largest adhesion."""
         if par.ecu.abs != "pi":
             return []
         return far_from_peak(
@@ -157,10 +161,11 @@ def _slip(x: Any, m: Any, u: control.Stimulus, par: WedgeCornerParameters) -> An
 
 
 def _contact_tracked(x: Any, m: Any, par: WedgeCornerParameters) -> Any:
-    """Return the memory with the angle of contact as the measured moment tells it.
+    """Return the memory with the angle of contact by the measured moment, while the wheel turns.
 
-    While the wheel turns. Once it stands the moment is believed from the angle: from where it was,
-    or the motors would push by what the believed stiffness is off, against a wedge that rests.
+    Once the wheel stands, the control estimates the moment from the angle and keeps the last angle
+    of contact. Otherwise an error of the assumed stiffness would make the motors push against a
+    wedge that rests.
     """
     law, seen = par.control.moment, readings(x, par)
     measured = ops.where(seen.Omega < 0, -1.0, 1.0) * seen.M

@@ -14,7 +14,7 @@ _LOOP_RATE = 2.0 * math.pi * 1200.0
 
 
 def _moment_slope(par: Any) -> float:
-    """Return moment per angle in contact, which the moment controller knows."""
+    """Return moment per angle in contact, as the moment controller assumes it."""
     wedge, caliper = par.wedge, par.caliper
     force = caliper.K_cal * math.tan(wedge.alpha) * _travel(par)
     slope: float = 2.0 * wedge.mu_B * caliper.r_B * force
@@ -28,7 +28,7 @@ def _travel(par: Any) -> float:
 
 
 def _grease(par: Any) -> float:
-    """Return the viscous friction of a bearing at the speed and the viscosity it is stated at."""
+    """Return the viscous friction of a bearing at the reference speed and viscosity."""
     bearing = par.bearing
     torque: float = 1.2e-4 * (bearing.omega_ref * (bearing.nu_ref / 1e-6)) ** bearing.k_nu
     return torque

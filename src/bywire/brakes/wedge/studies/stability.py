@@ -14,11 +14,10 @@ from bywire.analysis.loop_figures import LoopFigures
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
-from bywire.brakes.wedge.linear import full, mechanical, rigid_rate
-from bywire.brakes.wedge.loops.moment import LOOP
+from bywire.brakes.wedge.loops import MOMENT_LOOP
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.sizing.design import redesigned
-from bywire.brakes.wedge.sizing.options import Count, Slope
+from bywire.brakes.wedge.plants import full, mechanical, rigid_rate
+from bywire.brakes.wedge.sizing import Count, Slope, redesigned
 from bywire.core.errors import InputError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
@@ -34,17 +33,15 @@ from bywire.synthesis.study import (
     variable,
 )
 
-# Stability of the wedge brake: motors without control, locked, and in the moment loop.
-
 _POINTS = 200  # frequencies of a disk margin
 _LOWEST = 0.05  # Hz
-_SPAN = 1.5  # a border is looked for between the neutral point over and times this
+_SPAN = 1.5  # factor of the search for a border to either side of the neutral point
 _EXACT = 1e-9
-_FREE = 1e-12  # of the largest coupling: less is rounding
+_FREE = 1e-12  # share of the largest coupling below which a coupling is rounding
 
 
 class Motion(NamedTuple):
-    """Slow motion of the wedge with its motors, and that of the wedge alone.
+    """Slow motion of the wedge with its motors, and of the wedge alone.
 
     Parameters
     ----------
@@ -93,7 +90,7 @@ def brake(
 
 
 def motion(par: WedgeParameters, F_N: float) -> Motion:
-    """Return how the wedge moves without control at a normal force [N], friction removed.
+    """Return the motion of the wedge without control at a normal force [N], friction removed.
 
     Raises
     ------
@@ -101,12 +98,12 @@ def motion(par: WedgeParameters, F_N: float) -> Motion:
         When there is no operating point.
     """
     whole = mechanical(full(par, F_N))
-    # Where the force exceeds the preload, one motor stands free: nothing depends on its angle.
+    # Where the force exceeds the preload, one motor is free: no state depends on its angle.
     acting = np.abs(whole.A).max(axis=0) > _FREE * np.abs(whole.A).max()
     bound = whole.reduced(
         [n for n, acts in zip(whole.states, acting, strict=True) if acts], held=True
     )
-    # The one that grows fastest; rounded, so that of a pair the upper one is taken every time.
+    # The pole that grows fastest; rounded, so that the choice within a pair is unique.
     slow = max(bound.poles(), key=lambda s: (round(s.real, 9), s.imag))
     locked = whole.reduced(("x", "v"), held=True).poles()
     return Motion(
@@ -146,10 +143,10 @@ def neutral(par: WedgeParameters, F_N: float) -> float:
 def controlled(par: WedgeParameters, moment: float) -> Controlled:
     """Return stability and disk margin of the closed moment loop at a moment [N m].
 
-    All NaN where the brake cannot be held at the moment.
+    All NaN where the brake has no operating point at the moment.
     """
     try:
-        gain, closed = LOOP.gain_and_closed(par, moment)
+        gain, closed = MOMENT_LOOP.gain_and_closed(par, moment)
     except InputError:
         return Controlled(math.nan, math.nan)
     if not closed.is_stable:
@@ -166,11 +163,11 @@ def moment_borders(
     Parameters
     ----------
     par
-        Brake; its controller keeps what it believes.
+        Brake; its controller keeps its assumptions.
     moment
         Operating point [N m].
     between, count
-        Range of friction coefficients that is searched, and into how many values it is cut.
+        Range of friction coefficients of the search, and number of values in it.
 
     Raises
     ------
@@ -178,24 +175,24 @@ def moment_borders(
         When an operating point does not exist.
     """
     values = [float(value) for value in np.geomspace(*between, count)]
-    return locus(LOOP, par, moment, "wedge.mu_B", "1", values).borders
+    return locus(MOMENT_LOOP, par, moment, "wedge.mu_B", "1", values).borders
 
 
 Coefficient = Annotated[float, Unit("1", 0.4), Field(gt=0, le=5, allow_inf_nan=False)]
 Force = Annotated[float, Unit("N", 1e3), Field(gt=0, allow_inf_nan=False)]
 
 ASSUMPTIONS = (
-    "Exact linear models of the brake, dry friction removed: what friction holds does not run "
-    "away, so that the real brake is stable in a wider range.",
+    "Exact linear models of the brake, dry friction removed: friction also holds the brake, so "
+    "that the real brake is stable in a wider range.",
     "Without control: both motors at constant currents, or locked; the wedge is preloaded between "
-    "the screws and carries the normal force given. Where the actuation force exceeds the preload, "
+    "the screws and carries the given normal force. Where the actuation force exceeds the preload, "
     "one screw loses the wedge, and the other moves or holds it alone.",
-    "With control: moment loop around position and current loops, as they are sampled, at the "
-    "moment given; its controllers know the wedge's slope.",
-    "The end stops of the wedge stand where the pads have traveled as far as before.",
+    "With control: sampled moment loop around position and current loops, at the given moment; its "
+    "controllers know the wedge's slope.",
+    "The end stops of the wedge allow the same travel of the pads as before.",
 )
 HIGHEST = 5.0
-"""friction coefficient up to which the moment loop's border is sought"""
+"""largest friction coefficient of the search for the moment loop's border"""
 _SEARCHED = 40
 _PLANES = {
     "growth_open": ("1/s", "growth rate, motors at constant currents"),
@@ -209,7 +206,7 @@ _FAST = 5.0  # growth [1/s] from which rates are compared with the closed form
 
 
 class Options(ParameterSet):
-    """The designs to compare, and where they are linearized."""
+    """The designs to compare, and their operating points."""
 
     mu_B_min: Coefficient
     """smallest friction coefficient of the pads"""
@@ -224,11 +221,11 @@ class Options(ParameterSet):
     slopes: Count
     """number of slopes"""
     force: Force
-    """normal force at which the wedge without control is looked at"""
+    """normal force of the wedge without control"""
     moment: SomeMoment
-    """moment at which the moment loop is looked at"""
+    """moment of the moment loop"""
     believed: Literal["known", "as-given"]
-    """whether the moment controller knows mu_B, or believes in that of the parameter set"""
+    """whether the moment controller knows mu_B, or assumes that of the parameter set"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Options:

@@ -16,7 +16,7 @@ import numpy as np
 
 from bywire.bench.experiment import Case, as_run
 from bywire.bench.kpis.hysteresis import Loop, loop_area
-from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.kpis.samples import smoothed
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.experiments import friction_ramp, hard_braking
 from bywire.brakes.motorcycle.methods.region_fit import (
@@ -31,12 +31,12 @@ from bywire.brakes.motorcycle.paper.table4 import step_peak
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.typing import Array, Complex
-from bywire.data.recursive_filter import filtered
+from bywire.data.recursive_filter import low_passed
 from bywire.identification.least_squares import solve
 from bywire.reproduction.item import Allowance, Fact
 from bywire.reproduction.source_file import SourceFile
+from bywire.simulation.ensemble import fit_lanes, simulate_group
 from bywire.simulation.run import Run, Trajectory, simulate
-from bywire.simulation.run_group import fit_lanes, simulate_group
 
 
 @dataclass(frozen=True)
@@ -341,8 +341,7 @@ def _runs(cases: Iterable[Case], signals: Sequence[str]) -> Sequence[Trajectory]
 
 def _low_passed(run: Trajectory, f: float) -> Array:
     """Return the measured current behind the first-order low-pass of Fig. 5."""
-    decay = math.exp(-2.0 * math.pi * f * float(run.time[1] - run.time[0]))
-    return filtered([1.0 - decay], [1.0, -decay], run["i_meas"], settled=True)
+    return low_passed(run["i_meas"], f, float(run.time[1] - run.time[0]))
 
 
 def _braking(brakes: Sequence[Par]) -> list[dict[str, float]]:

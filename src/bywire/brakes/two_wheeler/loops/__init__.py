@@ -1,1 +1,0 @@
-"""Control loops, one file each."""

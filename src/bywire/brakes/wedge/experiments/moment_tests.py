@@ -1,0 +1,313 @@
+"""Moment tests of Roberts et al. (2003): pulses (Fig. 7), a ramp (Fig. 8), a large pulse (Fig. 9).
+
+The times of the maneuvers are ours: the text of the figures gives none.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import numpy as np
+import xarray as xr
+from pydantic import Field, model_validator
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.wedge.case import (
+    BRAKING,
+    along_disc,
+    braking,
+    case_from_parked,
+    last_turn,
+    mean,
+    parking_time,
+    release_time,
+    steps,
+    swing,
+    too_coarse,
+)
+from bywire.brakes.wedge.laws.moment_control import SomeMoment, SpeedLimit
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Fraction, Unit
+from bywire.core.typing import Array
+
+Count = Annotated[int, Unit("1", 3.0), Field(ge=1, le=100)]
+
+# --- A step, then pulses to 80 % (Fig. 7)
+
+_OVER = "over the disc's last revolution of the hold; over its second half where that is shorter"
+PULSES_FIGURES = Figures(
+    hold_moment=("N*m", f"Mean moment {_OVER}."),
+    hold_error=(
+        "%",
+        "Relative error of that moment: far below 0 where the demand exceeds the brake's "
+        "capability.",
+    ),
+    hold_ripple=("N*m", f"Moment peak to peak {_OVER}: the disc's run-out."),
+    hold_power=("W", f"Mean input power {_OVER}, standby included."),
+    brake_power=("W", f"Mean braking power {_OVER}."),
+    pulse_moment=(
+        "N*m",
+        "Mean moment over the disc's last revolution of the first pulse; over the pulse's "
+        "last fifth where it is shorter.",
+    ),
+)
+
+
+class PulsesOptions(ParameterSet):
+    """The braking maneuver."""
+
+    M_high: SomeMoment
+    """moment demanded"""
+    low: Fraction
+    """share of it to which the pulses fall"""
+    t_hold: Duration
+    """time from the step to the first pulse"""
+    t_low: Duration
+    """length of each pulse"""
+    t_high: Duration
+    """time between pulses, and after the last one"""
+    pulses: Count
+    """number of pulses"""
+    settle: Duration
+    """time parked before the step"""
+
+
+def pulses(par: WedgeParameters, options: PulsesOptions, _: object = None) -> tuple[Case, ...]:
+    """Return the single run."""
+    levels = {0.0: options.M_high}
+    period = options.t_low + options.t_high
+    for k in range(options.pulses):
+        begin = options.t_hold + k * period
+        levels[begin] = options.low * options.M_high
+        levels[begin + options.t_low] = options.M_high
+    return (
+        case_from_parked(
+            par,
+            lambda t: {"M_set": steps(t, levels)},
+            options.t_hold + options.pulses * period,
+            settle=options.settle,
+            keep=options.settle,
+        ),
+    )
+
+
+def judge_pulses(recordings: Recordings, options: PulsesOptions) -> tuple[Kpi, ...]:
+    """Return the figures of the braking, of its hold and of its pulses."""
+    run = along_disc(recordings["run"])
+    begin, end = _turn(run, 0.0, options.t_hold, 0.5)
+    held = too_coarse(run, begin, end)
+    hold, power = (math.nan if held else mean(run, name, begin, end) for name in ("M_B", "P_in"))
+    ripple = math.nan if held else swing(run, "M_B", begin, end)
+    figures = PULSES_FIGURES(
+        hold_moment=(hold, held),
+        hold_error=(100.0 * (hold / options.M_high - 1.0), held),
+        hold_ripple=(ripple, held),
+        hold_power=(power, held),
+        brake_power=(hold * mean(run, "Omega", begin, end), held),
+        pulse_moment=_pulse(run, options),
+    )
+    return (*braking(run, options.M_high, options.t_hold), *figures)
+
+
+def _turn(run: xr.Dataset, begin: float, end: float, last: float) -> tuple[float, float]:
+    """Return the part of a time [s] that counts, without the rows at its ends.
+
+    It is the disc's last revolution, over which the run-out averages out. Without a whole
+    revolution it is the ``last`` share of the time.
+    """
+    turn = last_turn(run, begin, end)
+    start = end - last * (end - begin) if turn is None else turn
+    return start + 2e-9, end - 2e-9
+
+
+def _pulse(run: xr.Dataset, options: PulsesOptions) -> tuple[float, str]:
+    """Return the moment in the first pulse; over less than a revolution the run-out would show."""
+    begin, end = _turn(run, options.t_hold, options.t_hold + options.t_low, 0.2)
+    problem = too_coarse(run, begin, end)
+    return math.nan if problem else mean(run, "M_B", begin, end), problem
+
+
+MOMENT_PULSES = Experiment(
+    name="moment-pulses",
+    assembly="wedge-brake",
+    summary="moment step to {M_high}, then pulses to {low:%} (Fig. 7)",
+    options=PulsesOptions,
+    defaults=PulsesOptions(
+        M_high=200.0, low=0.8, t_hold=0.5, t_low=0.2, t_high=0.2, pulses=3, settle=0.05
+    ),
+    cases=pulses,
+    judge=judge_pulses,
+    kpis=BRAKING.units | PULSES_FIGURES.units,
+    figures=("time-traces", "energy-balance"),
+)
+
+
+# --- A step, a reduction, and a slow ramp back (Fig. 8)
+
+_ROWS = 10  # fewest on the ramp
+
+RAMP_FIGURES = Figures(
+    ramp_error_mean=("N*m", "Mean of demand minus moment on the ramp."),
+    ramp_error_rms=(
+        "N*m",
+        "Root mean square of demand minus moment on the ramp, run-out included.",
+    ),
+    ramp_slope=("N*m/s", "Slope of a line through the moment on the ramp."),
+)
+
+
+class RampOptions(ParameterSet):
+    """The braking maneuver."""
+
+    M_high: SomeMoment
+    """moment demanded at first, and at the end of the ramp"""
+    M_low: SomeMoment
+    """moment from which the ramp starts"""
+    t_hold: Duration
+    """time from the step to the reduction"""
+    t_low: Duration
+    """time at the lower moment"""
+    t_ramp: Duration
+    """length of the ramp"""
+    t_end: Duration
+    """time recorded after the ramp"""
+    settle: Duration
+    """time parked before the step"""
+
+    @model_validator(mode="after")
+    def _rises(self) -> RampOptions:
+        if self.M_low > self.M_high:
+            raise ValueError(
+                f"M_low = {self.M_low:g} N*m must not be above M_high = {self.M_high:g} N*m: "
+                "the ramp rises from M_low to M_high"
+            )
+        return self
+
+
+def _ramp_demand(t: Array, options: RampOptions) -> Array:
+    """Return the moment demand [N m] at times t [s], shape (len(t),)."""
+    begin = options.t_hold + options.t_low
+    ramp = np.clip((t - begin) / options.t_ramp, 0.0, 1.0)
+    stepped = steps(t, {0.0: options.M_high, options.t_hold: options.M_low})
+    return stepped + (options.M_high - options.M_low) * ramp
+
+
+def ramp(par: WedgeParameters, options: RampOptions, _: object = None) -> tuple[Case, ...]:
+    """Return the single run."""
+    duration = options.t_hold + options.t_low + options.t_ramp + options.t_end
+    return (
+        case_from_parked(
+            par,
+            lambda t: {"M_set": _ramp_demand(t, options)},
+            duration,
+            settle=options.settle,
+            keep=options.settle,
+        ),
+    )
+
+
+def judge_ramp(recordings: Recordings, options: RampOptions) -> tuple[Kpi, ...]:
+    """Return the figures of the braking, and the tracking errors on the ramp."""
+    run = along_disc(recordings["run"])
+    begin = options.t_hold + options.t_low
+    end = begin + options.t_ramp
+    problem = too_coarse(run, begin, end, _ROWS)
+    error, rms, slope = (math.nan,) * 3 if problem else _followed(run, begin, end)
+    figures = RAMP_FIGURES(
+        ramp_error_mean=(error, problem),
+        ramp_error_rms=(rms, problem),
+        ramp_slope=(slope, problem),
+    )
+    return (*braking(run, options.M_high, options.t_hold), *figures)
+
+
+def _followed(run: xr.Dataset, begin: float, end: float) -> tuple[float, float, float]:
+    """Return mean and root mean square of the error [N m], and the moment's slope [N m/s]."""
+    part = run.sel(time=slice(begin - 1e-9, end + 1e-9))
+    error = (part["M_set"] - part["M_B"]).values
+    slope = float(np.polyfit(part["time"].values, part["M_B"].values, 1)[0])
+    return float(error.mean()), float(np.sqrt(np.mean(error**2))), slope
+
+
+MOMENT_RAMP = Experiment(
+    name="moment-ramp",
+    assembly="wedge-brake",
+    summary="moment step to {M_high}, down to {M_low}, slow ramp back (Fig. 8)",
+    options=RampOptions,
+    defaults=RampOptions(
+        M_high=200.0, M_low=160.0, t_hold=0.5, t_low=0.3, t_ramp=1.0, t_end=0.3, settle=0.05
+    ),
+    cases=ramp,
+    judge=judge_ramp,
+    kpis=BRAKING.units | RAMP_FIGURES.units,
+    figures=("time-traces", "energy-balance"),
+)
+
+
+# --- A pulse up to 950 N m and back to the parking position (Fig. 9)
+
+LARGE_PULSE_FIGURES = Figures(
+    peak_moment=("N*m", "Largest moment."),
+    peak_angle=("rad", "Largest common reference of both motors, from the parking position."),
+)
+
+
+class LargePulseOptions(ParameterSet):
+    """The braking maneuver."""
+
+    M_high: SomeMoment
+    """moment demanded"""
+    t_pulse: Duration
+    """length of the pulse"""
+    t_end: Duration
+    """time recorded after it"""
+    omega_gap: SpeedLimit
+    """largest speed while crossing the gap, lower here than in Figs. 7 and 8"""
+    settle: Duration
+    """time parked before the pulse"""
+
+
+def large_pulse(
+    par: WedgeParameters, options: LargePulseOptions, _: object = None
+) -> tuple[Case, ...]:
+    """Return the single run."""
+    levels = {0.0: options.M_high, options.t_pulse: 0.0}
+    return (
+        case_from_parked(
+            par,
+            lambda t: {"M_set": steps(t, levels)},
+            options.t_pulse + options.t_end,
+            {"control.moment.omega_gap": options.omega_gap},
+            settle=options.settle,
+            keep=options.settle,
+        ),
+    )
+
+
+def judge_large_pulse(recordings: Recordings, options: LargePulseOptions) -> tuple[Kpi, ...]:
+    """Return the figures of the braking and of the release."""
+    run = along_disc(recordings["run"])
+    return (
+        *braking(run, options.M_high, options.t_pulse),
+        *LARGE_PULSE_FIGURES(
+            peak_moment=run["M_B"].max(), peak_angle=np.abs(run["theta_ref"]).max()
+        ),
+        release_time(run, options.t_pulse),
+        parking_time(run, options.t_pulse),
+    )
+
+
+MOMENT_PULSE_950 = Experiment(
+    name="moment-pulse-950",
+    assembly="wedge-brake",
+    summary="moment pulse of {M_high} on the software rate limit (Fig. 9)",
+    options=LargePulseOptions,
+    defaults=LargePulseOptions(M_high=950.0, t_pulse=0.2, t_end=0.3, omega_gap=60.0, settle=0.05),
+    cases=large_pulse,
+    judge=judge_large_pulse,
+    kpis=BRAKING.units | LARGE_PULSE_FIGURES.units | {"release_time": "s", "parking_time": "s"},
+    figures=("time-traces", "energy-balance"),
+)

@@ -1,0 +1,120 @@
+"""Figure: actuation force and brake factor of a wedge over the friction of its pads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bywire.bench.running import Result
+from bywire.brakes.wedge.case import tag
+from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
+from bywire.report import style
+from bywire.report.bench_figures import FigureKind, Shown
+from bywire.report.panels import Role
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FARTHEST = 60.0
+"""largest brake factor on the ordinate: at the neutral point it has no bound"""
+
+
+@dataclass(frozen=True)
+class WedgeForces:
+    """Actuation force over normal force at some friction coefficients.
+
+    ``mu_B``: friction coefficients of the pads, ascending; ``free``: force ratio at rest without
+    friction in the brake; ``rising``, ``falling``: the same with friction, while the moment rises
+    and falls slowly.
+    """
+
+    mu_B: Sequence[float]
+    free: Sequence[float]
+    rising: Sequence[float]
+    falling: Sequence[float]
+
+    def __post_init__(self) -> None:
+        columns = (self.mu_B, self.free, self.rising, self.falling)
+        sizes = {len(column) for column in columns}
+        if sizes == {0} or len(sizes) != 1:
+            raise ParameterError(
+                "WedgeForces: mu_B, free, rising and falling have "
+                f"{', '.join(str(len(column)) for column in columns)} entries: give as many of "
+                "each, at least one"
+            )
+
+
+def brake_factor(forces: WedgeForces, tan_alpha: float) -> Figure:
+    """Draw force ratio and brake factor C* over the friction coefficient.
+
+    ``forces``: computed forces; ``tan_alpha``: tangent of the wedge's angle, where the closed form
+    changes its sign.
+    """
+    mu = np.asarray(forces.mu_B, dtype=np.float64)
+    figure, (upper, lower) = style.new_figure(5.0, (1.0, 1.0))
+    line = np.linspace(mu[0], mu[-1], 601)
+    look = style.STROKES[Role.SET_POINT]
+    for axes, over in ((upper, False), (lower, True)):
+        axes.plot(
+            line,
+            _shown(line, tan_alpha - line, over),
+            color=look.color,
+            linestyle=look.linestyle,
+            linewidth=look.linewidth,
+            zorder=look.zorder,
+            label="closed form, no friction",
+        )
+        for label, color, marker, ratio in (
+            ("simulated, no friction", style.BLUE, "o", forces.free),
+            ("with friction, moment rises", style.VERMILLION, "^", forces.rising),
+            ("with friction, moment falls", style.GREEN, "v", forces.falling),
+        ):
+            values = _shown(mu, np.asarray(ratio, dtype=np.float64), over)
+            axes.plot(mu, values, marker, color=color, markersize=4.5, zorder=4, label=label)
+        axes.axvline(
+            tan_alpha,
+            color=style.GRAY,
+            linestyle=":",
+            linewidth=1.0,
+            zorder=1.5,
+            label="tan(alpha)",
+        )
+        axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
+    lower.set_ylim(-1.05 * FARTHEST, 1.05 * FARTHEST)
+    upper.set_ylabel(style.axis_label("actuation over normal force", "1", "\n"))
+    lower.set_ylabel(style.axis_label("brake factor C*", "1", "\n"))
+    lower.set_xlabel(style.axis_label("friction coefficient of the pads", "1"))
+    style.legend_above(upper)
+    figure.align_ylabels([upper, lower])
+    return figure
+
+
+def _shown(mu: Array, ratio: Array, over: bool) -> Array:
+    """Return the force ratio, or the brake factor within the ordinate."""
+    if not over:
+        return ratio
+    with np.errstate(divide="ignore"):
+        factor = 2.0 * mu / ratio
+    return np.where(np.abs(factor) <= FARTHEST, factor, np.nan)
+
+
+def _of_static_test(result: Result) -> list[Shown]:
+    """Return the figure of a static test of the wedge brake, from its key figures."""
+    kpis = {kpi.name: kpi.value for kpi in result.kpis}
+    tried = sorted(result.bench.chosen_options.flat()["mu_B"])
+    r_B = result.bench.par.flat()["caliper.r_B"]
+    moment = float(result.bench.chosen_options.flat()["M_hold"])
+    free, rising, falling = (
+        [kpis[f"{name}_{tag(mu_B)}"] * 2.0 * mu_B * r_B / moment for mu_B in tried]
+        for name in ("F_M", "F_M_rising", "F_M_falling")
+    )
+    figure = brake_factor(WedgeForces(tried, free, rising, falling), kpis["neutral_mu_closed"])
+    caption = "Actuation force over normal force, and brake factor, over the pads' friction."
+    return [Shown("brake-factor", figure, caption)]
+
+
+FIGURE = FigureKind("brake-factor", _of_static_test)

@@ -1,0 +1,418 @@
+"""Control loops of the wedge brake and its rigs: moment, position, force, current."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, cast
+
+from bywire.analysis.loop import Loop, Point, Quantity, Saturation
+from bywire.brakes.wedge.elements import wedge
+from bywire.brakes.wedge.laws import moment_control
+from bywire.brakes.wedge.model import WedgeBrake, force_for, memory_at, state_at, travel_for
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.rigs.screw_rig import ScrewRig, screws_compliance
+from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
+from bywire.core import ops
+from bywire.core.errors import InputError, not_valid
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import zeros
+from bywire.plant import current_drive, force_sensor, roller_screw, servo_motor
+
+Causes = Mapping[str, Mapping[str, Any]]
+"""causes of nonlinearity: name -> parameters without it"""
+
+_SCREWS: Causes = {
+    "bearing friction": {
+        "bearing.C_0": 0.0,
+        "bearing.C_1": 0.0,
+        "bearing.C_2": 0.0,
+        "bearing.T_nu": 0.0,
+    },
+    "screw efficiency": {"screw.eta_f": 1.0, "screw.eta_b": 1.0},
+}
+_MOTORS: Causes = {
+    "cogging": {"motor_1.T_cog": 0.0, "motor_2.T_cog": 0.0},
+    "encoder": {"encoder.law": "ideal"},
+}
+
+DRIVE_TRAIN: Causes = {**_SCREWS, **_MOTORS}
+"""causes in motors and screws on a rig"""
+
+CAUSES: Causes = {
+    **_SCREWS,
+    "wedge friction": {"wedge_friction.mu_int": 0.0, "wedge_friction.mu_R": 0.0},
+    **_MOTORS,
+    "run-out, disc slowing": {"flywheel.runout": 0.0, "flywheel.law": "driven"},
+}
+"""causes in the whole brake"""
+
+DRIVE_LIMITS = (
+    Saturation("sat_current", ("i_1_ref", "i_2_ref"), ("control.position.i_max", "drive.i_max")),
+)
+"""current demand of a drive at the controller's or at its own limit"""
+
+
+def beyond(name: str, value: str, need: str, limit: str) -> InputError:
+    """Build the error of an operating point that needs more than a limit gives.
+
+    Parameters
+    ----------
+    name, value
+        Quantity that gives the operating point, and its value with its unit.
+    need
+        What the brake would need, with its unit.
+    limit
+        Parameter that limits it, with its value.
+    """
+    return not_valid(name, value, f"small enough for {limit}", f"and needs {need}")
+
+
+# --- Current loop of the drives, the shaft clamped
+
+_SAMPLE = 20e-6  # sample time of the demand [s]; an analog drive takes it without sampling
+_STEP = 5e-6  # substep [s]
+
+
+def current_point(par: ParameterSet, value: float) -> Point:
+    """Return the drive that holds a current [A] in a motor whose shaft is clamped.
+
+    Raises
+    ------
+    ParameterError
+        When the current is beyond the drive's limit, its voltage beyond the supply, or its
+        torque beyond the clamp.
+    """
+    clamped = cast(
+        WedgeParameters,
+        par.replace(
+            {
+                "rig.mode_1": "current",
+                "rig.load": "dummy",
+                "rig.clamp": "closed",
+                "control.T_fast": _SAMPLE,
+            }
+        ),
+    )
+    _require_current(value, clamped)
+    drive, motor = clamped.drive, clamped.motor_1
+    held = value / drive.G_sense
+    duty = servo_motor.resistance(motor) * held / drive.V_dc
+    state = ShaftRig.state(
+        drive=current_drive.State(demand=value, sensed=value, integral=duty),
+        motor=servo_motor.State(i=held, theta=0.0, omega=0.0),
+    )
+    memory = zeros(ShaftRig.Memory)._replace(i_1_ref=value)
+    stimulus = zeros(ShaftRig.Stimulus)._replace(i_1_set=value)
+    return Point(ShaftRig(), clamped, state, memory, stimulus, _STEP)
+
+
+def _require_current(value: float, par: WedgeParameters) -> None:
+    if ops.is_symbol(par.drive.V_dc):
+        return
+    drive, motor = par.drive, par.motor_1
+    held = abs(value) / drive.G_sense
+    torque = servo_motor.torque_constant(motor) * held
+    limits = (
+        ("drive.i_max", abs(value), drive.i_max, "A"),
+        ("drive.V_dc", servo_motor.resistance(motor) * held, drive.V_dc, "V"),
+        ("rig.T_clamp", torque, par.rig.T_clamp, "N*m"),
+    )
+    for name, need, most, unit in limits:
+        if not need < most:
+            needed, limit = f"{need:.4g} {unit}", f"{name} = {most:g} {unit}"
+            raise beyond("current", f"{value:g} A", needed, limit)
+
+
+DRIVE_CURRENT_LOOP = Loop(
+    name="drive-current",
+    assembly="wedge-brake",
+    summary="current control in the drive, analog, shaft clamped",
+    at=Quantity("current", "A", 0.0),
+    inputs=("i_1_set",),
+    output="i_1",
+    cut="sensed_1",
+    point=current_point,
+    causes={},
+    band=(10.0, 3000.0),
+    amplitudes=(1e-2, 1.0, 5.0),
+    tunables={"drive.k_p": (1e-3, 1.0), "drive.k_i": (1.0, 5e3)},
+    proof="current-loop",
+    single=False,
+    analog=True,
+    locked=("theta_1", "omega_1"),
+)
+
+
+# --- Moment loop, around position and current loops
+
+MOMENT = Quantity("moment", "N*m", 200.0)
+COUNTED = ", counted against the disc's rotation whatever its direction"
+"""remark on a moment that is not positive"""
+
+
+def moment_point(par: ParameterSet, value: float) -> Point:
+    """Return the brake that holds a moment [N m].
+
+    Screws and references stand where the wedge is in balance: the actuation force presses both
+    contacts of the heart, and the currents hold it.
+
+    Raises
+    ------
+    ParameterError
+        When the moment is not positive, beyond the wedge's travel or the drives' current, or
+        when the disc stands.
+
+    Notes
+    -----
+    The wedge stands on the side to which the disc turns; the moment counts in that direction.
+    """
+    closed = cast(WedgeParameters, par.replace({"command.mode": "moment"}))
+    _require_braking(value, closed)
+    x = travel_for(force_for(value, closed), closed)
+    _require_travel_and_current(value, x, closed)
+    turning = ops.where(closed.flywheel.Omega_0 < 0, -1.0, 1.0)
+    x *= turning
+    memory = memory_at(x, closed)._replace(mode=moment_control.MOMENT, M_set=value, M_meas=value)
+    state = state_at(x, closed)._replace(y_M=turning * value)
+    return Point(
+        WedgeBrake(), closed, state, memory, zeros(WedgeBrake.Stimulus)._replace(M_set=value)
+    )
+
+
+def _require_braking(value: float, par: WedgeParameters) -> None:
+    MOMENT.require_positive(value, COUNTED)
+    if not ops.is_symbol(par.flywheel.Omega_0) and par.flywheel.Omega_0 == 0.0:
+        speed, advice = "the speed at which the loop works", "as a standing disc gives no moment"
+        raise not_valid("flywheel.Omega_0", "0 rad/s", speed, advice)
+
+
+def _require_travel_and_current(value: float, x: float, par: WedgeParameters) -> None:
+    if ops.is_symbol(x):
+        return
+    moment = f"{value:g} N*m"
+    if not x < par.wedge.x_stop:
+        limit = f"wedge.x_stop = {par.wedge.x_stop * 1e3:g} mm"
+        raise beyond("moment", moment, f"{x * 1e3:.3g} mm of wedge travel", limit)
+    force = abs(wedge.slope(par.wedge) - par.wedge.mu_B) * force_for(value, par)
+    i = 0.5 * force * roller_screw.slope(par.screw) / par.motor_1.K_ref
+    if i > par.drive.i_max:
+        needed = f"{i:.3g} A in each motor even without friction"
+        raise beyond("moment", moment, needed, f"drive.i_max = {par.drive.i_max:g} A")
+
+
+MOMENT_LOOP = Loop(
+    name="moment",
+    assembly="wedge-brake",
+    summary="moment control, 1 kHz around 5 kHz",
+    at=MOMENT,
+    inputs=("M_set",),
+    output="y_M",
+    cut="rate",
+    point=moment_point,
+    causes=CAUSES,
+    band=(0.5, 100.0),
+    amplitudes=(0.5, 20.0),
+    # The law depends on f_c over slope_hat alone: one of them is enough.
+    tunables={"control.moment.f_c": (0.3, 60.0)},
+    sustained=CAUSES["run-out, disc slowing"],
+    proof="moment-pulses",
+    saturations=DRIVE_LIMITS,
+)
+
+
+# --- Position loop of the assembled wedge
+
+BAND = (1.0, 150.0)
+"""frequencies [Hz]"""
+
+TUNABLES: Mapping[str, tuple[float, float]] = {
+    "control.position.f_n": (2.0, 200.0),
+    "control.position.zeta": (0.2, 4.0),
+    "control.position.c": (0.0, 1.0),
+}
+"""gains of the law -> lowest and highest values worth trying"""
+
+
+def two_motor_loop(
+    name: str,
+    summary: str,
+    at: Quantity,
+    point: Callable[[ParameterSet, float], Point],
+    causes: Mapping[str, Mapping[str, Any]],
+    proof: str = "",
+) -> Loop:
+    """Return the position loop of two motors that follow one reference and share a load.
+
+    ``name``, ``summary``, ``at``, ``position_point``, ``causes``, ``proof``: as those of a `Loop`.
+    """
+    return Loop(
+        name=name,
+        assembly="wedge-brake",
+        summary=summary,
+        at=at,
+        inputs=("theta_1_set", "theta_2_set"),
+        output="theta_2",
+        cut="i_2_ref",
+        point=point,
+        causes=causes,
+        band=BAND,
+        amplitudes=(1e-3, 0.25, 0.5, 1.0),
+        tunables=TUNABLES,
+        proof=proof,
+        saturations=DRIVE_LIMITS,
+        single=False,  # two motors share the load
+    )
+
+
+def position_point(par: ParameterSet, value: float) -> Point:
+    """Return the wedge at a travel [m] within the clearance, preloaded between the screws.
+
+    Raises
+    ------
+    ParameterError
+        When the pads would press.
+    """
+    closed = cast(WedgeParameters, par.replace({"command.mode": "position"}))
+    free = min(travel_for(0.0, closed), closed.wedge.x_stop)
+    if not abs(value) < free:
+        valid = f"between {-free * 1e3:.3g} and {free * 1e3:.3g} mm"
+        raise not_valid("wedge travel", f"{value * 1e3:g} mm", valid, "within the clearance")
+    memory = memory_at(value, closed)
+    stimulus = zeros(WedgeBrake.Stimulus)._replace(
+        theta_1_set=memory.theta_1_ref, theta_2_set=memory.theta_2_ref
+    )
+    return Point(WedgeBrake(), closed, state_at(value, closed), memory, stimulus)
+
+
+POSITION_LOOP = two_motor_loop(
+    name="position",
+    summary="position control of the assembled wedge in its clearance, 5 kHz",
+    at=Quantity("wedge travel", "m", 0.0),
+    point=position_point,
+    causes=CAUSES,
+)
+
+
+# --- Position loop of one motor on a preloaded screw (Figs. 5 and 6)
+
+_ONE_MOTOR = {**DRIVE_TRAIN, "cogging": {"motor_1.T_cog": 0.0}}  # the one motor that there is
+
+
+def screw_position_point(par: ParameterSet, value: float) -> Point:
+    """Return the shaft at rest at an angle [rad]."""
+    rig = cast(
+        WedgeParameters,
+        par.replace({"rig.mode_1": "position", "rig.load": "screw", "rig.clamp": "open"}),
+    )
+    state = zeros(ShaftRig.State)._replace(theta_1=value)
+    memory = zeros(ShaftRig.Memory)._replace(theta_1_ref=value, last_1=value)
+    return Point(
+        ShaftRig(), rig, state, memory, zeros(ShaftRig.Stimulus)._replace(theta_1_set=value)
+    )
+
+
+SCREW_POSITION_LOOP = Loop(
+    name="screw-position",
+    assembly="wedge-brake",
+    summary="position control of one motor on a preloaded screw, 5 kHz (Figs. 5 and 6)",
+    at=Quantity("motor angle", "rad", 0.0),
+    inputs=("theta_1_set",),
+    output="theta_1",
+    cut="i_1_ref",
+    point=screw_position_point,
+    causes=_ONE_MOTOR,
+    band=BAND,
+    amplitudes=(1e-3, 0.25, 0.5, 1.0, 2.0),
+    tunables=TUNABLES,
+    proof="screw-position",
+)
+
+
+# --- Two motors that push their screws against a force sensor
+
+
+def force_point(par: ParameterSet, value: float) -> Point:
+    """Return both motors in position control, at rest with a force [N] between their screws.
+
+    Each stands half the compression away from the middle. The controllers have no integral part:
+    the references lie further away, by the angle errors that give the holding currents.
+
+    Raises
+    ------
+    ParameterError
+        When the drives cannot hold the force.
+    """
+    rig = cast(WedgeParameters, par.replace({"rig.mode_1": "position", "rig.mode_2": "position"}))
+    k = roller_screw.slope(rig.screw)
+    rest = zeros(force_sensor.Input)._replace(c=screws_compliance(rig))
+    theta = 0.5 * value / (force_sensor.stiffness(rest, rig.rig.sensor) * k)
+    state: dict[str, float] = {"y_F": value}
+    memory: dict[str, float] = {}
+    stimulus: dict[str, float] = {}
+    for n, sign, motor in ((1, 1.0, rig.motor_1), (2, -1.0, rig.motor_2)):
+        i = sign * k * value / servo_motor.torque_constant(motor)
+        demand = rig.drive.G_sense * i
+        reference = sign * theta + demand / _stiffness(rig)
+        _require_force(value, abs(demand), rig)
+        state |= {
+            f"demand_{n}": demand,
+            f"sensed_{n}": demand,
+            f"i_{n}": i,
+            f"theta_{n}": sign * theta,
+            f"integral_{n}": servo_motor.resistance(motor) * i / rig.drive.V_dc,
+        }
+        memory |= {f"theta_{n}_ref": reference, f"last_{n}": sign * theta, f"i_{n}_ref": demand}
+        stimulus |= {f"theta_{n}_set": reference}
+    return Point(
+        ScrewRig(),
+        rig,
+        zeros(ScrewRig.State)._replace(**state),
+        zeros(ScrewRig.Memory)._replace(**memory),
+        zeros(ScrewRig.Stimulus)._replace(**stimulus),
+    )
+
+
+def _stiffness(par: WedgeParameters) -> float:
+    """Return the current demand per angle error [A/rad] of the position control."""
+    control = par.control.position
+    return control.J_hat / control.K_hat * (2.0 * math.pi * control.f_n) ** 2
+
+
+def _require_force(value: float, demand: float, par: WedgeParameters) -> None:
+    if ops.is_symbol(demand):
+        return
+    limits = {"control.position.i_max": par.control.position.i_max, "drive.i_max": par.drive.i_max}
+    name, most = min(limits.items(), key=lambda limit: limit[1])
+    if not demand < most:
+        needed = f"{demand:.3g} A even without friction"
+        raise beyond("force", f"{value:g} N", needed, f"{name} = {most:g} A")
+
+
+_FORCE = Quantity("force", "N", 0.0)
+
+FORCE_FIGHT = two_motor_loop(
+    name="force-fight",
+    summary="position control of two motors on one reference, a force sensor between, 5 kHz",
+    at=_FORCE,
+    point=force_point,
+    causes=DRIVE_TRAIN,
+    proof="force-fight",
+)
+
+FORCE_AGAINST = Loop(
+    name="force-against",
+    assembly="wedge-brake",
+    summary="force between two motors, one excited against the other that holds, 5 kHz",
+    at=_FORCE,
+    inputs=("theta_1_set",),
+    output="F",
+    cut="i_1_ref",
+    point=force_point,
+    causes=DRIVE_TRAIN,
+    band=BAND,
+    amplitudes=(1e-3, 0.05, 0.1, 0.2),
+    tunables=TUNABLES,
+    saturations=DRIVE_LIMITS,
+    single=False,  # the output is the force, but the angle is controlled
+)

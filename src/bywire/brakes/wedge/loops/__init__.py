@@ -1,1 +1,0 @@
-"""Control loops, by the controller that closes them, and what they share."""

@@ -1,1 +1,0 @@
-"""The wedge brake's drive train: what its rigs measure of screws, bearings and motors."""

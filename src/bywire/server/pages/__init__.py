@@ -1,1 +1,0 @@
-"""The pages of `bywire serve`, one file each, in one frame."""

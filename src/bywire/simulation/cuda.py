@@ -1,0 +1,585 @@
+"""Many cases on a graphics processor, a thread each: CUDA C, its kernels, memory, and errors.
+
+The compiler, NVIDIA's NVRTC in a library, needs no graphics processor and no driver. What it made
+is kept beside compiled kernels.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import ctypes
+import hashlib
+import importlib
+import math
+import os
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from itertools import pairwise
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import CompilerError, DeviceError, ParameterError, quoted
+from bywire.core.extras import how_to_install
+from bywire.core.pairs import read_count
+from bywire.core.scratch import scratch_folder
+from bywire.core.typing import Array
+from bywire.simulation.c_runtime import CUDA, ONE_LANE
+from bywire.simulation.compiler import digest_of, is_intact, sha256, usable_folder
+from bywire.simulation.emit_single import Caller, emit_single
+from bywire.simulation.native import Ends, Request, plan_array, pointer
+from bywire.simulation.program import Program
+from bywire.simulation.schedule import Layout, Schedule
+from bywire.simulation.stages import Stages, build_stages, layout_of, leaf_count
+
+# A product and a sum in one rounding would give other digits than the processor's kernels. And
+# kernels do not say of each of their functions that it runs there.
+OPTIONS = ("--fmad=false", "--device-as-default-execution-space")
+OTHERWISE = "or take engine = 'auto', which computes on this machine's processor"
+
+
+def bindings(name: str) -> ModuleType:
+    """Return a module of NVIDIA's bindings, ``"driver"`` or ``"nvrtc"``.
+
+    Raises
+    ------
+    DeviceError
+        When the extra that brings it is not installed, with the command.
+    """
+    try:
+        return importlib.import_module(f"cuda.bindings.{name}")
+    except ImportError:
+        raise DeviceError(
+            "engine 'cuda' needs NVIDIA's bindings and compiler, which are not installed: "
+            f"{how_to_install('gpu')}; {OTHERWISE}",
+            name="engine",
+            value="cuda",
+        ) from None
+
+
+def cuda_binary(source: str, capability: int, entry: str) -> bytes:
+    """Return the code of a kernel for a graphics processor, compiled unless it is kept.
+
+    Parameters
+    ----------
+    source
+        CUDA C, as ``emit_cuda`` writes it.
+    capability
+        Of the processor, for instance 90: the major number ten times, and the minor one.
+    entry
+        Name of its function.
+
+    Returns
+    -------
+    bytes
+        Its own code; where the compiler does not know the processor yet, PTX, which the driver
+        compiles.
+
+    Raises
+    ------
+    DeviceError
+        When the compiler is missing, or does not support a processor that old.
+    CompilerError
+        With the first lines of the compiler's message.
+    """
+    nvrtc = bindings("nvrtc")
+    try:
+        _, *version = nvrtc.nvrtcVersion()
+        _, known = nvrtc.nvrtcGetSupportedArchs()
+    except RuntimeError:  # the bindings are there, and the library is not
+        raise DeviceError(
+            f"NVIDIA's compiler NVRTC cannot be loaded: {how_to_install('gpu')}; {OTHERWISE}"
+        ) from None
+    target = max((each for each in known if each <= capability), default=0)
+    if not target:
+        raise DeviceError(
+            f"NVRTC {version[0]}.{version[1]} compiles for graphics processors of compute "
+            f"capability {min(known) / 10:.1f} and later, not for {capability / 10:.1f}: install "
+            f"an older release of it, {OTHERWISE}"
+        )
+    is_own = target == capability
+    options = (f"--gpu-architecture={'sm' if is_own else 'compute'}_{target}", *OPTIONS)
+    text = CUDA + source
+    key = hashlib.sha256("\0".join((text, *options, *map(str, version))).encode()).hexdigest()[:32]
+    file = usable_folder() / f"{key}.cubin"
+    if is_intact(file, entry):
+        return file.read_bytes()
+    binary = _compiled(nvrtc, text, options, is_own)
+    if not is_own:  # the driver keeps what it makes of PTX
+        return binary
+    with contextlib.suppress(OSError), scratch_folder(file.parent) as scratch:
+        built, fresh = scratch / "kernel.cubin", scratch / "digest"
+        built.write_bytes(binary)
+        fresh.write_text(sha256(built))
+        os.replace(built, file)
+        os.replace(fresh, digest_of(file))
+    return binary
+
+
+def _compiled(nvrtc: Any, text: str, options: tuple[str, ...], is_own: bool) -> bytes:
+    error, program = nvrtc.nvrtcCreateProgram(text.encode(), b"kernel.cu", 0, [], [])
+    try:
+        if not int(error):
+            given = [each.encode() for each in options]
+            (error,) = nvrtc.nvrtcCompileProgram(program, len(given), given)
+        if int(error):
+            said = _text(nvrtc.nvrtcGetProgramLogSize, nvrtc.nvrtcGetProgramLog, program)
+            lines = said.rstrip(b"\0").decode(errors="replace").splitlines()
+            message = "\n".join(line for line in lines if line.strip())[:2000] or error.name
+            raise CompilerError(f"NVRTC rejected a generated kernel:\n{message}\n{OTHERWISE}")
+        if is_own:
+            return _text(nvrtc.nvrtcGetCUBINSize, nvrtc.nvrtcGetCUBIN, program)
+        return _text(nvrtc.nvrtcGetPTXSize, nvrtc.nvrtcGetPTX, program)
+    finally:
+        nvrtc.nvrtcDestroyProgram(program)
+
+
+def _text(size_of: Any, fill: Any, program: Any) -> bytes:
+    """Return a property of a program; the bindings fill existing bytes."""
+    _, size = size_of(program)
+    content = bytes(bytearray(size))
+    fill(program, content)
+    return content
+
+
+# --- The device and its driver
+
+VARIABLE = "BYWIRE_GPU"
+"""environment variable with the number of the graphics processor, where there are several"""
+_NO_DRIVER = "the driver's library is not there"
+_OUT_OF_MEMORY = 2  # CUDA_ERROR_OUT_OF_MEMORY
+_MEGA = 1e6
+
+
+class CudaDevice:
+    """A graphics processor of NVIDIA's.
+
+    Parameters
+    ----------
+    driver
+        ``cuda.bindings.driver``, after ``cuInit``.
+    number
+        Which one, >= 0.
+    """
+
+    def __init__(self, driver: Any, number: int) -> None:
+        self._driver, self._lock = driver, threading.RLock()
+        self._device = self._checked(driver.cuDeviceGet(number))
+        name = self._checked(driver.cuDeviceGetName(128, self._device))
+        self.label = name.split(b"\0")[0].decode(errors="replace")
+        kinds = driver.CUdevice_attribute
+        major, minor = (
+            self._checked(driver.cuDeviceGetAttribute(kind, self._device))
+            for kind in (
+                kinds.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR,
+                kinds.CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR,
+            )
+        )
+        self._capability = 10 * int(major) + int(minor)
+        self._context = self._checked(driver.cuDevicePrimaryCtxRetain(self._device))
+
+    def load(self, source: str, entry: str) -> Any:
+        """Return the function of a kernel.
+
+        Raises
+        ------
+        CompilerError
+            With the compiler's message.
+        """
+        binary = cuda_binary(source, self._capability, entry)
+        with self._current():
+            module = self._checked(self._driver.cuModuleLoadData(binary))
+            return self._checked(self._driver.cuModuleGetFunction(module, entry.encode()))
+
+    def free(self) -> int:
+        """Return how many bytes are free."""
+        with self._current():
+            return int(self._checked(self._driver.cuMemGetInfo())[0])
+
+    @contextmanager
+    def working(self) -> Iterator[Memory]:
+        """Have the device for oneself, and memory of it that is given back in the end."""
+        with self._current():
+            memory = Memory(self._driver, self._checked)
+            try:
+                yield memory
+            finally:
+                memory.give_back()
+
+    @contextmanager
+    def _current(self) -> Iterator[None]:
+        """Have the calling thread alone work on the device: it is one queue anyway."""
+        with self._lock:
+            self._checked(self._driver.cuCtxSetCurrent(self._context))
+            yield
+
+    def _checked(self, answer: Any, wanted: int = 0) -> Any:
+        """Return what a function of the driver gives behind its status.
+
+        Raises
+        ------
+        DeviceError
+            When the status is an error's; ``wanted``: bytes that were asked for.
+        """
+        status, *values = answer
+        if not int(status):
+            return values[0] if len(values) == 1 else values
+        if int(status) == _OUT_OF_MEMORY:
+            unknown, *sizes = self._driver.cuMemGetInfo()  # it may have no room to begin with
+            left = (
+                ""
+                if int(unknown)
+                else "{:.4g} of {:.4g} MB are free: ".format(*(size / _MEGA for size in sizes))
+            )
+            what = f"no room for {wanted / _MEGA:.3g} MB" if wanted else "no free memory"
+            raise DeviceError(
+                f"{self.label} has {what}: {left}end other programs on it, name another one by "
+                f"{VARIABLE}, {OTHERWISE}",
+                name=self.label,
+            )
+        _, said = self._driver.cuGetErrorString(status)
+        text = (said or b"").decode(errors="replace") or status.name
+        where = getattr(self, "label", "a graphics processor")
+        raise DeviceError(f"{where} failed: {text} ({status.name}); start again, {OTHERWISE}")
+
+
+class Memory:
+    """Memory of a graphics processor that is freed together, with operations on it.
+
+    Parameters
+    ----------
+    driver, checked
+        The driver, and what raises an error for its statuses.
+    """
+
+    def __init__(self, driver: Any, checked: Callable[..., Any]) -> None:
+        self._driver, self._checked = driver, checked
+        self._places: list[Any] = []
+
+    def room(self, size: int) -> Any:
+        """Return the place of so many bytes, whatever they hold.
+
+        Raises
+        ------
+        DeviceError
+            When there is no such room.
+        """
+        place = self._checked(self._driver.cuMemAlloc(max(size, 8)), size)
+        self._places.append(place)
+        return place
+
+    def put(self, place: Any, array: NDArray[Any]) -> None:
+        """Copy a C-contiguous array to a place."""
+        if array.nbytes:
+            self._checked(self._driver.cuMemcpyHtoD(place, pointer(array).value, array.nbytes))
+
+    def get(self, place: Any, array: NDArray[Any]) -> None:
+        """Fill a C-contiguous array with what stands at a place."""
+        if array.nbytes:
+            self._checked(self._driver.cuMemcpyDtoH(pointer(array).value, place, array.nbytes))
+
+    def run(self, function: Any, blocks: int, threads: int, arguments: Sequence[Any]) -> None:
+        """Run a kernel to its end; its arguments are places, and floats."""
+        values = [
+            ctypes.c_double(each) if isinstance(each, float) else ctypes.c_void_p(int(each))
+            for each in arguments
+        ]
+        addresses = (ctypes.c_void_p * len(values))(*map(ctypes.addressof, values))
+        self._checked(
+            self._driver.cuLaunchKernel(
+                function, blocks, 1, 1, threads, 1, 1, 0, 0, ctypes.addressof(addresses), 0
+            )
+        )
+        self._checked(self._driver.cuCtxSynchronize())
+
+    def give_back(self) -> None:
+        """Free every place."""
+        for place in self._places:  # a kernel that failed has taken everything with it
+            self._driver.cuMemFree(place)
+
+
+@cache
+def find_device() -> CudaDevice:
+    """Return the graphics processor that computes: the first one, or that of ``BYWIRE_GPU``.
+
+    Raises
+    ------
+    DeviceError
+        When there is none, or no driver, or the extra ``bywire[gpu]`` is not installed.
+    ParameterError
+        When ``BYWIRE_GPU`` names none.
+    """
+    driver = bindings("driver")
+    try:
+        status, count = driver.cuInit(0)[0], 0
+        if not int(status):
+            status, count = driver.cuDeviceGetCount()
+        said = "" if not int(status) else status.name
+    except RuntimeError:
+        said, count = _NO_DRIVER, 0
+    if said or not count:
+        why = f" ({said})" if said else ""
+        raise DeviceError(
+            f"engine 'cuda' finds no NVIDIA graphics processor{why}: check that nvidia-smi lists "
+            f"one, {OTHERWISE}",
+            name="engine",
+            value="cuda",
+        )
+    wanted = os.environ.get(VARIABLE, "0")
+    number = read_count(wanted)
+    if number is None or number >= count:
+        raise ParameterError(
+            f"{VARIABLE} = {quoted(wanted)} is not a graphics processor: there "
+            f"{'is one, 0' if count == 1 else f'are {count}, 0 to {count - 1}'}",
+            name=VARIABLE,
+            value=wanted,
+            valid="0" if count == 1 else f"0 to {count - 1}",
+        )
+    return CudaDevice(driver, number)
+
+
+# --- Kernels of many cases
+# Cases go to the processor in batches that its memory holds, and batches in pieces of time: what a
+# piece records is fetched before the next one, and no piece keeps a display waiting.
+#
+# Every number of a case stands beside the same number of the next case, so that threads that run
+# together read and write neighbors; rows stand as who asks for them has them. A thread has
+# branches and cuts of its own, as a single run has.
+
+ENTRY = "bw_run_cases"
+"""name of its function"""
+THREADS = 64
+"""threads of a block, which share a processor's registers, of which each takes as many as it may"""
+
+# Behind `emission.PLAN`: how many cases, whether each has a stimulus of its own, which row of the
+# stimulus is the first in memory, and the distances between the entries of two cases, rows and
+# signals.
+_BEGIN = """const int64_t cases = plan[8 + {tasks}], own = plan[9 + {tasks}];
+  const int64_t ahead = plan[10 + {tasks}], by_case = plan[11 + {tasks}];
+  const int64_t by_row = plan[12 + {tasks}], by_signal = plan[13 + {tasks}];
+  const int64_t at = (int64_t)blockIdx.x * blockDim.x + threadIdx.x;
+  if (at >= cases) return;
+  const int64_t wide = own ? cases : 1;
+  if (own) u += at;
+  state += at;
+  rec += at * by_case;
+  double p[{np} + 1];
+  for (int k = 0; k < {np}; ++k) p[k] = par[k * cases + at];
+  (void)wide; (void)chosen;"""
+
+_THREADS = Caller(
+    runtime=ONE_LANE,
+    head=f"""KERNEL void __launch_bounds__({THREADS}) {ENTRY}(const double *restrict par, double h,
+    const double *restrict u, double *restrict state, const int64_t *restrict plan,
+    double *restrict rec)""",
+    begin=_BEGIN,
+    stimulus="uk[{k} * wide]",
+    entry="state[{k} * cases]",
+    row="u + (f / stim - ahead) * {nu} * wide",
+    record="""double *row = rec + (f / every - row0) * by_row;
+      for (int j = 0; j < {count}; ++j) row[j * by_signal] = o[j];""",
+)
+
+
+def emit_cuda(stages: Stages) -> str:
+    """Return the CUDA C of the kernel; before it stands what its compiler is to know first.
+
+    That is ``c_runtime.CUDA`` for NVRTC.
+    """
+    return emit_single(stages, _THREADS)
+
+
+# --- The kernel
+
+MOST = 2**15
+"""cases of a batch: as many threads as the largest processors hold at once"""
+_SUBSTEPS = 5000  # of a piece of time
+_SHARE = 0.5  # of the free memory that a batch may take; threads' stacks and others take some
+_FLOAT = 8  # bytes
+
+
+class CudaKernel:
+    """Kernel for a batch of cases on a graphics processor.
+
+    Parameters
+    ----------
+    device
+        The graphics processor.
+    stages
+        What is computed, of the signals that are wanted.
+    """
+
+    at_once = 2
+    """batches at a time: one is set up, or taken apart, while another is computed"""
+
+    def __init__(self, device: CudaDevice, stages: Stages) -> None:
+        self.layout: Layout = layout_of(stages)
+        self.label = f"CUDA C, {device.label}"
+        self.lanes = 1
+        self._device, self._signals = device, len(stages.output)
+        self._inputs = leaf_count(stages, "p"), leaf_count(stages, "u")
+        self._function = device.load(emit_cuda(stages), ENTRY)
+
+    def for_cases(self, count: int, schedule: Schedule) -> CudaKernel:
+        """Return the kernel for batches of so many cases as memory holds, of about equal size.
+
+        Raises
+        ------
+        DeviceError
+            When it does not hold a single case.
+        """
+        free = self._device.free()
+        size = self._size(schedule)
+        most = min(MOST, int(_SHARE * free) // size)
+        if most < 1:
+            raise DeviceError(
+                f"{self._device.label} has {free / 1e6:.3g} MB free, of which a case may use half, "
+                f"but it needs {size / 1e6:.3g} MB: record fewer signals, or less often"
+            )
+        batches = -(-count // most)
+        sized = copy.copy(self)
+        sized.lanes = -(-count // batches)
+        return sized
+
+    def rows(self, cases: int, rows: int) -> Array:
+        """Return room for what cases record, shape (cases, rows, signals), as the device has it."""
+        return np.empty((rows, self._signals, cases)).transpose(2, 0, 1)
+
+    def advance(
+        self,
+        schedule: Schedule,
+        parameters: Array,
+        stimulus: Array,
+        vector: Array,
+        rows: Array,
+        end: int,
+        begin: int = 0,
+        ends: Ends | None = None,
+    ) -> None:
+        """Run frames begin..end of one batch; see ``case_kernels.LaneKernel.advance``.
+
+        ``ends`` are none: all outputs are recorded in all rows.
+
+        Raises
+        ------
+        DeviceError
+            When the device fails, or others have taken its memory meanwhile.
+        """
+        own = int(stimulus.ndim == 3)
+        with self._device.working() as memory:
+            state, par = memory.room(vector.nbytes), memory.room(parameters.nbytes)
+            memory.put(state, vector)
+            memory.put(par, parameters)
+            given = memory.room(stimulus[: _stimulus_rows(schedule)].nbytes)
+            plan = memory.room(_FLOAT * (len(schedule.task_frames) + 14))
+            recording = _Recording(rows, self.lanes, _most_rows(schedule))
+            room = memory.room(recording.size)
+            for first, last in _pieces(schedule, begin, end):
+                ahead = first // schedule.stimulus_frames
+                memory.put(given, stimulus[ahead : last // schedule.stimulus_frames + 1])
+                recording.begin(rows_between(schedule, first, last))
+                said = [*plan_array(schedule, first, last, self._signals)]
+                said += [self.lanes, own, ahead, *recording.apart]
+                memory.put(plan, np.array(said, dtype=np.int64))
+                memory.run(
+                    self._function,
+                    -(-self.lanes // THREADS),
+                    THREADS,
+                    (par, float(schedule.step), given, state, plan, room),
+                )
+                memory.get(room, recording.place)
+                recording.end()
+            memory.get(state, vector)
+
+    def _size(self, schedule: Schedule) -> int:
+        """Return the bytes of a case with a stimulus of its own."""
+        parameters, inputs = self._inputs
+        stimulus = inputs * _stimulus_rows(schedule)
+        recorded = self._signals * _most_rows(schedule)
+        return _FLOAT * (parameters + self.layout.total + stimulus + recorded)
+
+
+def _frames(schedule: Schedule) -> int:
+    """Return the frames of a piece of time."""
+    return max(_SUBSTEPS // schedule.substeps, 1)
+
+
+class _Recording:
+    """Where the rows of a piece of time go: in the order of those who want them.
+
+    Straight into their array where the piece has it to itself, else through room of its own.
+    """
+
+    def __init__(self, rows: Array, lanes: int, most: int) -> None:
+        self._rows, self._lanes, self._at = rows, lanes, 0
+        self._order = sorted(range(3), key=lambda axis: -rows.strides[axis])
+        self._room = np.empty(lanes * most * rows.shape[2])
+        self.size = self._room.nbytes
+        self.begin(0)
+
+    def begin(self, count: int) -> None:
+        """Take so many rows more."""
+        shape = self._lanes, count, self._rows.shape[2]
+        self._target = self._rows[:, self._at : self._at + count]
+        own = self._room[: math.prod(shape)].reshape([shape[axis] for axis in self._order])
+        straight = self._target.transpose(self._order)
+        is_whole = straight.shape == own.shape and straight.flags.c_contiguous
+        self.place = straight if is_whole else own
+        seen = self.place.transpose(np.argsort(self._order))
+        self._seen = None if is_whole else seen
+        self.apart = [stride // _FLOAT for stride in seen.strides]
+        self._at += count
+
+    def end(self) -> None:
+        """Have the rows where they are wanted."""
+        if self._seen is not None:
+            self._target[:] = self._seen[: len(self._target)]
+
+
+def rows_between(schedule: Schedule, begin: int, end: int) -> int:
+    """Return how many rows are recorded from frame begin to before end; at the run's end its row.
+
+    As the kernel counts them by its plan.
+    """
+    every = schedule.record_frames
+    return -(-(end + int(end == schedule.frames)) // every) - -(-begin // every)
+
+
+def _stimulus_rows(schedule: Schedule) -> int:
+    """Return how many rows of a stimulus a piece of time reads at most."""
+    return _frames(schedule) // schedule.stimulus_frames + 2
+
+
+def _most_rows(schedule: Schedule) -> int:
+    """Return how many rows a piece records at most, that of the end among them."""
+    return _frames(schedule) // schedule.record_frames + 2
+
+
+def _pieces(schedule: Schedule, begin: int, end: int) -> list[tuple[int, int]]:
+    """Return the frames at which pieces begin and end; at the end of a run nothing but its row."""
+    edges = [*range(begin, end, _frames(schedule)), end]
+    return list(pairwise(edges)) or [(begin, end)]
+
+
+class CudaEngine:
+    """Single runs on the graphics processor: a batch of one, slow, with the digits of many."""
+
+    def __init__(self, program: Program) -> None:
+        self._kernel = CudaKernel(find_device(), build_stages(program))
+        self.layout, self.label = self._kernel.layout, self._kernel.label
+
+    def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
+        """Run frames begin..end in place; see ``engine.Engine``."""
+        schedule, vector = request.schedule, state[:, None].copy()
+        count = rows_between(schedule, begin, end)
+        recorded = self._kernel.rows(1, count)
+        self._kernel.advance(
+            schedule, request.parameters[:, None], request.stimulus, vector, recorded, end, begin
+        )
+        rows[:count] = recorded[0][:, request.selection]
+        state[:] = vector[:, 0]
