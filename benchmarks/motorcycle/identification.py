@@ -15,8 +15,7 @@ from benchmarks.timing import timed
 from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.experiments.friction_ramp import EXPERIMENT
 from bywire.brakes.motorcycle.methods.friction_ramp import METHOD, Options, shots_of
-from bywire.brakes.motorcycle.methods.stick_slip.shooting import Shooting, overlaid
-from bywire.brakes.motorcycle.methods.stick_slip.slips import BEFORE, Shot, onset_of
+from bywire.brakes.motorcycle.methods.stick_slip import BEFORE, Shooting, Shot, onset_of, overlaid
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.catalog import parameters
 from bywire.core.typing import Array

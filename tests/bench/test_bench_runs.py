@@ -14,7 +14,7 @@ from bywire.bench import ensemble, running, step_error
 from bywire.bench.ensemble import run_benches
 from bywire.bench.experiment import as_run
 from bywire.bench.running import Result, run
-from bywire.brakes.motorcycle.operating_point import settled_start
+from bywire.brakes.motorcycle.case import settled_start
 from bywire.core.errors import WorkLimitError
 from bywire.simulation.ensemble import simulate_group
 from bywire.simulation.run import simulate

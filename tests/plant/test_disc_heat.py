@@ -102,7 +102,7 @@ def test_a_warning_says_which_boiling_point_is_passed_and_when():
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ("T_1=700 degC", "T_1 = 700 degC must be below T_2 = 600 degC"),
+        ("T_1=700 degC", "T_1 = 700 degC must be < T_2 = 600 degC"),
         ("T_a=-300 degC", "it must be > 0 K, got '-300 degC'"),
         ("T_a=20", "cannot be K"),
         ("f=1.2", "must be >= 0 and <= 1"),

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from bywire.core.errors import RunError
-from bywire.reproduction import runs as shared
+from bywire.reproduction import reproduction as shared
 from bywire.reproduction.reproduction import Part, Reproduction, reproduced
 
 EMPTY = Reproduction("made-up", "Nobody, 2010")

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from bywire.core.errors import FileError, UnknownNameError
 from bywire.data.netcdf import read_recording
 from bywire.report.tables import text_table
-from bywire.reproduction.item import SHARE, Allowance, Fact, compared, found
+from bywire.reproduction.item import SHARE, Allowance, Fact, RootCause, compared, found
 from bywire.reproduction.reproduction import (
     SOURCES,
     Exhibit,
@@ -23,7 +23,6 @@ from bywire.reproduction.reproduction import (
     tallies,
     verdicts,
 )
-from bywire.reproduction.root_cause import RootCause
 
 KEYS = ["id", "unit", "stated", "computed", "tolerance", "agrees", "note"]
 

@@ -35,7 +35,7 @@ def test_a_study_without_any_result_says_why_and_fails(study, tmp_path, design, 
     assert (run.status, run.holds) == ("failed", False)
     assert len(run.findings.failures) == len(run.cases) > 0
     assert any("cases have no result" in text for text in run.warnings)
-    assert "must be less than the chamber length" in " ".join(str(run).split())
+    assert "must be < the chamber length" in " ".join(str(run).split())
     names = {each.name for each in run.write(tmp_path / "report")}
     assert "report.html" in names
     assert not [name for name in names if name.endswith((".png", ".toml", ".nc"))]

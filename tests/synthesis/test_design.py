@@ -12,8 +12,7 @@ import pytest
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.loop_figures import LOOP_FIGURES, LoopFigures
 from bywire.analysis.margins import MARGINS, margins
-from bywire.brakes.motorcycle.linear.brake import first_orders
-from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop
+from bywire.brakes.motorcycle.linear import PressureLoop, first_orders
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError
 from bywire.simulation.run import simulate

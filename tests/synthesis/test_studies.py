@@ -10,8 +10,6 @@ import pytest
 import xarray as xr
 
 import bywire
-from bywire.brakes.motorcycle.sizing import demand as actuator_demand
-from bywire.brakes.motorcycle.sizing.trial import sine_figures
 from bywire.brakes.motorcycle.studies import actuator_sizing
 from bywire.brakes.wedge.sizing import Demand, answer, closing_speed, redesigned
 from bywire.brakes.wedge.studies import drive_train
@@ -140,15 +138,15 @@ def test_a_response_that_no_design_reaches_gives_no_optimum() -> None:
 @pytest.mark.parametrize("kind", ["sine", "step"])
 def test_the_wanted_pressure_and_its_derivatives_belong_together(kind) -> None:
     wanted = (
-        actuator_demand.sine(MOTORCYCLE, 37e5, 3e5, 10.0)
+        actuator_sizing.sine(MOTORCYCLE, 37e5, 3e5, 10.0)
         if kind == "sine"
-        else actuator_demand.step(MOTORCYCLE, 6e5, 37e5, 10.0)
+        else actuator_sizing.step(MOTORCYCLE, 6e5, 37e5, 10.0)
     )
     inner = slice(2, -2)
     for value, rate in ((wanted.p, wanted.rate), (wanted.rate, wanted.bend)):
         slope = np.gradient(value, wanted.t)
         np.testing.assert_allclose(slope[inner], rate[inner], atol=2e-3 * np.abs(rate).max())
-    lag = actuator_demand._lag(MOTORCYCLE, wanted.middle)
+    lag = actuator_sizing._lag(MOTORCYCLE, wanted.middle)
     filled = lag * np.gradient(wanted.p_pd, wanted.t)
     error = filled - (wanted.p - wanted.p_pd)
     assert np.abs(error[inner]).max() < 2e-3 * np.abs(filled).max()
@@ -156,7 +154,7 @@ def test_the_wanted_pressure_and_its_derivatives_belong_together(kind) -> None:
 
 
 def test_a_double_pole_has_the_bandwidth_that_is_asked_for() -> None:
-    wanted = actuator_demand.step(MOTORCYCLE, 0.0, 1e5, 10.0)
+    wanted = actuator_sizing.step(MOTORCYCLE, 0.0, 1e5, 10.0)
     fine = np.linspace(0.0, wanted.t[-1], 20001)
     rate = np.interp(fine, wanted.t, wanted.rate) / 1e5  # the impulse response
     gain = abs(np.trapezoid(rate * np.exp(-2j * np.pi * 10.0 * fine), fine))
@@ -164,7 +162,7 @@ def test_a_double_pole_has_the_bandwidth_that_is_asked_for() -> None:
 
 
 def test_seals_keep_their_force_at_the_piston_when_the_gear_changes() -> None:
-    other = actuator_demand.geared(MOTORCYCLE, 2.0 * MOTORCYCLE.gear.k_g)
+    other = actuator_sizing.geared(MOTORCYCLE, 2.0 * MOTORCYCLE.gear.k_g)
     for v in (0.0, 1e-5, 1e-2):
         forces = [
             np.array(seal_friction.output(seal_friction.Input(v / k, 3e6), par.seal)) / k
@@ -178,7 +176,9 @@ def test_the_calculation_agrees_with_the_bench_where_nothing_rubs() -> None:
         {"seal.T_pr": 0.0, "seal.f_cfr_p": 0.0, "seal.f_cfr_n": 0.0, "adc.law": "ideal"}
     )
     for k_g in (2e-4, 4e-4):
-        found = sine_figures("x", actuator_demand.geared(smooth, k_g), 30e5, 3e5, 10.0)
+        found = actuator_sizing.sine_figures(
+            "x", actuator_sizing.geared(smooth, k_g), 30e5, 3e5, 10.0
+        )
         kpis = {one.name: one.value for one in found}
         assert kpis["x_bench_amplitude"] == pytest.approx(3e5, rel=0.01)
         for name in ("current", "speed", "power"):
@@ -191,9 +191,9 @@ def test_the_best_gear_ratio_is_a_minimum_and_limits_bind_where_they_say() -> No
     kpis = {one.name: one.value for one in found.kpis}
 
     def power(k_g: float) -> float:
-        own = actuator_demand.geared(MOTORCYCLE, k_g)
+        own = actuator_sizing.geared(MOTORCYCLE, k_g)
         wanted = actuator_sizing.course(own, options, 10.0)
-        return float(actuator_demand.motion(own, wanted).electrical.max())
+        return float(actuator_sizing.motion(own, wanted).electrical.max())
 
     best = kpis["optimum_k_g"]
     assert power(best) == pytest.approx(kpis["optimum_electrical"])

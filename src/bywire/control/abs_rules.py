@@ -14,8 +14,8 @@ from bywire.core.signals import Pressure, Signal
 
 BUILD, DUMP, HOLD, STEPPED = 0.0, 1.0, 2.0, 3.0
 PHASES = ("build", "dump", "hold", "stepped")
-"""what phases 0 to 3 are called"""
-_FAR = 0.5  # of the pressure: what is left where a dump did not keep a wheel from slipping far
+"""names of the phases 0 to 3"""
+_FAR = 0.5  # share of the pressure that remains if a wheel slips far in spite of a dump
 _LEAST = 0.05  # of the pressure: from less, steps would lead up again too late
 
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
@@ -25,7 +25,7 @@ Speed = Annotated[float, Unit("m/s", 5.0), Field(gt=0, allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):
-    """Thresholds, times, and pressures relative to what the road last held.
+    """Thresholds, times, and pressures relative to the last one that the road held.
 
     A threshold judges the slip ahead, to which the wheel's deceleration leads within ``t_lead``:
     a line in the plane of slip and deceleration, beyond which a wheel that slows down quickly is
@@ -49,7 +49,7 @@ class Parameters(ParameterSet):
     dump: Annotated[float, Unit("1/s", 100.0), Field(gt=0, allow_inf_nan=False)]
     """how fast it is taken back, over itself"""
     depth: Fraction
-    """pressure down to which it is taken back, over what the road last held"""
+    """pressure at the end of a dump, relative to the last one that the road held"""
     back: Factor
     """pressure at which the stepped build begins, over the same"""
     t_step: Duration
@@ -81,7 +81,7 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """What is seen of wheel and vehicle, what may be lowered now and then, and what was left."""
+    """State of wheel and vehicle, the demand now and a sample ago, and the last output."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0), Ge(0)]
     a: Annotated[float, Signal("m/s**2", "measured deceleration of the vehicle", 10.0)]
@@ -102,7 +102,7 @@ class Output(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What rules go by, 0 or 1."""
+    """Conditions of the rules, 0 or 1."""
 
     biting: Annotated[float, Signal("1", "the first bite is enough")]
     locking: Annotated[float, Signal("1", "the wheel tends to lock")]
@@ -113,7 +113,7 @@ class Seen(NamedTuple):
 
 
 def seen(x: State, u: Input, slowing: Slowing, par: Parameters) -> Seen:
-    r"""Return what rules go by.
+    r"""Return the conditions of the rules.
 
     .. math:: \lambda_{ahead} = \lambda + T_{lead} \dot\lambda, \quad
        v \dot\lambda = a_{wheel} - (1 - \lambda) a
@@ -150,7 +150,7 @@ def next_phase(phase: Flag, s: Seen) -> Flag:
 def balanced(p: Pressure, slowing: Slowing, u: Input) -> Pressure:
     r"""Return the pressure that the road holds, :math:`p - (a_{wheel} - a) J/(r k)`.
 
-    What slows the wheel more than the vehicle is brake torque that the road does not hold.
+    A wheel that slows more than the vehicle has more brake torque than the road holds.
     """
     return ops.fmax(p - (slowing - u.a) * u.inertia, _LEAST * p)
 

@@ -25,7 +25,7 @@ class Parameters(ParameterSet):
     T_t: Duration
     """tracking time of the anti-wind-up"""
     D_max: Fraction
-    """limit of the duty cycle that the ECU asks for"""
+    """limit of the duty cycle that the ECU demands"""
 
 
 class State(NamedTuple):
@@ -35,7 +35,7 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Set point and measurement, and what the power stage can realize."""
+    """Set point, measurement, and limit of the power stage."""
 
     i_ref: Annotated[float, Signal("A", "current set point", 5.0)]
     i_meas: Annotated[float, Signal("A", "measured current", 5.0)]
@@ -55,11 +55,11 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
         I_{k+1} = I_k + T (k_i (i_{ref} - i) + (D_{sat} - D) / T_t)
 
     D_sat is D within the smaller of the two limits, the ECU's own and the power stage's: the
-    integral part follows what reaches the motor, not what was asked for.
+    integral part follows the realized duty cycle, not the demanded one.
     """
     error = u.i_ref - u.i_meas
-    wanted = par.k_p * error + x.integral
+    unlimited = par.k_p * error + x.integral
     limit = ops.fmin(par.D_max, u.D_lim)
-    duty = ops.clip(wanted, -limit, limit)
-    growth = par.k_i * error + (duty - wanted) / par.T_t
+    duty = ops.clip(unlimited, -limit, limit)
+    growth = par.k_i * error + (duty - unlimited) / par.T_t
     return State(integral=x.integral + T * growth), Output(duty=duty)

@@ -1,6 +1,6 @@
 """Derating: a motor's current limit falls with the winding's temperature, as the ECU believes it.
 
-No sensor is in the winding: the ECU runs a thermal model of its own on the current.
+The winding has no sensor: the ECU runs a thermal model on the current.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Rise = Annotated[float, Signal("delta_degC", "rise above the air as the ECU beli
 class Parameters(ParameterSet):
     """The ECU's thermal model, and how the limit follows it.
 
-    ``law``: ``"current"`` lowers the limit; ``"off"`` leaves it as it is, and nothing is computed.
+    ``law``: ``"current"`` lowers the limit; ``"off"`` keeps it, and computes nothing.
     """
 
     law: Literal["off", "current"]
@@ -63,7 +63,7 @@ class Parameters(ParameterSet):
     def _falls(self) -> Parameters:
         if not self.T_derate < self.T_limit:
             raise ValueError(
-                f"T_derate = {shown(self.T_derate, 'K')} must be below T_limit = "
+                f"T_derate = {shown(self.T_derate, 'K')} must be < T_limit = "
                 f"{shown(self.T_limit, 'K')}: between them the limit falls"
             )
         return self

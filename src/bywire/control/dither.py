@@ -68,7 +68,7 @@ def breakaway_current(
 
     .. math:: i_{brkf} = \frac{k_{brk,p}}{K_e} (T_{pr} + f_{cfr,p} p_{mc})
 
-    The gear's efficiency is left out, as in the paper; negative pressure counts as zero.
+    The gear's efficiency is neglected, as in the paper; negative pressure counts as zero.
 
     References
     ----------

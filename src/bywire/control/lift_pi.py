@@ -35,7 +35,7 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Deceleration, rider's demand, what is left of it to be lowered, and that a sample ago."""
+    """Deceleration, rider's demand, the demand to be lowered, and that a sample ago."""
 
     a: Annotated[float, Signal("m/s**2", "measured deceleration", 10.0)]
     p_rider: Pressure
@@ -56,9 +56,9 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     .. math:: p = \min(p_{most}, K_p (a_{lim} - a) + I)
     """
     error = par.a_lim - u.a
-    wanted = par.k_p * error + x.integral
-    p = ops.clip(wanted, 0.0, ops.fmax(u.p_most, 0.0))
-    growth = par.k_p / par.T_i * error + (p - wanted) / par.T_t
+    unlimited = par.k_p * error + x.integral
+    p = ops.clip(unlimited, 0.0, ops.fmax(u.p_most, 0.0))
+    growth = par.k_p / par.T_i * error + (p - unlimited) / par.T_t
     idle = u.p_before <= 0
     integral = ops.where(idle, ops.fmax(u.p_rider, 0.0), x.integral + T * growth)
     return State(integral), Output(p, ops.where(p < u.p_most, 1.0, 0.0))

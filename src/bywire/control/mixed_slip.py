@@ -1,4 +1,4 @@
-"""Mixed slip and deceleration of a wheel: what slip control holds where slip alone is unsure."""
+"""Mixed slip and deceleration of a wheel: the controlled variable where slip alone is uncertain."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """What takes the places of set point and slip."""
+    """Substitutes of set point and slip."""
 
     set_point: Annotated[float, Signal("1", "mixed set point", 0.1)]
     mixed: Annotated[float, Signal("1", "mixed slip and deceleration", 0.1)]

@@ -26,7 +26,7 @@ class Parameters(ParameterSet):
     zeta: Factor
     """damping ratio"""
     c: Weight
-    """share of the reference's speed that the damping leaves alone; 0 damps the whole speed"""
+    """share of the reference's speed that is not damped; 0 damps the whole speed"""
     f_speed: Frequency
     """corner of the filter behind the encoder's differences"""
     i_max: Current

@@ -70,14 +70,14 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     .. math:: i = k_p (b r - p) + I + D, \quad
         D_k = \frac{\tau_d D_{k-1} + k_d (d_k - d_{k-1})}{\tau_d + T}, \quad d = c r - p
 
-    The integral takes up the difference between the limited and the wanted demand with the time
+    The integral follows the difference between the limited and the unlimited demand with the time
     constant T_t, so that it cannot wind up.
     """
     signal = par.c * u.p_ref - u.p_meas
     slope = (par.tau_d * x.slope + par.k_d * (signal - x.last)) / (par.tau_d + T)
-    wanted = par.k_p * (par.b * u.p_ref - u.p_meas) + x.integral + slope
-    i = ops.clip(wanted, -par.i_max, par.i_max)
-    growth = par.k_i * (u.p_ref - u.p_meas) + (i - wanted) / par.T_t
+    unlimited = par.k_p * (par.b * u.p_ref - u.p_meas) + x.integral + slope
+    i = ops.clip(unlimited, -par.i_max, par.i_max)
+    growth = par.k_i * (u.p_ref - u.p_meas) + (i - unlimited) / par.T_t
     return State(integral=x.integral + T * growth, slope=slope, last=signal), Output(i=i)
 
 

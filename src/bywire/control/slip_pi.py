@@ -17,7 +17,7 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
 class Parameters(ParameterSet):
-    """Gains by the crossover of the loop, from what the ECU believes of its wheel.
+    """Gains by the crossover of the loop, from the wheel's parameters that the ECU assumes.
 
     ``schedule``: ``"speed"`` lets the gain follow the speed, with which gain and pole of the wheel
     fall; ``"fixed"`` keeps that of v_fixed.
@@ -56,7 +56,7 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Speed, slip and its set point, the rider's demand, what may be lowered, and that before."""
+    """Speed, slip, set point, the rider's demand, the demand to be lowered, and the last one."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0), Ge(0)]
     slip_set: Annotated[float, Signal("1", "slip set point", 0.1)]
@@ -93,14 +93,14 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
 
     .. math:: p = \min(p_{most}, K_p (\lambda_{set} - \lambda) + I)
 
-    The integral follows what is demanded in the tracking time, and starts at the rider's demand.
+    The integral follows the output in the tracking time, and starts at the rider's demand.
 
     Notes
     -----
     On the rising branch the tyre's slip is stiff, and an integral alone closes the loop in
     :math:`T_i\, N r \mu'(\lambda)/(k K_p)`: 2 s on dry asphalt at a slip of 0.04, half a stop.
-    ``eager`` shortens that far below the set slip, above v_fall, and leaves the loop at the set
-    slip as it is.
+    ``eager`` shortens that far below the set slip, above v_fall, and does not change the loop at
+    the set slip.
 
     References
     ----------
@@ -109,14 +109,14 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     """
     K_p = gain(u.v, par)
     error = u.slip_set - u.slip
-    wanted = K_p * error + x.integral
-    p = ops.clip(wanted, 0.0, ops.fmax(u.p_most, 0.0))
+    unlimited = K_p * error + x.integral
+    p = ops.clip(unlimited, 0.0, ops.fmax(u.p_most, 0.0))
     short = ops.fmax(error, 0.0) / ops.fmax(u.slip_set, _NO_SLIP)
-    # While a demand builds up, what is missing is not slip control's; below v_fall edges of the
-    # wheel come so late that slip looks missing: no haste then.
+    # While a demand builds up, slip control is not the cause of missing pressure. Below v_fall the
+    # edges of the wheel come so late that slip looks too small: no faster integral then.
     calm = ops.where(u.p_most < u.p_rider, 1.0, ops.where(u.v < par.v_fall, 1.0, 0.0))
     haste = 1.0 + par.eager * (1.0 - calm) * short
-    growth = K_p / par.T_i * haste * error + (p - wanted) / par.T_t
+    growth = K_p / par.T_i * haste * error + (p - unlimited) / par.T_t
     # Nothing to be lowered yet: the first demand must not wait for the integral.
     idle = u.p_before <= 0
     integral = ops.where(idle, ops.fmax(u.p_rider, 0.0), x.integral + T * growth)

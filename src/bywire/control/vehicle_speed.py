@@ -25,15 +25,15 @@ class Parameters(ParameterSet):
     """
 
     law: Literal["wheels", "accelerometer"]
-    """what carries the speed while the wheels slip"""
+    """source of the speed while the wheels slip"""
     a_max: Annotated[float, Unit("m/s**2", 12.0), Field(gt=0, allow_inf_nan=False)]
     """deceleration that no braking exceeds (law "wheels")"""
     slip_small: Weight
-    """slip up to which a wheel is believed (law "accelerometer")"""
+    """slip up to which a wheel counts as reliable (law "accelerometer")"""
     tau: Duration
     """time in which the reference comes back to a wheel that is believed"""
     v_still: Annotated[float, Unit("m/s", 1.0), Field(gt=0, allow_inf_nan=False)]
-    """speed below which every wheel is believed, or an error would stay at standstill"""
+    """speed below which every wheel counts as reliable: else an error would stay at standstill"""
 
 
 class State(NamedTuple):
@@ -64,7 +64,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> State:
 def slip(
     v: Speed,
     v_wheel: Annotated[float, Signal("m/s", "measured speed of the tread", 20.0)],
-    v_off: Annotated[float, Signal("m/s", "speed below which slip is not told", 2.0), Gt(0)],
-) -> Annotated[float, Signal("1", "braking slip as the ECU sees it", 0.1)]:
-    """Return the braking slip as the ECU sees it, relative to at least ``v_off``."""
+    v_off: Annotated[float, Signal("m/s", "speed below which slip is uncertain", 2.0), Gt(0)],
+) -> Annotated[float, Signal("1", "braking slip as the ECU computes it", 0.1)]:
+    """Return the braking slip as the ECU computes it, relative to at least ``v_off``."""
     return (v - v_wheel) / ops.fmax(v, v_off)

@@ -1,6 +1,6 @@
 """Adjuster of a brake's clearance: it counts how far the pads travel, and turns by whole teeth.
 
-It acts only when the brake is parked again. Its faults are parameters of what it turns. Teeth are
+It acts only while the brake is parked. Its faults are parameters of the turning. Teeth are
 positive where they take clearance away.
 """
 
@@ -17,13 +17,13 @@ from bywire.core.signals import Signal
 
 WAITS, APPLIED, TURNS = 0.0, 1.0, 2.0
 
-_WHOLE = 1e-9  # of a tooth: what is short of a whole one by rounding alone
+_WHOLE = 1e-9  # of a tooth: rounding error of a whole one
 Flag = Annotated[float, Signal("1", "flag")]
 Teeth = Annotated[float, Signal("1", "teeth")]
 
 
 class Parameters(ParameterSet):
-    """When it turns, by how much, and what may be wrong with it.
+    """Thresholds and steps of the adjuster, and its fault.
 
     ``ways``: ``"closing"`` takes clearance away only; ``"both"`` also gives it back where there is
     less than ``gap_min``.
@@ -36,7 +36,7 @@ class Parameters(ParameterSet):
     gap_nominal: Length
     """clearance that it restores"""
     band: Length
-    """clearance beyond the nominal one that it lets pass"""
+    """excess of the clearance that it tolerates"""
     gap_min: Length
     """clearance of the cold brake below which it never turns; a hot disc takes some of it"""
     tooth: Length
@@ -50,19 +50,19 @@ class Parameters(ParameterSet):
     ways: Literal["closing", "both"]
     """which ways it turns"""
     fault: Literal["none", "stuck", "one-way", "slips", "over-adjusts", "blind-to-heat"]
-    """what is wrong with it"""
+    """fault"""
 
 
 class State(NamedTuple):
-    """What it remembers."""
+    """Memory."""
 
     applied: Annotated[float, Signal("1", "the brake was applied since it was parked last")]
     wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
-    teeth: Annotated[float, Signal("1", "teeth turned, as it counts them")]
+    teeth: Annotated[float, Signal("1", "teeth turned, by its own count")]
 
 
 class Input(NamedTuple):
-    """What it sees: its wear log needs no more."""
+    """Signals, all that the wear log needs."""
 
     gap: Annotated[float, Signal("m", "clearance by the way from parking to contact", 2e-4)]
     T: Annotated[float, Signal("K", "temperature of the disc, estimated", 350.0)]

@@ -18,7 +18,7 @@ Age = Annotated[float, Signal("s", "time since the last edge", 1e-3), Ge(0)]
 
 
 class Parameters(ParameterSet):
-    """What the ECU knows of its wheel sensors.
+    """Wheel sensors as the ECU assumes them.
 
     ``law``: ``"period"`` divides the angle between edges by the time between them, and lets the
     speed fall while none comes; ``"difference"`` takes differences of the angle over a sample.
@@ -39,7 +39,7 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """What the capture unit shows."""
+    """Registers of the capture unit."""
 
     angle: Annotated[float, Signal("rad", "angle of the last edge", 100.0)]
     age: Age

@@ -33,7 +33,7 @@ class SurfaceParameters(ParameterSet):
     """Adhesion of a tyre on a surface: after Burckhardt, and by the Magic Formula."""
 
     c1: Coefficient
-    """what Burckhardt's adhesion tends to, but for c3"""
+    """limit of Burckhardt's adhesion, before c3 is subtracted"""
     c2: Coefficient
     """how fast it rises with slip"""
     c3: Coefficient
@@ -51,7 +51,7 @@ class SurfaceParameters(ParameterSet):
     def _has_a_peak(self) -> SurfaceParameters:
         if not self.c1 * self.c2 > self.c3:
             raise ValueError(
-                f"c1 c2 = {self.c1 * self.c2:g} must be above c3 = {self.c3:g}: the adhesion must "
+                f"c1 c2 = {self.c1 * self.c2:g} must be > c3 = {self.c3:g}: the adhesion must "
                 "rise with slip first"
             )
         locked = angle(1.0, surface_of(self))
@@ -126,7 +126,7 @@ def burckhardt_rising(
     for _ in range(_NEWTON):
         decay = ops.exp(-c2 * slip)
         left = mu - c1 * (1.0 - decay) + c3 * slip
-        # At the peak itself, where the curve is level, rounding must not be divided by nothing.
+        # The curve is level at the peak: avoid a division of rounding errors by zero.
         slip = slip + left / ops.fmax(c1 * c2 * decay - c3, _LEVEL * bend)
     return ops.fmin(slip, peak)
 
@@ -160,10 +160,10 @@ def magic_rising(
     By Newton's method from z = tan(theta/C), which approaches the root from one side for every E.
     """
     part = theta / ground.C
-    wanted = ops.sin(part) / ops.cos(part)
-    z = wanted
+    target = ops.sin(part) / ops.cos(part)
+    z = target
     for _ in range(_MAGIC_NEWTON):
-        left = wanted - (1.0 - ground.E) * z - ground.E * ops.arctan(z)
+        left = target - (1.0 - ground.E) * z - ground.E * ops.arctan(z)
         z = z + left / (1.0 - ground.E * z * z / (1.0 + z * z))
     return z / ground.B
 
@@ -183,7 +183,7 @@ def peak_slip(ground: Surface, par: Parameters) -> Slip:
 
 
 def held(slip: Slip, ground: Surface, par: Parameters) -> Rising:
-    """Return what is held at a slip: the peak up to its slip, beyond it what is left there.
+    """Return the adhesion limit at a slip: the peak up to its slip, the curve beyond.
 
     The slip is that on the rising branch of the curve at which as much is held.
     """

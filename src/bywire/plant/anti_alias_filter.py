@@ -18,7 +18,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """What comes out."""
+    """Filtered signal."""
 
     y: Annotated[float, Signal("1", "filtered reading", 0.5)]
 
@@ -30,7 +30,7 @@ class Rate(NamedTuple):
 
 
 class Input(NamedTuple):
-    """What goes in."""
+    """Signal at the input."""
 
     raw: Annotated[float, Signal("1", "reading, share of the range", 0.5)]
 

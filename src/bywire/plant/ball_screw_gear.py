@@ -46,7 +46,7 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What drives angle and speed."""
+    """Right-hand sides of angle and speed."""
 
     theta: Annotated[float, Signal("rad/s", "motor speed", 50.0)]
     omega: Annotated[float, Signal("N*m", "accelerating torque", 0.1)]
@@ -139,7 +139,7 @@ def energy(x: State, par: Parameters) -> Energy:
 
 
 def power_in(x: State, u: Input, par: Parameters) -> Power:
-    """Return the motor's power less the power that the piston gives."""
+    """Return the motor's power minus the power to the piston."""
     return (u.torque - par.k_g * u.force) * x.omega
 
 

@@ -28,13 +28,13 @@ FAULTS = (
 
 
 class Input(NamedTuple):
-    """What the load does."""
+    """Current of the load."""
 
     i_dc: Annotated[float, Signal("A", "battery current", 5.0)]
 
 
 class Output(NamedTuple):
-    """What the load sees."""
+    """Voltage at the load."""
 
     v_bus: Annotated[float, Signal("V", "bus voltage", 12.0)]
 

@@ -27,7 +27,7 @@ class Parameters(ParameterSet):
     r_eff: Length
     """radius at which the pads' friction acts"""
     T_drag: Torque
-    """what pads that do not come off hold without pressure; 0 where they do"""
+    """torque of pads that drag without pressure; 0 if they do not"""
 
 
 FAULTS = (
@@ -61,5 +61,5 @@ def torque_per_pressure(
 
 
 def output(u: Input, par: Parameters) -> Output:
-    """Return the torque; without pressure none but what drags."""
+    """Return the torque; without pressure only that of dragging pads."""
     return Output(torque=ops.fmax(torque_per_pressure(par) * u.p, par.T_drag))

@@ -25,7 +25,7 @@ GaugePressure = Annotated[float, Signal("Pa", "pressure", 2e6), Ge(0)]
 
 
 class Parameters(ParameterSet):
-    """Newtonian fluid of constant bulk modulus; air, if any, stays where it is, undissolved."""
+    """Newtonian fluid of constant bulk modulus; air, if any, does not move or dissolve."""
 
     beta: Annotated[float, Unit("Pa", 1e9), Field(gt=0, allow_inf_nan=False)]
     """bulk modulus"""
@@ -85,7 +85,7 @@ def compliance(u: Chamber, par: Parameters) -> FluidCompliance:
 
     .. math:: \frac{V - V_g}{\beta} + \frac{V_g}{n (p_{atm} + p)}
 
-    The fluid fills what the gas leaves: with V in the place of V - V_g the stored energy is not
+    The fluid fills the rest of the volume: with V in the place of V - V_g the stored energy is not
     the integral of the powers.
     """
     if par.air != "entrained":
@@ -124,7 +124,7 @@ def gas_energy(p: GaugePressure, par: Parameters) -> Energy:
 
 
 def inflow_energy(p: GaugePressure, par: Parameters) -> Energy:
-    r"""Return what fluid that came in its place has brought, gas and fluid together.
+    r"""Return the energy that inflow has brought, gas and fluid together.
 
     .. math:: \int_0^p h(p') \left(-\frac{dV_g}{dp'}\right) dp'
 

@@ -136,7 +136,7 @@ def expansion(par: Parameters) -> Annotated[float, Signal("m**3/s", "flow", 1e-8
 def balance(
     x: State, u: Input, par: Parameters
 ) -> Annotated[float, Signal("m**3/s", "flow", 1e-6)]:
-    """Return the flow that the pads take up: what comes in and expands, but for what leaks."""
+    """Return the flow that moves the pads: inflow and expansion minus leak."""
     q = u.q if par.fluid_heat == "off" else u.q + expansion(par)
     return q if par.leak == "tight" else q - par.G_leak * x.p
 
@@ -177,18 +177,18 @@ def _pad_energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> flo
 
 
 def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
-    """Return what the inflow carries, and what fluid that expands gives."""
+    """Return the power of the inflow, and of fluid that expands."""
     carried = brake_fluid.convected_power(u.q, x.p, fluid)
     return carried if par.fluid_heat == "off" else carried + expansion_power(x, par, fluid)
 
 
 def expansion_power(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
-    """Return what fluid that expands gives, signed: where it cools it takes."""
+    """Return the power of fluid that expands; negative while it cools."""
     return brake_fluid.convected_power(expansion(par), x.p, fluid)
 
 
 def power_loss(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
-    """Return what the leak carries away, >= 0."""
+    """Return the power that leaves with the leak, >= 0."""
     if par.leak == "tight":
         return 0.0 * x.p
     return brake_fluid.convected_power(par.G_leak * x.p, x.p, fluid)

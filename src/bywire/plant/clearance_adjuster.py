@@ -1,4 +1,4 @@
-"""Adjuster's screw: takes clearance away while it is turned, and stays where it is else.
+"""Adjuster's screw: takes clearance away while it turns, and holds its place otherwise.
 
 A controller holds how fast it turns; it is self-locking, so that no load drives it.
 """
@@ -31,7 +31,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Where it stands, and how fast it moves."""
+    """Clearance taken away, and its rate."""
 
     taken: Annotated[float, Signal("m", "clearance that the adjuster took away", 1e-4)]
     taking: Annotated[float, Signal("m/s", "speed of the adjuster", 0.01)]
@@ -64,5 +64,5 @@ def rate(x: State, u: Input, par: Parameters) -> Rate:
 
 
 def moved(x: State, par: Parameters) -> State:
-    """Return clearance taken away and speed; nothing where there is no adjuster."""
+    """Return clearance taken away and speed; zero without an adjuster."""
     return State(0.0, 0.0) if par.law == "none" else x

@@ -35,7 +35,7 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What drives place and speed."""
+    """Right-hand sides of place and speed."""
 
     s: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v: Annotated[float, Signal("N", "force", 1e3)]

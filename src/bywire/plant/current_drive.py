@@ -29,7 +29,7 @@ class Parameters(ParameterSet):
     f_sense: Frequency
     """corner of the current measurement's filter"""
     G_sense: Factor
-    """scale of the current measurement, 1 where it is calibrated"""
+    """scale of the current measurement; 1 if calibrated"""
     i_max: Current
     """limit of the filtered demand's magnitude"""
     k_p: DutyPerCurrent
@@ -41,13 +41,13 @@ class Parameters(ParameterSet):
     V_dc: Voltage
     """supply voltage: gain and limit of the PWM stage"""
     R_off: Resistance
-    """what the diodes act like while the stage is off: resistance that empties the winding"""
+    """resistance of the diodes while the stage is off, in which the current decays"""
 
 
 FAULTS = (
     ParameterFault("under-voltage", "less voltage at the power stage", ("V_dc",), 0.5),
     ParameterFault("scale", "current measurement shows a multiple", ("G_sense",), 0.5),
-    ParameterFault("derated", "less current than wanted", ("i_max",), 0.5),
+    ParameterFault("derated", "less current than demanded", ("i_max",), 0.5),
 )
 
 
@@ -83,7 +83,7 @@ class Output(NamedTuple):
 
 
 def error(x: State, par: Parameters) -> Annotated[float, Signal("A", "current error", 1.0)]:
-    """Return the limited demand less the sensed current."""
+    """Return the limited demand minus the sensed current."""
     return ops.clip(x.demand, -par.i_max, par.i_max) - x.sensed
 
 
@@ -92,7 +92,7 @@ def output(x: State, u: Input, par: Parameters) -> Output:
 
     .. math:: V = V_{dc}\, \mathrm{sat}(k_p e + I), \quad |\mathrm{sat}| \le 1
 
-    While the stage is off, back-EMF less R_off i: the current dies away and stays zero.
+    While the stage is off, back-EMF minus R_off i: the current dies away and stays zero.
 
     References
     ----------
@@ -107,12 +107,12 @@ def rate(x: State, u: Input, par: Parameters) -> Rate:
 
     .. math:: \dot I = k_i e + (\mathrm{sat}(k_p e + I) - k_p e - I)/T_t
 
-    The last term is the anti-wind-up (our reading; the paper names none). While the stage is off,
+    The last term is the anti-wind-up (our reading; the paper has none). While the stage is off,
     the integral part decays with T_t.
     """
     e = error(x, par)
-    wanted = par.k_p * e + x.integral
-    growth = par.k_i * e + (ops.clip(wanted, -1.0, 1.0) - wanted) / par.T_t
+    unlimited = par.k_p * e + x.integral
+    growth = par.k_i * e + (ops.clip(unlimited, -1.0, 1.0) - unlimited) / par.T_t
     return Rate(
         demand=2.0 * math.pi * par.f_demand * (u.i_ref - x.demand),
         sensed=2.0 * math.pi * par.f_sense * (par.G_sense * u.i - x.sensed),

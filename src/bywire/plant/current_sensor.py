@@ -18,7 +18,7 @@ Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
 
 
 class Parameters(ParameterSet):
-    """Linear between the ends of its range, saturating there; no dynamics of its own."""
+    """Linear between the ends of its range, saturating there; no dynamics."""
 
     i_low: SignedCurrent
     """lowest current that it shows"""
@@ -29,7 +29,7 @@ class Parameters(ParameterSet):
     def _ordered(self) -> Parameters:
         if not self.i_low < self.i_high:
             raise ValueError(
-                f"current_sensor.i_low = {self.i_low:g} A must be below i_high = {self.i_high:g} A"
+                f"current_sensor.i_low = {self.i_low:g} A must be < i_high = {self.i_high:g} A"
             )
         return self
 
@@ -46,7 +46,7 @@ def reading(i: MotorCurrent, par: Parameters) -> Reading:
 
 
 def value(share: Reading, par: Parameters) -> MotorCurrent:
-    """Return the current that a reading stands for."""
+    """Return the current of a reading."""
     return par.i_low + share * (par.i_high - par.i_low)
 
 
@@ -55,4 +55,4 @@ def watch(t: Array, u: Input, par: Parameters) -> list[str]:
     """Return whether the current left the sensor's range, and when first."""
     text = f"the current leaves the sensor's range, {par.i_low:g} to {par.i_high:g} A,"
     beyond = outside(u.i, par.i_low, par.i_high)
-    return first(t, beyond, text, ": what is measured stays at its end")
+    return first(t, beyond, text, ": the measured value stays at its end")

@@ -42,7 +42,7 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What drives the current."""
+    """Right-hand side of the current."""
 
     i: Annotated[float, Signal("V", "voltage across the inductance", 6.0)]
 
@@ -93,7 +93,7 @@ def energy(x: State, par: Parameters) -> Energy:
 
 
 def power_in(x: State, u: Input, par: Parameters) -> Power:
-    """Return the electrical power taken in less the mechanical power given out."""
+    """Return the electrical power minus the mechanical power."""
     return u.v * x.i - par.K_e * x.i * u.omega
 
 

@@ -20,7 +20,7 @@ Cooling = Annotated[
     float, Signal("W", "cooling by air", role=Role("sink", "air", book="heat", returns="any"))
 ]
 Kelvin = Annotated[float, Signal("K", "temperature", 400.0), Ge(0)]
-_STANDS = 1e-9  # of v_ref: below, the power of the speed is 0 and has no slope
+_STANDS = 1e-9  # of v_ref: below it the power of the speed is 0, without a slope
 
 
 class Parameters(ParameterSet):
@@ -44,7 +44,7 @@ class Parameters(ParameterSet):
     h_0: Convection
     """convection at rest"""
     h_1: Convection
-    """what v_ref adds to it"""
+    """increase of h_0 at the speed v_ref"""
     v_ref: Annotated[float, Unit("m/s", 1.0), Field(gt=0, allow_inf_nan=False)]
     """speed to which h_1 refers"""
     epsilon: Weight
@@ -62,7 +62,7 @@ class Parameters(ParameterSet):
     T_a: Temperature
     """temperature of the air, and of all before the first stop"""
     T_1: Temperature
-    """temperature of the discs up to which the pads hold as when cold"""
+    """temperature of the discs up to which the pads have their cold friction"""
     T_2: Temperature
     """temperature of the discs from which on they fade no further"""
     f: Weight
@@ -72,13 +72,13 @@ class Parameters(ParameterSet):
     T_wet: Temperature
     """the same of fluid with 3.7 % of water"""
     T_most: Temperature
-    """temperature of the discs up to which these numbers hold"""
+    """temperature of the discs up to which these values are valid"""
 
     @model_validator(mode="after")
     def _fades_upward(self) -> Parameters:
         if not self.T_1 < self.T_2:
             raise ValueError(
-                f"T_1 = {shown(self.T_1, 'K')} must be below T_2 = {shown(self.T_2, 'K')}: pads "
+                f"T_1 = {shown(self.T_1, 'K')} must be < T_2 = {shown(self.T_2, 'K')}: pads "
                 "fade from the one to the other"
             )
         return self
@@ -101,7 +101,7 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What warms them."""
+    """Heat sources."""
 
     T_disc: Annotated[float, Signal("W", "heat into the discs", 1e4)]
     T_pads: Annotated[float, Signal("W", "heat into the pads", 1e3)]
@@ -112,7 +112,7 @@ class Input(NamedTuple):
     """Power of the brake's friction, speed of the vehicle, and whether pads press on the discs.
 
     The power is that of the set-valued friction, limit times speed where the wheel turns and 0
-    where it stands: a locked wheel heats its tyre.
+    at standstill: a locked wheel heats its tyre.
     """
 
     P: Annotated[float, Signal("W", "friction power of the brake", 3e4), Ge(0)]
@@ -129,7 +129,7 @@ class Stored(NamedTuple):
 
 
 class Flows(NamedTuple):
-    """What flows between the bodies, and from them to the air."""
+    """Heat flows between the bodies, and from them to the air."""
 
     disc_air: Annotated[float, Signal("W", "cooling of the discs", 1e3)]
     disc_pads: Annotated[float, Signal("W", "heat from discs to pads", 100.0)]
@@ -159,7 +159,7 @@ def convection(
 
 
 def flows(x: State, u: Input, par: Parameters) -> Flows:
-    r"""Return what flows between the bodies, and to the air.
+    r"""Return the heat flows between the bodies, and to the air.
 
     .. math::
         P_{da} &= h A (T_d - T_a) + \varepsilon \sigma A (T_d^4 - T_a^4) \\
@@ -184,7 +184,7 @@ def mass(par: Parameters) -> Factors:
 
 
 def balance(x: State, u: Input, par: Parameters) -> Balance:
-    r"""Return what warms the bodies.
+    r"""Return the net heat flow into each body.
 
     .. math::
         C_d \dot T_d &= \psi P - P_{da} - P_{dp} \\
@@ -224,7 +224,7 @@ def power_in(u: Input, par: Parameters) -> Power:
 
 
 def power_loss(x: State, u: Input, par: Parameters) -> Cooling:
-    """Return the heat that goes to the air; signed: air warms what is colder."""
+    """Return the heat flow to the air; negative if the air is warmer."""
     if par.law == "off":
         return 0.0
     out = flows(x, u, par)
@@ -242,5 +242,5 @@ def watch(t: Array, x: State, par: Parameters) -> list[str]:
     return [
         *first(t, x.T_fluid > par.T_wet, boils("wet", wet), vapor),
         *first(t, x.T_fluid > par.T_boil, boils("fresh", fresh), vapor),
-        *first(t, x.T_disc > par.T_most, f"the discs pass {most}, up to which numbers hold,"),
+        *first(t, x.T_disc > par.T_most, f"the discs pass {most}, the end of their valid range,"),
     ]

@@ -14,7 +14,7 @@ Watts = Annotated[float, Signal("W", "power", 50.0)]
 
 
 class Parameters(ParameterSet):
-    """Stiff supply, lossless power stages: what the motors do not take is standby."""
+    """Stiff supply, lossless power stages: power that the motors do not take is standby."""
 
     P_standby: Annotated[float, Unit("W", 20.0), Field(ge=0, allow_inf_nan=False)]
     """power of the drives' electronics, both together"""
@@ -23,7 +23,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """What the measurement shows."""
+    """Reading of the measurement."""
 
     P: Annotated[float, Signal("W", "input power, filtered", 50.0)]
 
@@ -35,7 +35,7 @@ class Rate(NamedTuple):
 
 
 class Input(NamedTuple):
-    """What the motors take, all together."""
+    """Power of all motors."""
 
     motors: Watts
 

@@ -1,4 +1,4 @@
-"""Rotor of a servo motor whose current is known: what turns, without winding and drive."""
+"""Rotor of a servo motor whose current is known, without winding and drive."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What drives angle and speed."""
+    """Right-hand sides of angle and speed."""
 
     theta: Annotated[float, Signal("rad/s", "motor speed", 50.0)]
     omega: Annotated[float, Signal("N*m", "accelerating torque", 0.5)]
@@ -57,7 +57,7 @@ def energy(x: State, par: Parameters) -> Energy:
 
 
 def power_in(x: State, u: Input, par: Parameters) -> Power:
-    """Return what comes in through the air gap and at the shaft."""
+    """Return the power through the air gap and at the shaft."""
     return (servo_motor.torque_constant(par) * u.i + u.load + u.friction) * x.omega
 
 

@@ -13,7 +13,7 @@ Work = Annotated[float, Signal("W", "work on the end stops")]
 Loss = Annotated[
     float,
     Signal(
-        "W", "loss in the end stops, less their energy at start", role=Role("sink", "end stops")
+        "W", "loss in the end stops, minus their energy at start", role=Role("sink", "end stops")
     ),
 ]
 

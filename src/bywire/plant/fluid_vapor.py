@@ -28,13 +28,13 @@ class Parameters(ParameterSet):
     T_wet: Temperature
     """boiling point with ``water_wet``"""
     water_wet: Annotated[float, Unit("1", 0.037), Field(gt=0, lt=1, allow_inf_nan=False)]
-    """share of water in wet fluid, up to which these numbers hold"""
+    """share of water in wet fluid, up to which these values are valid"""
     V: Volume
     """volume of the fluid that is as hot"""
     growth: Growth
     """vapor per volume of that fluid and kelvin beyond its boiling point, at ambient pressure"""
     T_most: Temperature
-    """temperature of the fluid up to which these numbers hold"""
+    """temperature of the fluid up to which these values are valid"""
 
     @model_validator(mode="after")
     def _boils_within_its_range(self) -> Parameters:
@@ -45,8 +45,8 @@ class Parameters(ParameterSet):
             )
         if self.water > self.water_wet:
             raise ValueError(
-                f"water = {self.water:g} is beyond water_wet = {self.water_wet:g}, up to which the "
-                "boiling point is known: give less, or the point of wetter fluid as T_wet"
+                f"water = {self.water:g} must be <= water_wet = {self.water_wet:g}, up to which "
+                "the boiling point is known: lower it, or set T_wet to the point of wetter fluid"
             )
         return self
 

@@ -58,7 +58,7 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What drives speed and angle."""
+    """Right-hand sides of speed and angle."""
 
     Omega: Annotated[float, Signal("N*m", "torque", 300.0)]
     phi: Annotated[float, Signal("rad/s", "disc speed", 60.0)]

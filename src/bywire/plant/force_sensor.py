@@ -30,7 +30,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """What its amplifier shows."""
+    """Reading of the amplifier."""
 
     y: Annotated[float, Signal("N", "force shown by the sensor", 1000.0)]
 
@@ -52,7 +52,7 @@ class Input(NamedTuple):
 
 
 class InputRate(NamedTuple):
-    """Derivatives of what the stored energy depends on; the compliance stands still."""
+    """Derivatives of the inputs of the stored energy; the compliance is constant."""
 
     X_1: Annotated[float, Signal("m/s", "velocity of screw 1", 0.02)]
     X_2: Annotated[float, Signal("m/s", "velocity of screw 2", 0.02)]
@@ -106,6 +106,6 @@ def power_in(u: Input, par: Parameters) -> Power:
 
 
 def power_loss(u: Input, par: Parameters) -> Loss:
-    """Return what the damping takes, >= 0."""
+    """Return the loss of the damping, >= 0."""
     rate_d = closing(u)
     return stiffness(u, par) * par.tau_F * rate_d * rate_d

@@ -13,14 +13,14 @@ Loss = Annotated[
     float,
     Signal(
         "W",
-        "loss of the ground's contact, less its energy at start",
+        "loss of the ground's contact, minus its energy at start",
         role=Role("sink", "ground contact", book="vehicle"),
     ),
 ]
 
 
 class Parameters(ParameterSet):
-    """Upright stiffness of rear tyre and suspension, without which nothing would carry."""
+    """Upright stiffness of rear tyre and suspension, which carries the load."""
 
     k: Stiffness
     """stiffness"""
@@ -36,7 +36,7 @@ class Input(NamedTuple):
 
 
 class InputRate(NamedTuple):
-    """Derivative of what the stored energy depends on."""
+    """Derivative of the input of the stored energy."""
 
     z: Annotated[float, Signal("m/s", "speed of the rise", 0.1)]
 

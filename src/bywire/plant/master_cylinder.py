@@ -37,17 +37,16 @@ class Parameters(ParameterSet):
     def _ordered(self) -> Parameters:
         if not self.x_nominal < self.s_mc:
             raise ValueError(
-                f"master_cylinder.x_nominal = {self.x_nominal:g} m must be less than the "
+                f"master_cylinder.x_nominal = {self.x_nominal:g} m must be < the "
                 f"chamber length s_mc = {self.s_mc:g} m"
             )
         if not self.x_rest < self.x_end:
             raise ValueError(
-                f"master_cylinder.x_end = {self.x_end:g} m must lie beyond "
-                f"x_rest = {self.x_rest:g} m"
+                f"master_cylinder.x_end = {self.x_end:g} m must be > x_rest = {self.x_rest:g} m"
             )
         if not self.x_end < self.s_mc:
             raise ValueError(
-                f"master_cylinder.x_end = {self.x_end:g} m must be less than the chamber length "
+                f"master_cylinder.x_end = {self.x_end:g} m must be < the chamber length "
                 f"s_mc = {self.s_mc:g} m: move the end stop forward or lengthen the chamber"
             )
         return self
@@ -117,7 +116,7 @@ def energy(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -
 
 
 def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
-    """Return the piston's work less what the outflow carries."""
+    """Return the power of the piston minus that of the outflow."""
     return output(x, u, par).force * u.v - brake_fluid.convected_power(u.q, x.p, fluid)
 
 

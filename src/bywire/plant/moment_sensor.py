@@ -18,7 +18,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """What it shows."""
+    """Reading."""
 
     M: Annotated[float, Signal("N*m", "moment shown by the sensor", 300.0)]
 
@@ -30,7 +30,7 @@ class Rate(NamedTuple):
 
 
 class Input(NamedTuple):
-    """What acts on the mount."""
+    """Moment on the mount."""
 
     M: Annotated[float, Signal("N*m", "braking moment", 300.0)]
 

@@ -1,6 +1,6 @@
 """Heat of a motor: copper loss warms its winding, the winding its housing, and that the air.
 
-Copper conducts less when hot, and magnets hold less: what `warmth` gives, a motor's resistance and
+Copper conducts less when hot, and magnets hold less: see `warmth`, a motor's resistance and
 torque constant follow.
 """
 
@@ -61,15 +61,15 @@ class Parameters(ParameterSet):
     T_a: Temperature
     """temperature of the air, and of the motor at the start"""
     T_most: Temperature
-    """temperature of the winding that its insulation stands"""
+    """temperature limit of the winding's insulation"""
 
     @model_validator(mode="after")
     def _magnets_hold(self) -> Parameters:
         rise = self.T_most - self.T_ref
         if not self.a_K * rise < 1.0:
             raise ValueError(
-                f"a_K = {self.a_K:g} 1/K leaves nothing of the torque constant at T_most = "
-                f"{shown(self.T_most, 'K')}: it must be below {1.0 / rise:.3g} 1/K"
+                f"a_K = {self.a_K:g} 1/K makes the torque constant zero or negative at T_most = "
+                f"{shown(self.T_most, 'K')}: it must be < {1.0 / rise:.3g} 1/K"
             )
         return self
 
@@ -89,7 +89,7 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What warms them."""
+    """Heat sources."""
 
     T_winding: Annotated[float, Signal("W", "heat into the winding", 30.0)]
     T_housing: Annotated[float, Signal("W", "heat into the housing", 30.0)]
@@ -121,7 +121,7 @@ def mass(par: Parameters) -> Factors:
 
 
 def balance(x: State, u: Input, par: Parameters) -> Balance:
-    r"""Return what warms winding and housing.
+    r"""Return the net heat flow into winding and housing.
 
     .. math::
         C_w \dot T_w &= P - G_{wh} (T_w - T_h) \\
@@ -134,7 +134,7 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
 
 
 def warmth(x: State, par: Parameters) -> Warmth:
-    r"""Return what resistance and torque constant are, over those at the reference temperature.
+    r"""Return resistance and torque constant relative to those at the reference temperature.
 
     .. math:: R/R_{ref} = 1 + a_R (T_w - T_{ref}), \quad K/K_{ref} = 1 - a_K (T_h - T_{ref})
     """
@@ -164,7 +164,7 @@ def power_in(u: Input, par: Parameters) -> Power:
 
 
 def power_loss(x: State, par: Parameters) -> Conducted:
-    """Return the heat that goes to the air; signed: air warms what is colder."""
+    """Return the heat flow to the air; negative if the air is warmer."""
     return 0.0 if par.law == "off" else par.G_ha * (x.T_housing - par.T_a)
 
 
@@ -175,7 +175,7 @@ def cold(par: Parameters) -> State:
 
 @row_by_row
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
-    """Return whether the winding gets hotter than its insulation stands."""
+    """Warn if the winding gets hotter than its insulation's limit."""
     if par.law == "off":
         return []
     most = shown(par.T_most, "K")

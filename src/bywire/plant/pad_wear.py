@@ -72,7 +72,7 @@ def output(u: Input, par: Parameters) -> Output:
 def compliance(
     h: Annotated[float, Signal("m", "thickness of a pad", 0.01)], par: Parameters
 ) -> ContactCompliance:
-    r"""Return what the two pads of a caliper give way, :math:`2 h / (E_{pad} A_{pad})`."""
+    r"""Return the compliance of the two pads of a caliper, :math:`2 h / (E_{pad} A_{pad})`."""
     return 2.0 * h / (par.E_pad * par.A_pad)
 
 

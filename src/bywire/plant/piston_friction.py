@@ -51,7 +51,7 @@ FAULTS = (
 
 
 class Input(NamedTuple):
-    """Pressures at the two ends of what resists: line and piston."""
+    """Pressures at the two ends of line and piston."""
 
     p_line: Annotated[float, Signal("Pa", "pressure where the line begins", 2e6)]
     p_pads: Annotated[float, Signal("Pa", "pressure that the pads return", 2e6)]
@@ -65,7 +65,7 @@ class Forces(NamedTuple):
 
 
 class Overlaps(NamedTuple):
-    """What is left of the pressures' difference once the friction is overcome."""
+    """Difference of the pressures beyond the friction."""
 
     inward: Annotated[float, Signal("Pa", "pressure beyond friction, inward", 1e5)]
     outward: Annotated[float, Signal("Pa", "pressure beyond friction, outward", 1e5)]
@@ -84,13 +84,13 @@ def exists(par: Parameters) -> bool:
 
 
 def thresholds(par: Parameters, caliper: pads.Parameters) -> Thresholds:
-    r"""Return what the friction takes of the pressure, :math:`F_{fr}/A`, less roll-back outward."""
+    r"""Return the pressure that the friction takes, :math:`F_{fr}/A`, minus roll-back outward."""
     taken = par.F_fr / caliper.A_pd
     return Thresholds(inward=taken, outward=(1.0 - par.rollback) * taken)
 
 
 def overlaps(u: Input, par: Parameters, caliper: pads.Parameters) -> Overlaps:
-    """Return what drives the flows of a piston that sticks."""
+    """Return the pressures that drive the flows of a sticking piston."""
     taken = thresholds(par, caliper)
     return Overlaps(
         inward=u.p_line - u.p_pads - taken.inward,
@@ -99,7 +99,7 @@ def overlaps(u: Input, par: Parameters, caliper: pads.Parameters) -> Overlaps:
 
 
 def compliance(pipeline: line.Parameters, fluid: brake_fluid.Parameters) -> FlowResistance:
-    """Return what a flow takes of the pressure: the resistance of the line."""
+    """Return the pressure drop per flow: the resistance of the line."""
     return line.resistance(pipeline, fluid)
 
 
@@ -109,7 +109,7 @@ def flow(f: Forces) -> Flow:
 
 
 def fluid_pressure(u: Input, par: Parameters, caliper: pads.Parameters) -> Pressure:
-    """Return the pressure in the caliper: that of the pads, and what the friction holds beside."""
+    """Return the pressure in the caliper: that of the pads plus that which friction holds."""
     if par.law == "off":
         return u.p_pads
     taken = thresholds(par, caliper)
@@ -121,7 +121,7 @@ def power_loss(
 ) -> Power:
     """Return the heat of the friction, with the compression energy that the fluid gives up, >= 0.
 
-    It is what the flow brings at the fluid's pressure less what arrives at that of the pads.
+    It is the flow's power at the fluid's pressure minus that at the pressure of the pads.
     """
     if par.law == "off":
         return 0.0

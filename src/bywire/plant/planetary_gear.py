@@ -31,7 +31,7 @@ class Parameters(ParameterSet):
     def _planets_fit(self) -> Parameters:
         if not self.z_sun < self.z_ring:
             raise ValueError(
-                f"z_ring = {self.z_ring:g} must be above z_sun = {self.z_sun:g}: the planets run "
+                f"z_ring = {self.z_ring:g} must be > z_sun = {self.z_sun:g}: the planets run "
                 "between them"
             )
         return self

@@ -12,7 +12,7 @@ from bywire.core.signals import Pressure, Signal
 
 
 class Parameters(ParameterSet):
-    """What stands in for a brake by wire of which the loop alone is known."""
+    """Substitute for a brake by wire of which only the loop is known."""
 
     f_n: Frequency
     """natural frequency of the pressure loop"""

@@ -18,21 +18,20 @@ Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
 
 
 class Parameters(ParameterSet):
-    """Linear between the ends of its range, saturating there; no dynamics of its own."""
+    """Linear between the ends of its range, saturating there; no dynamics."""
 
     p_low: SignedPressure
     """lowest absolute pressure that it shows"""
     p_high: SignedPressure
     """highest absolute pressure that it shows"""
     place: Literal["master-cylinder", "mid-pipeline"]
-    """where it sits; mid-pipeline sees the mean of the pressures at both ends"""
+    """position; mid-pipeline measures the mean of the pressures at both ends"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:
         if not self.p_low < self.p_high:
             raise ValueError(
-                f"pressure_sensor.p_low = {self.p_low:g} Pa must be below "
-                f"p_high = {self.p_high:g} Pa"
+                f"pressure_sensor.p_low = {self.p_low:g} Pa must be < p_high = {self.p_high:g} Pa"
             )
         return self
 
@@ -49,7 +48,7 @@ def reading(p: AbsolutePressure, par: Parameters) -> Reading:
 
 
 def value(share: Reading, par: Parameters) -> AbsolutePressure:
-    """Return the absolute pressure that a reading stands for."""
+    """Return the absolute pressure of a reading."""
     return par.p_low + share * (par.p_high - par.p_low)
 
 
@@ -59,4 +58,4 @@ def watch(t: Array, u: Input, par: Parameters) -> list[str]:
     span = f"{par.p_low / 1e5:g} to {par.p_high / 1e5:g} bar absolute"
     text = f"the pressure leaves the sensor's range, {span},"
     beyond = outside(u.p, par.p_low, par.p_high)
-    return first(t, beyond, text, ": what is measured stays at its end")
+    return first(t, beyond, text, ": the measured value stays at its end")

@@ -32,7 +32,7 @@ class Parameters(ParameterSet):
 
 
 FAULTS = (
-    ParameterFault("blocked", "the uncovered port lets nothing back", ("G_port",), 0.0),
+    ParameterFault("blocked", "the uncovered port lets no fluid back", ("G_port",), 0.0),
     ParameterFault(
         "leaking",
         "the cup seal lets fluid back, by its conductance",
@@ -51,7 +51,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Conductance of the port as it stands."""
+    """Conductance of the port."""
 
     G: Annotated[float, Signal("m**3/(s*Pa)", "port conductance", 1e-12)]
 
@@ -71,5 +71,5 @@ def output(u: Input, par: Parameters) -> Output:
 
 
 def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
-    """Return what the flow into the reservoir carries away, >= 0."""
+    """Return the power that leaves with the flow into the reservoir, >= 0."""
     return brake_fluid.convected_power(output(u, par).G * u.p, u.p, fluid)

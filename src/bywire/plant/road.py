@@ -1,4 +1,4 @@
-"""Road: what it is made of and how it rises, along the way."""
+"""Road: surface and slope along the way."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Gradient = Annotated[float, Unit("1", 0.05), Field(gt=-1, lt=1, allow_inf_nan=Fa
 SurfaceName = Literal[
     "dry-asphalt", "wet-asphalt", "dry-concrete", "dry-cobble", "wet-cobble", "snow", "ice", "own"
 ]
-"""what experiments call a surface; ``own`` is that of the parameters"""
+"""names of surfaces in experiments; ``own`` is that of the parameters"""
 
 
 class Slope(NamedTuple):
@@ -68,7 +68,7 @@ class Parameters(ParameterSet):
     def _has_no_gap(self) -> Parameters:
         if not self.x_back >= self.x_change + self.ramp:
             raise ValueError(
-                f"x_back = {self.x_back:g} m must be at least x_change + ramp = "
+                f"x_back = {self.x_back:g} m must be >= x_change + ramp = "
                 f"{self.x_change + self.ramp:g} m: the further surface begins before it ends"
             )
         return self

@@ -38,7 +38,7 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What turns the wheel."""
+    """Right-hand side of the wheel's speed."""
 
     omega: Annotated[float, Signal("N*m", "torque", 300.0)]
 

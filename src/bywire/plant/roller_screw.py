@@ -29,7 +29,7 @@ class Parameters(ParameterSet):
     eta_b: BackEfficiency
     """efficiency where the load drives the screw; 2 - 1/eta_f makes the loss independent of it"""
     law: Literal["load", "drive"]
-    """what the loss is proportional to: the axial force or the motor's torque"""
+    """quantity to which the loss is proportional: the axial force or the motor's torque"""
 
 
 class Input(NamedTuple):

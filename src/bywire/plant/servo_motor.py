@@ -80,7 +80,7 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What drives current, angle and speed."""
+    """Right-hand sides of current, angle and speed."""
 
     i: Annotated[float, Signal("V", "voltage across the inductance", 6.0)]
     theta: Annotated[float, Signal("rad/s", "motor speed", 50.0)]
@@ -144,7 +144,7 @@ def energy(x: State, par: Parameters) -> Energy:
 
 
 def power_in(x: State, u: Input, par: Parameters) -> Power:
-    """Return what comes in through the terminals and at the shaft."""
+    """Return the power at the terminals and at the shaft."""
     return u.v * x.i + (u.load + u.friction) * x.omega
 
 

@@ -1,4 +1,4 @@
-"""Rigid shaft: what a motor turns, with viscous damping."""
+"""Rigid shaft that a motor turns, with viscous damping."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What drives angle and speed."""
+    """Right-hand sides of angle and speed."""
 
     theta: Annotated[float, Signal("rad/s", "shaft speed", 20.0)]
     omega: Annotated[float, Signal("N*m", "accelerating torque", 0.1)]
 
 
 class Input(NamedTuple):
-    """Torques on the shaft: driving less load, and dry friction."""
+    """Torques on the shaft: driving minus load, and dry friction."""
 
     torque: Annotated[float, Signal("N*m", "torque", 0.1)]
     friction: Annotated[float, Signal("N*m", "friction torque", 0.01)]

@@ -57,7 +57,7 @@ class Parameters(ParameterSet):
     def _stands(self) -> Parameters:
         if not self.l_f < self.L:
             raise ValueError(
-                f"l_f = {self.l_f:g} m must be below the wheelbase L = {self.L:g} m: the center of "
+                f"l_f = {self.l_f:g} m must be < the wheelbase L = {self.L:g} m: the center of "
                 "gravity lies between the wheels"
             )
         return self
@@ -84,7 +84,7 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What drives the states."""
+    """Right-hand sides of the states."""
 
     x: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v: Annotated[float, Signal("N", "force", 1e3)]
@@ -140,7 +140,7 @@ def rear_load(
     cosine: Cosine,
     par: Parameters,
 ) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
-    r"""Return the load that holds the body level, between nothing and the whole weight.
+    r"""Return the load that holds the body level, between zero and the whole weight.
 
     .. math:: N_r = (m g l_f \cos\gamma - F h - F_d (h - h_a))/L
     """
@@ -163,7 +163,7 @@ def rigid_rear_load(
 
     Load on the rear wheel is missing on the front one, whose force then pitches less. Where the
     factor on the left is not positive, no load between the ends is stable: a rear wheel that sinks
-    a little sinks further. It then carries nothing where the right-hand side is negative, and the
+    a little sinks further. It then carries no load where the right-hand side is negative, and the
     whole weight where that is positive.
     """
     carried = mu_f * par.m * par.g * cosine * par.h + F_d * (par.h - par.h_a)
@@ -220,14 +220,14 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
 
 
 def energy(x: State, par: Parameters) -> Energy:
-    """Return the kinetic energy of the speed, and of pitching with what it lifts."""
+    """Return the kinetic energy of the speed, and of pitching with the lifted mass."""
     at = center(x, par)
     turning = 0.5 * (par.inertia + par.m * at.l_f * at.l_f) * x.phi_rate * x.phi_rate
     return 0.5 * par.m * x.v * x.v + turning + par.m * par.g * (at.h - par.h)
 
 
 def power_in(x: State, u: Input, par: Parameters) -> Power:
-    """Return the power of tyres and slope, and of what pitches the body."""
+    """Return the power of tyres and slope, and of the moments that pitch the body."""
     travel = -(u.F + par.m * par.g * u.sine) * x.v
     return travel + pitch_power(x, u, par) + u.support * par.L * x.phi_rate
 
@@ -256,4 +256,4 @@ def watch(t: Array, x: State, par: Parameters) -> list[str]:
     pitch = _DEGREES * x.phi
     most = f" (pitch up to {highest(pitch):.3g} deg, limit {highest(limit):.3g} deg)"
     text = "the rider goes over the handlebar: the center of gravity passes the front wheel"
-    return first(t, pitch > limit, text, f"{most}, and what follows is no longer a stop")
+    return first(t, pitch > limit, text, f"{most}, and the rest is no longer a stop")

@@ -50,14 +50,14 @@ class Contact(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """What a tyre can hold at its slip."""
+    """Limits of a tyre's force at its slip."""
 
     mu: Annotated[float, Signal("1", "largest adhesion", 1.0)]
     u: Annotated[float, Signal("m", "largest deflection", 1e-2)]
 
 
 class Input(NamedTuple):
-    """Speeds, load, surface, and what `limits` says; these are taken value-only."""
+    """Speeds, load, surface, and `limits`, which are value-only."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v_wheel: Annotated[float, Signal("m/s", "speed of the tread", 20.0)]
@@ -74,13 +74,13 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """What the tyre does."""
+    """Force of the tyre."""
 
     F: Annotated[float, Signal("N", "braking force of the tyre", 1e3)]
 
 
 def braking_slip(u: Contact, par: Parameters) -> Slip:
-    """Return the slip, relative to the faster of vehicle and tread; 0 where nothing moves.
+    """Return the slip, relative to the faster of vehicle and tread; 0 at standstill.
 
     1 for a wheel that stands below a moving vehicle; never beyond -1 and 1.
     """
@@ -90,7 +90,7 @@ def braking_slip(u: Contact, par: Parameters) -> Slip:
 
 
 def limits(u: Contact, par: Parameters) -> Limits:
-    """Return what the tyre holds: its peak up to the peak's slip, beyond it what is left there.
+    """Return the limits of the force: the peak up to its slip, the curve beyond.
 
     The deflection is that which the rising branch of the curve needs for the adhesion.
     """
@@ -103,7 +103,7 @@ def _ground(u: Contact | Input) -> adhesion.Surface:
 
 
 def rate(x: State, u: Input, par: Parameters) -> Annotated[float, Signal("m/s", "rate", 0.5)]:
-    r"""Return how the deflection changes, :math:`\dot u = v - \omega r - |v| u/\sigma`.
+    r"""Return the rate of the deflection, :math:`\dot u = v - \omega r - |v| u/\sigma`.
 
     It is pulled back to the limit where it slides.
     """
@@ -121,10 +121,10 @@ def force_over_load(
 ) -> Annotated[float, Signal("1", "braking force over load", 1.0)]:
     """Return the force over the load: of the deflection up to the limit, damped near standstill.
 
-    With its damping a tyre holds no more than without: what it holds at most at its slip.
+    Damping does not raise the limit of the force.
     """
     slides = sliding(x, u)
-    # No magnitude: its slope at zero, where a free wheel rolls, would be none.
+    # A magnitude would have no slope at zero, where a free wheel rolls.
     bent = ops.where(x.u < 0, -x.u, x.u)
     held = adhesion.adhesion(bent / par.sigma, _ground(u), par)
     size = ops.where(slides > 0, u.mu_max, ops.fmin(held, u.mu_max))

@@ -42,7 +42,7 @@ class Input(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """What the capture unit shows."""
+    """Registers of the capture unit."""
 
     angle: Annotated[float, Signal("rad", "angle of the last edge", 100.0)]
     age: Annotated[float, Signal("s", "time since the last edge", 1e-3)]

@@ -1,1 +1,1 @@
-"""Published sources reproduced: what each states beside what we compute, one file per source."""
+"""Published sources reproduced: statements against our results, one file per source."""

@@ -1,18 +1,21 @@
-"""A statement of a source beside what we compute."""
+"""Statements of a source against our results, and the root causes of disagreements."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from typing import Literal
 
 from bywire.bench.requirements import COMPARE
 from bywire.core.arguments import checked
+from bywire.report.wording import amount
 
 Tolerance = float | Literal["<=", ">="]
 Kind = Literal["printed", "reading", "axis", "requirement", "physical bound", "ours"]
-"""what a statement is: a number in text, table or equation; a sentence that we put as a number;
-the end of a figure's axis; a requirement on the design; a limit that physics sets and we derive;
-or nothing but our number"""
+"""kind of a statement: a number in text, table or equation; a sentence that we read as a number;
+the end of a figure's axis; a requirement on the design; a physical limit that we derive; or only
+our result"""
 
 
 SHARE = "share"
@@ -27,13 +30,13 @@ class Allowance:
     Parameters
     ----------
     what
-        What it is used for.
+        Compared quantity.
     size
         Largest difference that counts as agreement.
     unit
         Unit of ``size``, or `SHARE`.
     reason
-        Why so much and not more.
+        Reason for this size.
     """
 
     what: str
@@ -61,10 +64,10 @@ class Fact:
     kind
         What kind of statement it is.
     tolerance
-        By which it is judged, see `Item`, or an `Allowance` around the number; None where nobody
-        says.
+        By which it is judged, see `Item`, or an `Allowance` around the number; None if none is
+        stated.
     note
-        How its counterpart is computed, where all of them are computed alike.
+        How its counterpart is computed, if it is the same for all sets.
     """
 
     value: float
@@ -82,7 +85,7 @@ def reading(value: float, unit: str, where: str) -> Fact:
 
 @dataclass(frozen=True)
 class Item:
-    """A statement of a source beside what we compute.
+    """A statement of a source with our result.
 
     Parameters
     ----------
@@ -98,7 +101,7 @@ class Item:
     agrees
         None where nothing is stated, or where the value was tuned to the statement.
     note
-        Where it is stated, and what a reader should know.
+        Place of the statement, and remarks for the reader.
     kind
         What kind of statement it is.
     """
@@ -141,9 +144,9 @@ def compared(
     tolerance
         See `Item`; an `Allowance` is taken around what is stated. ``"as stated"``: the fact's.
     note
-        What a reader should know beside the place of the statement and the fact's own note.
+        Remark for the reader, after the place of the statement and the note of the fact.
     tuned
-        How the value was made to agree: then it proves nothing, and is not judged.
+        How the value was made to agree. Such a statement proves nothing and is not judged.
     """
     if tolerance == "as stated":
         tolerance = fact.tolerance
@@ -187,3 +190,61 @@ def holds(stated: float, computed: float, tolerance: Tolerance) -> bool:
 
 def _joined(parts: tuple[str, ...]) -> str:
     return "; ".join(part for part in parts if part)
+
+
+# --- Root causes
+
+
+@dataclass(frozen=True)
+class RootCause:
+    """A cause of disagreements.
+
+    Parameters
+    ----------
+    text
+        The cause in one sentence, with its numbers.
+    explains
+        Ids of the statements that it explains; ``*`` stands for anything.
+    """
+
+    text: str
+    explains: tuple[str, ...]
+
+    def explained(self, items: Iterable[Item]) -> list[Item]:
+        """Return the disagreements that it explains."""
+        return [
+            item
+            for item in items
+            if item.agrees is False and any(fnmatchcase(item.id, name) for name in self.explains)
+        ]
+
+
+class Quoted:
+    """The items' numbers, as text with unit."""
+
+    def __init__(self, items: Iterable[Item]) -> None:
+        self._items = {item.id: item for item in items}
+
+    def stated(self, name: str) -> str:
+        """Return what the source states."""
+        item = self._items[name]
+        return amount(item.stated, item.unit, 3)
+
+    def __call__(self, name: str) -> str:
+        """Return what we compute."""
+        item = self._items[name]
+        return amount(item.computed, item.unit, 3)
+
+    def share(self, name: str) -> str:
+        """Return what we compute in percent of what is stated."""
+        item = self._items[name]
+        return amount(100.0 * (item.computed or 0.0) / (item.stated or 1.0), "%", 4)
+
+
+def causes_of(
+    items: Iterable[Item], *known: Callable[[Quoted], RootCause]
+) -> tuple[RootCause, ...]:
+    """Return the causes that explain a disagreement, their numbers taken from the items."""
+    listed = list(items)
+    causes = (cause(Quoted(listed)) for cause in known)
+    return tuple(cause for cause in causes if cause.explained(listed))

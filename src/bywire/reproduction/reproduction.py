@@ -1,16 +1,21 @@
-"""What the reproduction of a source consists of, and its statements as tables."""
+"""The reproduction of a source: its parts, the runs that they share, its tables and its report."""
 
 from __future__ import annotations
 
 import re
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import xarray as xr
 
-from bywire.bench.running import Progress
-from bywire.core.interrupts import thread_pool
+from bywire.bench.bench import Bench
+from bywire.bench.running import Progress, Result, run
+from bywire.core.arguments import checked
+from bywire.core.interrupts import raise_if_stopped, thread_pool
 from bywire.core.machine import worker_count
 from bywire.core.registry import Kind, instances
 from bywire.report.answer import Answer
@@ -35,30 +40,110 @@ from bywire.report.tables import (
     verdict_table,
 )
 from bywire.report.wording import amount
-from bywire.reproduction.item import SHARE, Allowance, Item
-from bywire.reproduction.root_cause import RootCause
-from bywire.reproduction.runs import Runs
+from bywire.reproduction.item import SHARE, Allowance, Item, RootCause
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-KINDS = (
-    "Kinds of statements: 'printed' stands in the source's text, tables or equations, or follows "
+
+class Runs:
+    """Bench results, each computed once; threads that ask for the same wait for it.
+
+    Parameters
+    ----------
+    progress
+        Called with the label of a piece of work and its finished share, 0 to 1.
+    """
+
+    def __init__(self, progress: Progress | None = None) -> None:
+        self._progress = progress
+        self._known: dict[str, Future[Result]] = {}
+        self._lock = threading.Lock()
+
+    def report(self, label: str, share: float) -> None:
+        """Tell how far a piece of work is."""
+        if self._progress is not None:
+            self._progress(label, share)
+
+    def bench(
+        self,
+        experiment: str,
+        name: str,
+        overrides: Mapping[str, Any] | None = None,
+        options: Mapping[str, Any] | None = None,
+        stimulus: Mapping[str, Any] | None = None,
+    ) -> Result:
+        """Return the result of an experiment with a parameter set.
+
+        Parameters
+        ----------
+        experiment, name
+            Names of experiment and parameter set.
+        overrides, options, stimulus
+            As in `Bench`.
+
+        Raises
+        ------
+        RunError
+            When a run fails.
+        KeyboardInterrupt
+            When the user stopped a run, or another part failed: then there is no result.
+        """
+        bench = Bench(experiment, name, overrides or {}, options or {}, stimulus or {})
+        key = repr(bench)
+        with self._lock:
+            is_first = key not in self._known
+            result = self._known.setdefault(key, Future())
+        if is_first:
+            try:
+                result.set_result(self._run(bench))
+            except BaseException as error:
+                result.set_exception(error)
+        return result.result()
+
+    def _run(self, bench: Bench) -> Result:
+        raise_if_stopped()
+        result = run(bench)
+        if result.status == "interrupted":
+            raise KeyboardInterrupt
+        return result
+
+
+@checked
+def kpis(result: Result) -> dict[str, float]:
+    """Return the KPIs of a result by name, SI."""
+    return {kpi.name: kpi.value for kpi in result.kpis}
+
+
+def selected(recording: xr.Dataset, *names: str) -> xr.Dataset:
+    """Return a recording with some of its variables, those that it has."""
+    return recording[[name for name in names if name in recording]]
+
+
+def peak(recording: xr.Dataset, name: str) -> float:
+    """Return the largest value of a signal."""
+    return float(np.max(recording[name].values))
+
+
+# --- Statements as tables
+
+_KINDS = (
+    "Kinds of statements: 'printed' is in the source's text, tables or equations, or follows "
     "from printed numbers by an equation that the note names; 'reading' is a sentence of the "
-    "source that we put as a number, as its note says; 'axis' is the end of a figure's axis, "
+    "source that we read as a number, see its note; 'axis' is the end of a figure's axis, "
     "beyond which the source shows nothing; 'requirement' is one on the design; 'physical "
-    "bound' is a limit that we derive; 'ours' is a number without a counterpart. No verdict is "
-    "given where nothing is stated, where a value was tuned to the statement, where it went in "
-    "as an input, or where another statement is judged instead."
+    "bound' is a limit that we derive; 'ours' is a number without a counterpart. There is no "
+    "verdict where nothing is stated, where a value was tuned to the statement or is an input, or "
+    "where another statement is judged instead."
 )
 
 
 def statements(items: Sequence[Item]) -> Table:
     """Return statements as one table."""
-    return reproduction_table(map(reproduction_row, items))
+    return reproduction_table(map(_reproduction_row, items))
 
 
-def reproduction_row(item: Item) -> ReproductionRow:
+def _reproduction_row(item: Item) -> ReproductionRow:
     """Return a statement as the row of a table."""
     return ReproductionRow(
         id=item.id,
@@ -74,7 +159,7 @@ def reproduction_row(item: Item) -> ReproductionRow:
 
 def verdicts(items: Sequence[Item]) -> Table:
     """Return statements as one table for terminals: numbers and verdicts without notes."""
-    return verdict_table(map(reproduction_row, items))
+    return verdict_table(map(_reproduction_row, items))
 
 
 def tolerances(allowances: Sequence[Allowance]) -> Table:
@@ -103,7 +188,7 @@ class Tally:
         return f"{self.agree} agree, {self.disagree} disagree, {self.silent} without verdict"
 
 
-def tally(items: Iterable[Item]) -> Tally:
+def _tally(items: Iterable[Item]) -> Tally:
     """Count the verdicts."""
     verdicts = [item.agrees for item in items]
     return Tally(verdicts.count(True), verdicts.count(False), verdicts.count(None))
@@ -113,7 +198,7 @@ def tallies(items: Iterable[Item]) -> dict[str, Tally]:
     """Count the verdicts of each parameter set, by what follows ``@`` in the ids."""
     listed = list(items)
     names = dict.fromkeys(item.parameter_set for item in listed)
-    return {name: tally(i for i in listed if i.parameter_set == name) for name in names}
+    return {name: _tally(i for i in listed if i.parameter_set == name) for name in names}
 
 
 # --- Reproductions
@@ -139,17 +224,17 @@ class Part:
     title
         Heading in the report.
     text
-        What was done and what came out, for the report.
+        Procedure and result, for the report.
     items
-        Statements beside computed numbers.
+        Statements with computed numbers.
     exhibits
         Figures.
     recordings
-        Runs worth keeping, by the name of their file.
+        Recordings to keep, by the name of their file.
     appendix
         Tables that stay folded in the report, by title.
     tables
-        Tables that report and terminal show, by title: there in place of the items' verdicts.
+        Tables that report and terminal show, by title: they replace the items' verdicts there.
     """
 
     title: str
@@ -178,7 +263,7 @@ class Reproduction(Answer):
     allowances
         The tolerances in use, with their reasons.
     sets
-        What to call the parameter sets, by what follows ``@`` in an item's id.
+        Titles of the parameter sets, by the text that follows ``@`` in an item's id.
     """
 
     source: str
@@ -217,7 +302,7 @@ class Reproduction(Answer):
         ]
 
     def document(self) -> Document:
-        """Return statements beside computed numbers, part by part, and what disagrees."""
+        """Return statements with computed numbers, part by part, and the disagreements."""
         short = Listing(self.in_short)
         hint = f"bywire reproduce {self.source} --out FOLDER"
         return Document(
@@ -232,7 +317,7 @@ class Reproduction(Answer):
                 f"Report with notes, tolerances and figures: {hint}",
             ],
             data=self._data(),
-            banner=Banner(f"All statements together: {tally(self.items)}"),
+            banner=Banner(f"All statements together: {_tally(self.items)}"),
             attachments=[
                 recording_file(f"{_stem(name)}.nc", recording)
                 for name, recording in self.recordings.items()
@@ -250,7 +335,7 @@ class Reproduction(Answer):
 
     def _sections(self, short: Listing) -> list[Section]:
         apart = [item for item in self.items if item.agrees is False]
-        sections = [Section("In short", [short, Paragraph(KINDS)])]
+        sections = [Section("In short", [short, Paragraph(_KINDS)])]
         sections += [Section("Disagreements", [TableBlock(statements(apart))])] if apart else []
         for part in self.parts:
             blocks: list[Block] = [Paragraph(part.text)]
@@ -323,7 +408,7 @@ def reproduced(
     source
         The source, without parts.
     runs
-        Bench results that the parts share; told of the progress.
+        Bench results that the parts share.
     parts
         ``part(runs)`` by the label of its table, figure or test.
     causes

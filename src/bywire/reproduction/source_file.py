@@ -1,8 +1,8 @@
 """Files of a source: parameter sets with the place of every value, statements, tolerances.
 
-What a source prints, and how its sentences were read, is data: TOML files beside the brake that it
-is about. What is computed from it is Python. A text that many entries share is written once, under
-``[places]``, and stands in theirs by its name in braces.
+The statements of a source, and how its sentences were read, are data: TOML files next to the brake
+that they concern. A text that many entries share is written once, under ``[places]``; entries refer
+to it by its name in braces.
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ class SourceFile:
     file
         TOML file; the functions below say which keys its sections have.
     places
-        Further texts that stand in it by their names in braces.
+        Further texts to which the file refers by their names in braces.
 
     Raises
     ------
     InputError
-        For anything in it that does not fit, with the file's name in front.
+        For anything in it that is not valid, with the file's name in front.
     """
 
     def __init__(self, file: Path, places: Mapping[str, str] = _NONE) -> None:
@@ -65,7 +65,7 @@ class SourceFile:
                 name: _cited_values(group, f"groups.{name}", _NONE, _NONE)
                 for name, group in self._sections["groups"].items()
             }
-            """values that stand at several places of a set, or elsewhere"""
+            """values that several places of a set share"""
             self.allowances = {
                 name: _made(Allowance, entry, f"tolerances.{name}")
                 for name, entry in self._sections["tolerances"].items()
@@ -82,7 +82,7 @@ class SourceFile:
         Parameters
         ----------
         formulas
-            Functions of a parameter set, by the names that derived values have for them.
+            Functions of a parameter set, by the names with which derived values refer to them.
         groups
             Further groups of values.
         """
@@ -119,11 +119,11 @@ class SourceFile:
         return tuple(found.values())
 
     def levels(self) -> tuple[StatedLevel | StatedRange, ...]:
-        """Return the statements that show as levels and ranges under a signal's curve."""
+        """Return the statements that figures show as levels and ranges behind a signal's curve."""
         return self._shown(self._level, "levels")
 
     def figures(self) -> tuple[StatedFigure, ...]:
-        """Return the statements that show beside a key figure."""
+        """Return the statements that reports show next to a key figure."""
         return self._shown(self._figure, "figures")
 
     def _shown(self, make: Callable[..., T], section: str) -> tuple[T, ...]:
@@ -204,7 +204,7 @@ class Facts:
         self._facts = dict(facts)
 
     def __getitem__(self, name: str) -> Fact:
-        """Return the statement of a name; an unknown one is refused with the nearest known."""
+        """Return the statement of a name; the error of an unknown name lists the nearest ones."""
         return pick(self._facts, name, "statement")
 
     def table(self, name: str) -> dict[str, Fact]:
@@ -213,7 +213,7 @@ class Facts:
         return {k.removeprefix(prefix): v for k, v in self._facts.items() if k.startswith(prefix)}
 
 
-# The keys of a section are the parameters of the function that makes something of it.
+# The keys of a section are the parameters of the function that reads it.
 
 
 @checked
@@ -256,12 +256,12 @@ def _statement(
 
 
 def _made(make: Callable[..., T], entry: Section, place: str) -> T:
-    """Return what a function makes of the keys of a section.
+    """Return the result of a function for the keys of a section.
 
     Raises
     ------
     InputError
-        For keys that it does not take, those that it misses, and values of another kind.
+        For unknown keys, missing keys, and values of another kind.
     """
     parameters = inspect.signature(make).parameters
     for key in entry:
@@ -269,7 +269,7 @@ def _made(make: Callable[..., T], entry: Section, place: str) -> T:
             raise unknown_name(f"key of {place}", key, parameters)
     for key, parameter in parameters.items():
         if parameter.default is parameter.empty and key not in entry:
-            raise ParameterError(f"{place}: {key} is missing")
+            raise ParameterError(f"{place}: {key} is missing", name=key)
     try:
         return make(**entry)
     except InputError as error:
@@ -277,7 +277,7 @@ def _made(make: Callable[..., T], entry: Section, place: str) -> T:
 
 
 def _filled(value: Any, places: Mapping[str, str]) -> Any:
-    """Return what a file holds with the texts that stand in others by their names."""
+    """Return the content of a file with texts in place of their names in braces."""
     if isinstance(value, dict):
         return {key: _filled(each, places) for key, each in value.items()}
     if isinstance(value, list):
@@ -297,7 +297,7 @@ def _cited_values(
         if name == "group" and isinstance(entry, str):
             found |= pick(groups, entry, f"{here}: group of values")
         elif not isinstance(entry, Mapping):
-            raise ParameterError(f'{here}: write {{ chosen = ..., where = "..." }}')
+            raise ParameterError(f'{here}: write {{ chosen = ..., where = "..." }}', name=here)
         elif "where" in entry:
             found[name] = _cited(entry, here, formulas)
         else:
@@ -310,7 +310,11 @@ def _cited(entry: Section, place: str, formulas: Mapping[str, Formula]) -> Cited
     kinds = (*get_args(Provenance), "formula")
     where, given = entry["where"], [key for key in entry if key != "where"]
     if len(given) != 1 or given[0] not in kinds or not isinstance(where, str):
-        raise ParameterError(f"{place} takes one of {', '.join(kinds)}, and a text where")
+        raise ParameterError(
+            f"{place} takes one of {', '.join(kinds)}, and a text where",
+            name=place,
+            valid=", ".join(kinds),
+        )
     if given == ["formula"]:
         return derived(pick(formulas, entry["formula"], f"{place}: formula"), where)
     value = entry[given[0]]
@@ -322,7 +326,7 @@ def _cited(entry: Section, place: str, formulas: Mapping[str, Formula]) -> Cited
 def _facts(
     table: Section, allowances: Mapping[str, Allowance], name: str, outer: Section
 ) -> Iterator[tuple[str, Fact]]:
-    """Yield statements; what a table says beside them holds for those that do not say it."""
+    """Yield statements; keys of a table are the defaults of the statements in it."""
     inherited = {**outer, **{k: v for k, v in table.items() if not isinstance(v, Mapping)}}
     tables = {k: v for k, v in table.items() if isinstance(v, Mapping)}
     if name and not tables:
@@ -339,14 +343,14 @@ def _fact(entry: Section, allowances: Mapping[str, Allowance], place: str) -> Fa
 
 
 def _judged(fact: Fact) -> str:
-    """Return the place of a statement, and why a curve may be so far off."""
+    """Return the place of a statement, and the reason of its tolerance."""
     if isinstance(fact.tolerance, Allowance):
         return f"{fact.where}; tolerance ours: {fact.tolerance.reason}"
     return f"{fact.where}: {_AXIS}" if fact.kind == "axis" else fact.where
 
 
 def _around(fact: Fact, unit: str) -> float:
-    """Return the tolerance around what is stated in a unit; 0 where nobody says."""
+    """Return the tolerance around what is stated in a unit; 0 if none is stated."""
     if not isinstance(fact.tolerance, Allowance):
         return 0.0
     return _in_unit(fact, fact.tolerance.around(fact.value), unit)

@@ -9,7 +9,7 @@ from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
 from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.case import case_from_rest
-from bywire.brakes.motorcycle.linear.brake import linear_model, theoretical
+from bywire.brakes.motorcycle.linear import linear_model, theoretical
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current, memory_at, state_at, travel_at

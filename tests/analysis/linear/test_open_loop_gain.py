@@ -11,7 +11,7 @@ from bywire.analysis.crossings import margin
 from bywire.analysis.linear.sampled_loops import closed_loop, open_loop
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.margins import margins
-from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop
+from bywire.brakes.motorcycle.linear import PressureLoop
 from bywire.brakes.wedge.laws import moment_control
 from bywire.brakes.wedge.model import WedgeBrake, force_for, memory_at, state_at, travel_for
 from bywire.brakes.wedge.parameters import WedgeParameters
@@ -92,7 +92,7 @@ def test_what_cannot_be_cut() -> None:
 def test_pressure_loop_agrees_with_its_chain() -> None:
     """The motorcycle's loop cut at the measured pressure, against the chain of its parts."""
     from bywire.brakes.motorcycle import trim
-    from bywire.brakes.motorcycle.linear.brake import theoretical
+    from bywire.brakes.motorcycle.linear import theoretical
     from bywire.brakes.motorcycle.model import MotorcycleBrake
 
     smooth = {

@@ -11,12 +11,7 @@ import pytest
 from bywire.analysis.linear.linearize import linearize
 from bywire.analysis.loop import PLANTS
 from bywire.analysis.reduction import reduction_error
-from bywire.brakes.motorcycle.linear.brake import (
-    theoretical,
-    two_pole,
-    two_pole_error,
-    with_slow_pair,
-)
+from bywire.brakes.motorcycle.linear import theoretical, two_pole, two_pole_error, with_slow_pair
 from bywire.brakes.motorcycle.paper.facts import FACTS, table4_model
 from bywire.brakes.motorcycle.trim import holding_current, travel_at
 from bywire.brakes.wedge.elements import wedge

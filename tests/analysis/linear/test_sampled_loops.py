@@ -14,8 +14,7 @@ from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.sweep import Sweep, complex_values
 from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.case import case_from_rest
-from bywire.brakes.motorcycle.linear.brake import first_orders
-from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop, cancelling_pi, current_loop
+from bywire.brakes.motorcycle.linear import PressureLoop, cancelling_pi, current_loop, first_orders
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import memory_at, state_at

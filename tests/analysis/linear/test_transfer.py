@@ -11,7 +11,7 @@ import pytest
 from analysis.small_linear_models import model_of
 from bywire.analysis.linear.linear_model import Realization, minimal
 from bywire.analysis.loop import LOOPS
-from bywire.brakes.motorcycle.linear.brake import linear_model, theoretical
+from bywire.brakes.motorcycle.linear import linear_model, theoretical
 from bywire.brakes.wedge.plants import INPUTS, full, mechanical
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError

@@ -19,7 +19,7 @@ from bywire.analysis.periodic import (
 )
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.sweep import Sweep
-from bywire.brakes.motorcycle.dither.dithered_plant import dithered_plant
+from bywire.brakes.motorcycle.dither import dithered_plant
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError, SolverError

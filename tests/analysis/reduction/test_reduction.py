@@ -11,7 +11,7 @@ from analysis.small_linear_models import model_of
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.reduction import reduce, reduction_error, residualized
-from bywire.brakes.motorcycle.linear.brake import linear_model
+from bywire.brakes.motorcycle.linear import linear_model
 from bywire.brakes.wedge.plants import full
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError

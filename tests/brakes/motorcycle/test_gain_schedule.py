@@ -13,8 +13,7 @@ from bywire.analysis.loop import LOOPS
 from bywire.bench.bench import Bench
 from bywire.bench.running import run
 from bywire.brakes.motorcycle import ecu as motorcycle_ecu
-from bywire.brakes.motorcycle.linear.brake import first_orders
-from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop
+from bywire.brakes.motorcycle.linear import PressureLoop, first_orders
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.control import gain_schedule, pressure_pid

@@ -23,7 +23,7 @@ def changed(changes: dict[str, Any]) -> None:
         (
             {"ecu.dither.f_dit": 499.0},
             {"ecu.dither.f_dit": 500.0},
-            r"ecu\.dither\.f_dit = 500 Hz must stay below half the sample rate, 500 Hz",
+            r"ecu\.dither\.f_dit = 500 Hz must be < half the sample rate, 500 Hz",
         ),
         (
             {"ecu.dither.f_dit": 500.0, "ecu.dither.waveform": "off"},
@@ -33,7 +33,7 @@ def changed(changes: dict[str, Any]) -> None:
         (
             {"fluid.V_air": 4.3e-7, **AIR},
             {"fluid.V_air": 4.4e-7, **AIR},
-            r"fluid\.V_air = 4\.4e-07 m\*\*3 must be less than .* 4\.38\d*e-07 m\*\*3",
+            r"fluid\.V_air = 4\.4e-07 m\*\*3 must be < .* 4\.38\d*e-07 m\*\*3",
         ),
         (
             {"fluid.V_air": 3.3e-7, **AIR, **DEAD},
@@ -44,7 +44,7 @@ def changed(changes: dict[str, Any]) -> None:
         (
             {"port.x_port": 4.6e-3, **DEAD},
             {"port.x_port": 4.7e-3, **DEAD},
-            r"port\.x_port = 0\.0047 m must be less than .* = 0\.004601 m",
+            r"port\.x_port = 0\.0047 m must be < .* = 0\.004601 m",
         ),
         ({"port.x_port": 4.7e-3}, {"port.x_port": 4.7e-3, **DEAD}, "never close"),
     ],

@@ -20,6 +20,7 @@ from bywire.brakes.motorcycle.trim import (
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
 from bywire.plant import brake_fluid, caliper, master_cylinder
+from raising import raises
 from run_once import run_once
 
 STEPS = 40_000
@@ -84,14 +85,14 @@ def test_start_beyond_the_end_stop_is_refused(changes: dict[str, Any]) -> None:
     assert travel_at(limit, par) == pytest.approx(par.master_cylinder.x_end, abs=1e-12)
     state_at(0.999 * limit, par)
     for p in (1.001 * limit, -1.0, math.nan):
-        text = rf"{p / 1e5:g} bar .*>= 0 bar and <= {math.floor(limit / 1e3) / 100:g} bar.*x_end"
-        with pytest.raises(ParameterError, match=text):
+        range_ = f">= 0 bar and <= {math.floor(limit / 1e3) / 100:g} bar"
+        with raises(ParameterError, value=f"{p / 1e5:g} bar", valid=range_):
             state_at(p, par)
 
 
 def test_bench_that_starts_beyond_the_end_stop_is_refused() -> None:
     stimulus = {"kind": "step", "start": 0, "end": "1 A", "t_step": 0}
-    with pytest.raises(ParameterError, match=r"60 bar is not valid.*<= 51\.27 bar"):
+    with raises(ParameterError, value="60 bar", valid="<= 51.27 bar"):
         bywire.Bench(
             "motor-open-loop", "dardanelli2010", options={"p_start": "60 bar"}, stimulus=stimulus
         ).cases()

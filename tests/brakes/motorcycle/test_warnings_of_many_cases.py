@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import bywire
 from bywire.bench.ensemble import changed, key_figures_of
+from bywire.bench.recording import Rows
+from bywire.brakes.motorcycle import watch
 from bywire.core import watching
+from bywire.core.catalog import PARAMETER_SETS
 from run_once import run_once
 
 SET = "dardanelli2010"
@@ -42,3 +46,15 @@ def test_books_are_those_of_single_runs_though_rows_tell_their_ends_alone():
     assert [list(each) for each in said] == [list(run_once(each).warnings) for each in benches]
     opened = [any("energy balance is open" in text for text in each) for each in said]
     assert opened == [False, True, True]
+
+
+def test_stops_warn_in_the_cases_that_are_looked_at_and_in_no_other():
+    """Free, on the far stop for a while, pulled against the near one, and off it at the end."""
+    force = np.zeros((4, 9))
+    force[1, 3:5], force[2, -1], force[3, 2:5] = 40.0, -60.0, -60.0
+    signals = {"F_stop": force, "at_stop": np.sign(force), "i": np.full(force.shape, -1.0)}
+    signals["p_pd"] = np.full(force.shape, 2e4)
+    rows = Rows(np.arange(9.0), signals, {name: {} for name in signals})
+    par = PARAMETER_SETS.find("dardanelli2010").parameters()
+    warns = [bool(watch.stop_warnings(rows.case(k), par)) for k in range(4)]
+    assert watch.cases_at_stops(rows) == np.flatnonzero(warns).tolist() == [1, 2]

@@ -1,17 +1,22 @@
-"""What the motorcycle brake's experiments share: runs that start at rest at a pressure."""
+"""Starts of the motorcycle brake's runs: at rest at a pressure, or where dither lets it settle."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.bench.experiment import Case
+from bywire.bench.experiment import Case, check_memory
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters
-from bywire.brakes.motorcycle.trim import memory_at, resting_at, state_at
+from bywire.brakes.motorcycle.trim import holding_current, memory_at, resting_at, state_at
+from bywire.core.errors import SolverError
+from bywire.core.interrupts import interrupts_deferred
+from bywire.simulation.engine import prepare
+from bywire.simulation.run import Run, simulate
 
 Signals = Mapping[str, NDArray[np.float64]]
 
@@ -28,9 +33,9 @@ def case_from_rest(
 ) -> Case:
     """Return a run that starts in equilibrium.
 
-    ``mode``: what the stimulus commands; ``p_start``: pressure at the start [Pa]; ``changes``:
-    further parameters that the experiment sets; ``timing``: ``settle``, ``keep`` and ``record`` of
-    the case [s].
+    ``mode``: quantity that the stimulus commands; ``p_start``: pressure at the start [Pa];
+    ``changes``: further parameters that the experiment sets; ``timing``: ``settle``, ``keep`` and
+    ``record`` of the case [s].
     """
     changed = par.replace({"drive.mode": mode, **(changes or {})})
     return Case(
@@ -54,5 +59,67 @@ def step_at_zero(
 
 
 def smoothing(par: MotorcycleParameters) -> dict[str, float]:
-    """Return the option ``smoothing`` as it is unless given: one dither period [s]."""
+    """Return the default of the option ``smoothing``: one dither period [s]."""
     return {"smoothing": 1.0 / par.ecu.dither.f_dit}
+
+
+# --- Where dither lets the pressure settle
+
+_ROUNDS, _TOLERANCE = 12, 2e-3
+_WINDOW = 0.2  # of the settling time: the mean is taken over it
+_SUBSTEPS, _LONGEST = 50, 20e-6  # substeps per sample time at least, and their longest length [s]
+
+
+def settled_start(p: float, par: MotorcycleParameters, settle: float) -> float:
+    """Return the frictionless equilibrium [Pa] whose current lets the pressure settle at ``p``.
+
+    Under dither the asymmetric friction shifts the mean pressure by several bar from the
+    equilibrium without friction. Each run of the settling time corrects the current by
+    the ratio of the pressures of the run before.
+
+    ``p``: required mean pressure [Pa]; ``settle``: settling time [s] of a run.
+
+    Raises
+    ------
+    SolverError
+        When no current holds the pressure within 0.2 %, for instance when the piston sticks.
+    """
+    start = p
+    for _ in range(_ROUNDS):
+        settled = _settled(start, par, settle)
+        if abs(settled - p) <= _TOLERANCE * p:
+            return start
+        if settled <= 0.05 * p:
+            break
+        start *= p / settled
+    raise SolverError(
+        f"no current makes the dithered pressure settle at p_start = {p / 1e5:g} bar (last: "
+        f"{settled / 1e5:.4g} bar): change p_start, lengthen settle, or set start = 'frictionless'",
+        name="p_start",
+        value=f"{p / 1e5:g} bar",
+    )
+
+
+def _settled(start: float, par: MotorcycleParameters, settle: float) -> float:
+    """Return the mean pressure [Pa] at the end of a run with constant current demand."""
+    driven = par.replace({"drive.mode": "current"})
+    i = holding_current(start, driven)
+    fields = MotorcycleBrake.Stimulus._fields
+
+    def stimulus(t: np.ndarray) -> np.ndarray:
+        rows = np.zeros((t.size, len(fields)))
+        rows[:, fields.index("i_set")] = i
+        return rows
+
+    T = driven.ecu.T_s
+    step = T / max(_SUBSTEPS, math.ceil(T / _LONGEST - 1e-9))
+    x, m = state_at(start, driven), memory_at(start, driven)
+    run = Run(MotorcycleBrake(), driven, x, m, stimulus, settle, step=step, record=T)
+    check_memory(run, 1)
+    with interrupts_deferred():
+        prepare(run.model, run.par).engine()
+    trajectory = simulate(run, ("p_mc",))
+    if trajectory.status == "interrupted":
+        raise KeyboardInterrupt
+    late = trajectory.time >= (1.0 - _WINDOW) * settle
+    return float(trajectory["p_mc"][late].mean())

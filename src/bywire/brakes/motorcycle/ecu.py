@@ -23,7 +23,7 @@ class Stimulus(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What ECU and sources hold between sampling instants."""
+    """Memory of ECU and sources between sampling instants."""
 
     p_meas: Annotated[float, Signal("Pa", "measured pressure", 2e6)]
     i_meas: Annotated[float, Signal("A", "measured current", 5.0)]
@@ -58,7 +58,7 @@ class Readings(NamedTuple):
 
 
 def tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
-    """Run the ECU once: convert, close the pressure loop if asked to, close the current loop."""
+    """Run the ECU once: convert, pressure control in the modes that have it, current control."""
     p_share = adc.sample(readings.p, u.noise_p, par.adc)
     i_share = adc.sample(readings.i, u.noise_i, par.adc)
     p_before = m.p_meas
@@ -81,10 +81,10 @@ def tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) 
 
 
 def source_tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
-    """Hold the value of an ideal source, and what the converters see meanwhile.
+    """Hold the value of an ideal source, and the readings of the converters.
 
-    Nothing reads that but the recording, and ``shown`` rounds it: a rounding within a tick would
-    look like a loop through which derivatives are lost.
+    Only the recording reads these, and ``shown`` rounds them: a rounding within the tick would
+    interrupt derivatives as if it were in a loop.
     """
     p_share = adc.noisy(readings.p, u.noise_p, par.adc)
     i_share = adc.noisy(readings.i, u.noise_i, par.adc)
@@ -95,7 +95,7 @@ def source_tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParam
 
 
 def shown(m: Memory, par: MotorcycleParameters) -> dict[str, float]:
-    """Return the measurements as the converters give them, in all modes."""
+    """Return the measurements after the converters, in all modes."""
     if par.drive.mode not in ("voltage-source", "current-source") or par.adc.law == "ideal":
         return {"p_meas": m.p_meas, "i_meas": m.i_meas}
     p = pressure_sensor.reading(m.p_meas + par.ecu.p_atm, par.pressure_sensor)
@@ -104,7 +104,7 @@ def shown(m: Memory, par: MotorcycleParameters) -> dict[str, float]:
 
 
 def _values(p: float, i: float, par: MotorcycleParameters) -> dict[str, float]:
-    """Return the measurements that the shares of the two spans stand for."""
+    """Return the measurements from shares of the sensors' spans."""
     return {
         "p_meas": pressure_sensor.value(p, par.pressure_sensor) - par.ecu.p_atm,
         "i_meas": current_sensor.value(i, par.current_sensor),
@@ -112,7 +112,7 @@ def _values(p: float, i: float, par: MotorcycleParameters) -> dict[str, float]:
 
 
 def _derated(m: Memory, par: MotorcycleParameters) -> Memory:
-    """Return the memory with the limit that the motor's temperature leaves of its current."""
+    """Return the memory with the current limit at the motor's temperature."""
     if par.ecu.derating.law == "off":
         return m
     x, out = derating.output(
@@ -127,9 +127,9 @@ def _derated(m: Memory, par: MotorcycleParameters) -> Memory:
 
 
 def _demand(m: Memory, p_before: float, u: Stimulus, par: MotorcycleParameters) -> Memory:
-    """Return the memory with the unfiltered current demand renewed.
+    """Return the memory with a new unfiltered current demand.
 
-    ``p_before`` is the pressure of the last tick, whose gains a schedule hands over from.
+    ``p_before``: pressure of the last tick; its scheduled gains hand over to the new ones.
     """
     if par.drive.mode == "current":
         return m._replace(i_star=u.i_set)
@@ -160,7 +160,7 @@ def _demand(m: Memory, p_before: float, u: Stimulus, par: MotorcycleParameters) 
 
 
 def _shaped(m: Memory, par: MotorcycleParameters) -> Memory:
-    """Return the memory with dither added and the low-pass filter run."""
+    """Return the memory after dither and low-pass filter."""
     ecu = par.ecu
     dit, wave = dither.output(dither.State(m.dit_phase), m.p_meas, ecu.T_s, ecu.dither, ecu.est_par)
     filter_first = ecu.filter.place == "before-dither"

@@ -1,4 +1,4 @@
-"""What may fail in the motorcycle brake beside what its elements say."""
+"""Faults of the motorcycle brake that none of its elements declares."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from bywire.brakes.motorcycle.model import MotorcycleBrake
-from bywire.core.errors import ParameterError
+from bywire.core.errors import not_valid
 from bywire.core.faults import Channel, Channels, Fault
 from bywire.core.units import shown
 from bywire.plant import current_sensor, fluid_vapor, pressure_sensor
 
-_GAP_PRESSURE = 2e3  # Pa, that closes a gap: little, and no volume without any
+_GAP_PRESSURE = 2e3  # Pa that closes a gap: small, but > 0, as the curve must increase
 NAME = MotorcycleBrake.name
 
 
@@ -34,9 +34,9 @@ CHANNELS = Channels(
 
 
 def _source(mode: str) -> Any:
-    """Return the changes in which an ideal source that gives nothing takes the ECU's place.
+    """Return the changes that replace the ECU by an ideal source at zero.
 
-    It is sampled like the ECU, so that the run's ticks stay where they are.
+    The source is sampled like the ECU, so that the ticks of the run do not move.
     """
 
     def changes(par: Any, value: float) -> Mapping[str, Any]:
@@ -57,11 +57,11 @@ def _knocked_back(par: Any, gap: float) -> Mapping[str, Any]:
 
 
 def _boiling(par: Any, T: float) -> Mapping[str, Any]:
-    """Return the vapor of fluid at a temperature [K] as gas in line and caliper."""
+    """Return the changes that make gas in line and caliper of the vapor at a temperature [K]."""
     if not 0.0 < T <= par.vapor.T_most:
-        raise ParameterError(
-            f"fluid.vapor at {shown(T, 'K')} is not valid: it must be > {shown(0.0, 'K')} and "
-            f"<= {shown(par.vapor.T_most, 'K')} (vapor.T_most), up to which the law of vapor holds"
+        limits = f"> {shown(0.0, 'K')} and <= {shown(par.vapor.T_most, 'K')} (vapor.T_most)"
+        raise not_valid(
+            "temperature of fluid.vapor", shown(T, "K"), limits, "the range of the law of vapor"
         )
     return {"fluid.air": "caliper", "fluid.V_air": fluid_vapor.volume(T, par.vapor)}
 

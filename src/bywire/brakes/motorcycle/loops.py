@@ -6,32 +6,31 @@ from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from bywire.analysis.loop import Loop, LoopSchedule, Point, Quantity
+from bywire.brakes.motorcycle import linear
 from bywire.brakes.motorcycle.ecu import Stimulus
-from bywire.brakes.motorcycle.linear import pressure_loop
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import memory_at, state_at
-from bywire.core.errors import ParameterError
+from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 from bywire.core.typing import Array, Complex
 
-_STEP = 10e-6  # substep [s]: at most 1/(100 f) of the current loop's band, or its error shows
+_STEP = 10e-6  # substep [s]: at most 1/(100 f) of the current loop's band, for a small error
 
 CAUSES: Mapping[str, Mapping[str, Any]] = {
     "seal friction": {"seal.T_pr": 0.0, "seal.f_cfr_p": 0.0, "seal.f_cfr_n": 0.0, "seal.mu_T": 0.0},
     "dither": {"ecu.dither.waveform": "off"},
     "converter": {"adc.law": "ideal"},
 }
-"""cause -> parameters without it"""
+"""changes that remove a cause of nonlinearity, by the cause"""
 
 
 def _require_pressed(p: float) -> None:
-    """Refuse a brake that is released: its piston just touches its stop and has no linear model."""
+    """Refuse a released brake: a piston that just touches its stop has no linear model."""
     if p == 0.0:
-        raise ParameterError(
-            "pressure = 0 bar is no operating point: the piston just touches its stop; it must be "
-            "> 0 bar, for instance '5 bar'"
+        raise not_valid(
+            "pressure", "0 bar", "> 0 bar", "because the piston just touches its stop at 0 bar"
         )
 
 
@@ -45,9 +44,9 @@ def current_point(par: ParameterSet, value: float) -> Point:
 
 
 def current_laws(par: ParameterSet, value: float, frequencies: Array) -> tuple[Complex, Complex]:
-    """Return what the PI makes of set point and current, up to its duty cycle, at any pressure."""
+    """Return the PI's responses from set point and from current to the duty cycle."""
     brake = cast(MotorcycleParameters, par)
-    pi = pressure_loop.current_control(brake.ecu).response(frequencies)[:, 0, 0]
+    pi = linear.current_control(brake.ecu).response(frequencies)[:, 0, 0]
     return pi, pi / (1.0 + 1j * frequencies / brake.anti_alias.f_aa)
 
 
@@ -61,16 +60,16 @@ def pressure_point(par: ParameterSet, value: float) -> Point:
 
 
 def dither_frequency(par: ParameterSet) -> Sequence[float]:
-    """Return the dither's frequency [Hz], where there is one."""
+    """Return the dither's frequency [Hz]; nothing without dither."""
     dither = cast(MotorcycleParameters, par).ecu.dither
     return () if dither.waveform == "off" else (dither.f_dit,)
 
 
 def pressure_laws(par: ParameterSet, value: float, frequencies: Array) -> tuple[Complex, Complex]:
-    """Return what the PID makes of set point and pressure at a pressure [Pa], up to its demand."""
+    """Return the PID's responses from set point and from pressure to its demand, at a pressure."""
     brake = cast(MotorcycleParameters, par)
-    demand = pressure_loop.pressure_demand(brake.ecu, value).response(frequencies)[:, 0, 0]
-    feedback = pressure_loop.pressure_feedback(brake.ecu, value).response(frequencies)[:, 0, 0]
+    demand = linear.pressure_demand(brake.ecu, value).response(frequencies)[:, 0, 0]
+    feedback = linear.pressure_feedback(brake.ecu, value).response(frequencies)[:, 0, 0]
     return demand, feedback / (1.0 + 1j * frequencies / brake.anti_alias.f_aa)
 
 
@@ -84,11 +83,11 @@ _OWN = {f"ecu.pressure.{name}": span for name, span in _GAINS.items()} | {
 
 
 def in_ecu(par: ParameterSet) -> Mapping[str, tuple[float, float]]:
-    """Return what a design of the pressure PID keeps to, so that an ECU can run it.
+    """Return the limits of a pressure PID that an ECU can run.
 
-    A filter faster than the sampling is none: backward differences then hand on every step of
-    the converter at full size. The derivative of a set point that jumps asks for more current
-    than there is, for one sample.
+    A filter faster than the sampling has no effect: backward differences then pass every step of
+    the converter at full size. The derivative of a set point that jumps demands more current than
+    the limit allows, for one sample.
     """
     T_s = cast(MotorcycleParameters, par).ecu.T_s
     return {"ecu.pressure.tau_d": (T_s, max(_SLOWEST, 10.0 * T_s)), "ecu.pressure.c": (0.0, 0.0)}

@@ -2,6 +2,9 @@
 
 Source: A. Dardanelli, G. Alli, S. M. Savaresi, "Modeling and control of an electro-mechanical
 brake-by-wire actuator for a sport motorbike", 5th IFAC Symposium on Mechatronic Systems, 2010.
+
+Source: A. Dardanelli, G. Alli, S. M. Savaresi, "Modeling and control of an electro-mechanical
+brake-by-wire actuator for a sport motorbike", 5th IFAC Symposium on Mechatronic Systems, 2010.
 """
 
 from __future__ import annotations
@@ -9,8 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
-from bywire.brakes.motorcycle import ecu
-from bywire.brakes.motorcycle import watch as warnings
+from bywire.brakes.motorcycle import ecu, watch
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core import ops
 from bywire.core.assembly import Assembly
@@ -60,7 +62,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     supply = Part(battery_supply, loss="E_supply")
     motor = Part(dc_motor, loss="E_copper")
     gear = Part(ball_screw_gear, output={"x": "x_mc"})
-    # The source's law gives energy where the load drives the gear, less than it took before.
+    # Eq. (8) returns energy where the load drives the gear, at most what it took before.
     E_gear = Integral(
         "J",
         "loss of gear and screw, signed",
@@ -173,7 +175,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     )
 
     def wire(self, w: Self) -> None:
-        """Say what every part feels: electrics, piston, fluid, load, sensors."""
+        """Wire the parts: electrics, piston, fluid, load, sensors."""
         warm = motor_heat.warmth(w.heat.xe, w.heat.par)
         w.motor.vary(R_m=w.motor.par.R_m * warm.R, K_e=w.motor.par.K_e * warm.K)
         w.current, w.voltage, w.i_dc = _electrics(w)
@@ -210,7 +212,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     def balance(
         self, x: Any, xe: Any, memory: ecu.Memory, par: Par, contact: tuple[float, ...]
     ) -> Any:
-        """Return the right-hand sides; the winding's current rests beside a current source."""
+        """Return the right-hand sides; with a current source the winding's state is constant."""
         rows = super().balance(x, xe, memory, par, contact)
         return rows._replace(i=0.0 * rows.i) if par.drive.mode == "current-source" else rows
 
@@ -243,11 +245,11 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         }
 
     def record(self, w: Self) -> dict[str, float]:
-        """Return what is recorded beside states, wires and losses."""
+        """Return the recorded signals that are not states, wires or losses."""
         friction, makeup = w.reaction
         F_stop = end_stop.load(w.stop.f)
         ideal = w.par.drive.mode in IDEAL
-        # A motor that stays cold keeps what it gives to the air, nothing: a zero without operation.
+        # With motor_heat.law = 'off' this flow is zero: it costs no operation of its own.
         heat, cold = motor_heat.stored(w.heat.x, w.heat.par), w.heat.par.law == "off"
         return {
             **ecu.shown(w.m, w.par),
@@ -284,20 +286,20 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         return state, zeros(ecu.Memory)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
-        """Return what the user should know of a recording."""
+        """Return the warnings of a recording."""
         held = par.drive.mode == "current-source" and "i" in recording
         source = {"i_source": ("time", recording["i"].values)} if held else {}
         seen = recording.assign(source) if held else recording
-        return warnings.watch(recording, par) + super().watch(seen, par)
+        return watch.stop_warnings(recording, par) + super().watch(seen, par)
 
     def may_warn(self, rows: Any, pars: Sequence[Any]) -> Sequence[int]:
-        """Return the cases of which ``watch`` may say something."""
+        """Return the cases in which ``watch`` may warn."""
         is_known = pars[0].drive.mode != "current-source" and self.are_silent(rows)
-        return warnings.may_warn(rows) if is_known else range(len(pars))
+        return watch.cases_at_stops(rows) if is_known else range(len(pars))
 
     def watched(self, par: Any) -> tuple[str, ...]:
-        """Return the signals that ``watch`` looks at."""
-        return (*warnings.WATCHED, *watched_by_elements(self, par))
+        """Return the signals that ``watch`` reads."""
+        return (*watch.WATCHED, *watched_by_elements(self, par))
 
 
 def _ecu(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
@@ -341,7 +343,7 @@ def _gauge(w: MotorcycleBrake) -> float:
 def _dry_losses(w: MotorcycleBrake, friction: float) -> tuple[float, float]:
     """Return the powers lost in the gear's and in the seals' dry friction.
 
-    What the seals can take at this speed is theirs, the rest is the gear's.
+    The seals take what their friction allows at this speed, the gear the rest.
     """
     total = -friction * w.gear.x.omega
     if w.gear.par.law == "paper":
@@ -351,7 +353,7 @@ def _dry_losses(w: MotorcycleBrake, friction: float) -> tuple[float, float]:
 
 
 def _gear_power(w: MotorcycleBrake, friction: float) -> float:
-    """Return what the gear takes at an instant [W]."""
+    """Return the loss power of the gear [W]."""
     if w.gear.par.law == "paper":
         torque = ball_screw_gear.Input(w.torque, w.load, friction)
         acceleration = ball_screw_gear.balance(w.gear.x, torque, w.gear.par).omega

@@ -46,7 +46,7 @@ DriveMode = Literal[
 
 
 class DriveParameters(ParameterSet):
-    """What commands the motor.
+    """Source of the motor's command.
 
     ``pressure`` and ``pedal`` close the pressure loop; ``current`` is a demand to the current
     loop through dither and low-pass filter, ``current-direct`` past both; ``voltage-source`` and
@@ -54,13 +54,13 @@ class DriveParameters(ParameterSet):
     """
 
     mode: DriveMode
-    """what the stimulus commands"""
+    """quantity that the stimulus commands"""
     T_source: Duration
     """interval over which an ideal source holds its value"""
 
 
 class EcuParameters(ParameterSet):
-    """The ECU: its sample time, its controllers, and what it believes of the plant."""
+    """The ECU: its sample time, its controllers, and its model of the plant."""
 
     T_s: Duration
     """sample time of both control loops"""
@@ -72,19 +72,19 @@ class EcuParameters(ParameterSet):
     dither: dither.Parameters
     est_par: Believed
     p_atm: Pressure
-    """ambient pressure that the ECU takes off the absolute reading"""
+    """ambient pressure that the ECU subtracts from the absolute reading"""
     pedal_map: pedal_map.Parameters
 
     @model_validator(mode="after")
     def _fits_sampling(self) -> EcuParameters:
         if self.filter.f_c * self.T_s >= 0.5:
             raise ValueError(
-                f"ecu.filter.f_c = {self.filter.f_c:g} Hz must stay below half the sample rate, "
+                f"ecu.filter.f_c = {self.filter.f_c:g} Hz must be < half the sample rate, "
                 f"{0.5 / self.T_s:g} Hz"
             )
         if self.dither.waveform != "off" and self.dither.f_dit * self.T_s >= 0.5:
             raise ValueError(
-                f"ecu.dither.f_dit = {self.dither.f_dit:g} Hz must stay below half the sample "
+                f"ecu.dither.f_dit = {self.dither.f_dit:g} Hz must be < half the sample "
                 f"rate, {0.5 / self.T_s:g} Hz: lower it, sample faster (ecu.T_s), or set "
                 "ecu.dither.waveform = 'off'"
             )
@@ -130,30 +130,33 @@ class MotorcycleParameters(ParameterSet):
         stroke, closed = cylinder.x_end - cylinder.x_rest, reservoir_port.closed_at(self.port)
         if not closed < stroke:
             raise ValueError(
-                f"port.x_port = {self.port.x_port:g} m must be less than the piston's stroke "
+                f"port.x_port = {self.port.x_port:g} m must be < the piston's stroke "
                 f"x_end - x_rest = {stroke:g} m: the port would never close"
             )
         room = cylinder.A_mc * (cylinder.s_mc - cylinder.x_rest - closed)
         if self.fluid.air == "entrained" and not self.fluid.V_air < room:
             raise ValueError(
-                f"fluid.V_air = {self.fluid.V_air:g} m**3 must be less than the chamber's volume "
+                f"fluid.V_air = {self.fluid.V_air:g} m**3 must be < the chamber's volume "
                 f"where pressure begins to build up, {room:g} m**3"
             )
         return self
 
     @model_validator(mode="after")
     def _sticks_on_fluid_alone(self) -> MotorcycleParameters:
-        """What leaks, warms or bubbles in the caliper feels the fluid, not what the pads return."""
-        beside = {
+        """Refuse a sticking piston with laws of the caliper's fluid.
+
+        They need the pressure of the fluid, but the state is that of the pads.
+        """
+        fluid_laws = {
             "caliper.leak": self.caliper.leak == "leaking",
             "caliper.fluid_heat": self.caliper.fluid_heat == "warming",
             "fluid.air": self.fluid.air == "caliper",
         }
-        clashing = [name for name, there in beside.items() if there]
+        clashing = [name for name, is_on in fluid_laws.items() if is_on]
         if self.piston.law == "sticking" and clashing:
             value = self.value(clashing[0])
             raise ValueError(
-                f"piston.law = 'sticking' does not go with {clashing[0]} = {value!r}: the fluid's "
-                "pressure is then another than the pads', and no state of its own; take one of both"
+                f"piston.law = 'sticking' does not go with {clashing[0]} = {value!r}: the pressure "
+                "of the fluid then differs from that of the pads, and is no state; set one of both"
             )
         return self

@@ -15,7 +15,7 @@ from bywire.core.parameters import ParameterSet
 _PRESSURE = Quantity("pressure", "Pa", 20e5)
 _CURRENT = Quantity("current", "A", 2.0)
 _AT = (_PRESSURE, _CURRENT)
-"""pressure in both chambers, motor current without friction"""
+"""operating points: pressure in both chambers, or holding current without friction"""
 
 
 def linear(
@@ -29,7 +29,7 @@ def linear(
     Raises
     ------
     ParameterError
-        When the point does not exist.
+        When there is no such point.
     """
     changes: dict[str, Any] = {"drive.mode": mode}
     driven = cast(MotorcycleParameters, par.replace(changes))

@@ -1,8 +1,8 @@
-"""What the motorcycle's ECU can compute to see a failure, of what its sensors and demands say.
+"""Residuals that the motorcycle's ECU can compute from its sensors and demands.
 
 Source of the relations: Dardanelli et al. (2010), eqs. (1), (4) and (8). The paper's rear brake has
-no sensor of angle or stroke. Residuals are looked at while the demand is steady: during a step all
-of them are large in a healthy brake, and thresholds above that would see nothing.
+no sensor of angle or stroke. Residuals count only while the demand is steady: during a step all of
+them are large in a healthy brake, and thresholds above that would detect nothing.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def _period(par: Any, dt: float) -> int:
 
 
 def _steady(signals: Signals, dt: float, values: Array) -> Array:
-    """Return a residual where the demand has not changed for a while, else none."""
+    """Return a residual where the demand is steady, `NEVER` elsewhere."""
     rows = round(_STEADY / dt)
     p = signals["p_ref"]
     still = largest_of_the_last(p, rows) - least_of_the_last(p, rows) <= 0
@@ -54,20 +54,20 @@ def _pressure(signals: Signals, par: Any, dt: float) -> Array:
 
 
 def _winding(signals: Signals, par: Any, dt: float) -> Array:
-    """Return the voltage that the resistance does not take, averaged over the dither: the speed."""
+    """Return the back-EMF, a measure of the speed: bridge voltage minus R_m i, dither averaged."""
     back_emf = par.supply.V_bat * signals["duty"] - par.motor.R_m * signals["i_meas"]
     return _steady(signals, dt, np.abs(mean_of_the_last(back_emf, _period(par, dt))))
 
 
 def _balance(signals: Signals, par: Any, dt: float) -> Array:
-    """Return the motor's torque less what the pressure asks for, averaged over the dither."""
+    """Return the motor's torque minus the load torque of the pressure, averaged over the dither."""
     torque = par.gear.eta_g * par.ecu.est_par.K_e * signals["i_meas"]
     load = par.gear.k_g * par.master_cylinder.A_mc * signals["p_meas"]
     return _steady(signals, dt, np.abs(mean_of_the_last(torque - load, _period(par, dt))))
 
 
 def _still(signals: Signals, par: Any, dt: float) -> Array:
-    """Return by how little the pressure moves in two periods of the dither: nothing where stuck."""
+    """Return minus the span of the pressure in two dither periods: zero for a stuck piston."""
     rows = 2 * _period(par, dt)
     p = signals["p_meas"]
     return _steady(signals, dt, least_of_the_last(p, rows) - largest_of_the_last(p, rows))

@@ -12,7 +12,7 @@ from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.control import low_pass_2, pressure_pid
 from bywire.core import ops
-from bywire.core.errors import ParameterError
+from bywire.core.errors import not_valid
 from bywire.core.signals import zeros
 from bywire.plant import (
     anti_alias_filter,
@@ -54,8 +54,8 @@ def travel_at(p: float, par: Par) -> float:
     .. math:: \frac{dF}{dp} = -\frac{F}{\beta} - C_{pd}(p), \quad
         F(p) = F(0) e^{-p/\beta} - \int_0^p C_{pd}(s) e^{(s - p)/\beta} ds
 
-    The integral runs from node to node of the caliper's table, by Gauss: it never looks at a node,
-    where the slope jumps.
+    The integral runs from node to node of the caliper's table, by Gauss, whose points are never
+    nodes: there the slope jumps.
     """
     cylinder, fluid, port, pads = par.master_cylinder, par.fluid, par.port, par.caliper
     start = cylinder.x_rest + reservoir_port.closed_at(port)
@@ -72,9 +72,9 @@ def travel_at(p: float, par: Par) -> float:
 def _nodes(
     p: float, beta: float, table: tuple[float, ...]
 ) -> tuple[tuple[tuple[caliper.State, float, float], ...], float]:
-    """Return where Gauss looks at the integral of `travel_at`, with width and exponential there.
+    """Return the Gauss points of the integral of `travel_at`, each with width and exponential.
 
-    And the exponential of the whole way.
+    The second value is the exponential over the whole interval.
     """
     looked_at = []
     for low, high in pairwise((0.0, *(ops.clip(node, 0.0, p) for node in table), p)):
@@ -85,7 +85,7 @@ def _nodes(
     return tuple(looked_at), ops.exp(-p / beta)
 
 
-_kept_nodes = lru_cache(maxsize=64)(_nodes)  # mostly, a study varies nothing that they follow from
+_kept_nodes = lru_cache(maxsize=64)(_nodes)  # a study rarely varies what they depend on
 
 
 def highest_pressure(par: Par) -> float:
@@ -112,7 +112,7 @@ def state_at(p: float, par: Par, current: float | None = None) -> Any:
     Parameters
     ----------
     current
-        Through the motor [A]; what balances the pressure without friction by default.
+        Motor current [A]; by default the one that balances the pressure without friction.
 
     Raises
     ------
@@ -122,23 +122,25 @@ def state_at(p: float, par: Par, current: float | None = None) -> Any:
     x = par.master_cylinder.x_rest if p == 0 else travel_at(p, par)
     if not ops.is_symbol(x) and not (p >= 0 and x <= par.master_cylinder.x_end):
         limit = math.floor(highest_pressure(par) / 1e3) / 100.0
-        raise ParameterError(
-            f"a start at rest at {p / 1e5:g} bar is not valid: it must be >= 0 bar and "
-            f"<= {limit:g} bar, where the piston meets its end stop: start lower, or move the "
-            "stop (master_cylinder.x_end)"
+        raise not_valid(
+            "pressure of the start at rest",
+            f"{p / 1e5:g} bar",
+            f">= 0 bar and <= {limit:g} bar",
+            "where the piston meets its end stop: start lower, or move the stop "
+            "(master_cylinder.x_end)",
         )
     return _resting_at(p, x, par, current)
 
 
 def resting_at(p: float, par: Par, current: float | None = None) -> Any:
-    """Return the state at rest at a pressure [Pa]; the friction holds what is left over.
+    """Return the state at rest at a pressure [Pa]; friction balances the remaining torque.
 
     Without pressure the piston rests at its retracted end. Parameters may be symbols.
 
     Parameters
     ----------
     current
-        Through the motor [A]; what balances the pressure without friction by default.
+        Motor current [A]; by default the one that balances the pressure without friction.
     """
     x = par.master_cylinder.x_rest if p == 0 else travel_at(p, par)
     return _resting_at(p, x, par, current)
@@ -160,7 +162,7 @@ def _resting_at(p: float, x: float, par: Par, current: float | None) -> Any:
 
 
 def memory_at(p: float, par: Par, current: float | None = None) -> Memory:
-    """Return the memory in which every controller, or the ideal source, holds that state."""
+    """Return the memory with which every controller, or the ideal source, holds that state."""
     i = holding_current(p, par) if current is None else current
     measured = _NOTHING._replace(p_meas=p, i_meas=i)
     if par.drive.mode == "voltage-source":

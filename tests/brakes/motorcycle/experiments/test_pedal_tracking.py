@@ -12,6 +12,7 @@ import bywire
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.brakes.motorcycle.experiments import pedal_tracking
 from bywire.core.errors import ParameterError
+from raising import raises
 
 SET = "dardanelli2010"
 T = np.arange(0.0, 10.0, 1e-3)
@@ -54,6 +55,6 @@ def test_set_point_that_does_not_move_has_no_lag():
 
 
 def test_built_in_ride_beyond_a_shorter_pedal_is_refused():
-    with pytest.raises(ParameterError, match=r"built-in ride: pedal goes up to 37 mm.*30 mm"):
+    with raises(ParameterError, name="pedal", value="37 mm", valid="30 mm"):
         bywire.Bench("pedal-tracking", SET, {"pedal.x_max": "30 mm"})
     assert max(pedal_tracking._TRAVELS) == 37

@@ -9,8 +9,7 @@ import pytest
 import xarray as xr
 
 from bywire.brakes.motorcycle.methods.friction_ramp import METHOD, Options, shots_of
-from bywire.brakes.motorcycle.methods.stick_slip.shooting import Shooting
-from bywire.brakes.motorcycle.methods.stick_slip.slips import Slip, cut_out, find_slips
+from bywire.brakes.motorcycle.methods.stick_slip import Shooting, Slip, cut_out, find_slips
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
@@ -18,6 +17,7 @@ from bywire.identification.measured import noise_of
 from bywire.identification.method import Effort, Identified
 from bywire.identification.trust import trust
 from bywire.identification.unknown import parameters_of
+from raising import raises
 
 PAR = parameters("dardanelli2010")
 OPTIONS = METHOD.defaults
@@ -72,26 +72,27 @@ def test_slips_that_follow_at_once_are_left_out(data: xr.Dataset) -> None:
     found = cut_out(t[:600], p[:600], i[:600], crowded, OPTIONS.longest)
     assert [shot.slip.begin for shot in found] == [400]
     for slip in (Slip(1, 4, 1, 1e5), Slip(400, 403, -1, 1e5)):
-        with pytest.raises(ParameterError, match=r"none of the 1 slips.*check the unit"):
+        with raises(ParameterError, name="least"):
             cut_out(t[:600], p[:600], i[:600], [slip], OPTIONS.longest)
 
 
 def test_a_wrong_unit_is_refused_in_a_sentence(data: xr.Dataset) -> None:
     """Of bar titled MPa."""
-    with pytest.raises(ParameterError, match="check the unit of p_mc"):
+    with raises(ParameterError, name="p_mc", value="bar", valid="<= "):
         METHOD.identify(data.assign(p_mc=10.0 * data["p_mc"]), PAR, OPTIONS, Effort(starts=1))
 
 
 def test_records_that_cannot_be_such_a_ramp_are_refused(data: xr.Dataset) -> None:
     t = data["time"].values
     dithered = data.assign(i=data["i"] + 0.5 * np.sin(2.0 * np.pi * 50.0 * t))
-    for record, message in (
-        (dithered, r"varies by 0\.35.* A .*switch the dither off"),
-        (data.isel(time=slice(None, None, 10)), "a sample every 10 ms.*250 Hz or faster"),
-        (data.assign(i=-data["i"]), r"p_mc goes against i.*sign = -1"),
+    for record, fields in (
+        (dithered, {"name": "i", "value": "0.35", "valid": "<= "}),
+        (data.isel(time=slice(None, None, 10)), {"name": "sample time", "valid": "<= 4 ms"}),
     ):
-        with pytest.raises(ParameterError, match=message):
+        with raises(ParameterError, **fields):
             METHOD.identify(record, PAR, OPTIONS, Effort(starts=1))
+    with pytest.raises(ParameterError, match=r"p_mc goes against i.*sign = -1"):
+        METHOD.identify(data.assign(i=-data["i"]), PAR, OPTIONS, Effort(starts=1))
 
 
 def test_a_pressure_whose_zero_is_off_is_found_out(data: xr.Dataset) -> None:
@@ -186,5 +187,5 @@ def test_a_ramp_up_alone_does_not_tell_the_release(alone: Identified) -> None:
 
 def test_a_record_without_slips_is_refused(data: xr.Dataset) -> None:
     smooth = data.assign(p_mc=data["p_mc"] * 0.0 + 1e5)
-    with pytest.raises(ParameterError, match=r"no slip of more than 0\.2 bar"):
+    with raises(ParameterError, name="p_mc"):
         METHOD.identify(smooth, PAR, OPTIONS, Effort(starts=1))

@@ -67,7 +67,7 @@ def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
 
 
 def loop(options: Options) -> hysteresis.Setting:
-    """Return what the loops are of: filtered current over pressure."""
+    """Return the setting of the loops: filtered current over pressure."""
     return hysteresis.Setting("i_filtered", "p_mc", options.smoothing, demand="i_star")
 
 

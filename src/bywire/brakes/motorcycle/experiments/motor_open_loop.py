@@ -28,7 +28,7 @@ _SOURCES: dict[str, tuple[DriveMode, str, str]] = {
     "pressure": ("pressure", "p_set", "Pa"),
 }  # drive mode, driven signal and its unit
 _IDEAL = ("current", "voltage")
-# What only the ECU gives a meaning.
+# Signals and key figures that need the ECU.
 _SIGNALS = ("p_ref", "duty", "i_star", "i_dit", "sat_current", "sat_duty")
 _KPIS = ("share_sat_current", "share_sat_duty")
 
@@ -37,9 +37,9 @@ class Options(ParameterSet):
     """The source."""
 
     source: Literal["current", "voltage", "current-loop", "current-direct", "pressure"]
-    """what is driven: an ideal source, or a demand to the ECU; -direct is without dither"""
+    """driven quantity: an ideal source, or a demand to the ECU; -direct is without dither"""
     add_holding: bool
-    """whether what holds p_start is added to the stimulus: current, voltage, or p_start itself"""
+    """whether the value that holds p_start is added to the stimulus: current, voltage or p_start"""
     p_start: Annotated[float, Unit("Pa", 2e6), Field(ge=0, allow_inf_nan=False)]
     """pressure from whose equilibrium the run starts"""
     duration: Duration
@@ -57,7 +57,8 @@ def cases(
     if stimulus is None:
         raise ParameterError(
             "motor-open-loop needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine "
-            "or table, with its parameters"
+            "or table, with its parameters",
+            name="stimulus",
         )
     mode, name, unit = _SOURCES[options.source]
     i = holding_current(options.p_start, par)
@@ -78,12 +79,12 @@ def cases(
 
 
 def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
-    """Leave out what has no meaning without the ECU."""
+    """Drop the signals that need the ECU, where an ideal source replaces it."""
     return recording.drop_vars(_SIGNALS) if options.source in _IDEAL else recording
 
 
 def without(options: Options) -> tuple[str, ...]:
-    """Return the KPIs that have no meaning without the ECU."""
+    """Return the KPIs that need the ECU, where an ideal source replaces it."""
     return _KPIS if options.source in _IDEAL else ()
 
 

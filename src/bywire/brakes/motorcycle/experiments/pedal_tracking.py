@@ -58,7 +58,7 @@ def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tupl
 
 
 def followed(options: Options) -> tracking.Setting:
-    """Return what follows what."""
+    """Return the tracking pressure and its set point."""
     return tracking.Setting("p_mc", "p_ref", options.smoothing)
 
 
@@ -86,12 +86,16 @@ def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
         if chosen is None:
             raise FileError(
                 f"{options.trace}: none of its columns {quoted(', '.join(names))} is pedal [mm], "
-                "force [N] or pressure [bar]: rename the one that the brake shall follow, or "
-                "name it in a mapping file, options.trace_map"
+                "force [N] or pressure [bar]: rename the column that the brake shall follow, or "
+                "name it in a mapping file, options.trace_map",
+                name="options.trace",
+                value=quoted(", ".join(names)),
+                valid="pedal [mm], force [N] or pressure [bar]",
             )
-        wanted = {chosen: _COLUMNS[chosen]}
         longest = max(options.max_gap, 1e-9)
-        ride = read_trace(options.trace, wanted, max_gap=longest, mapping=meaning)
+        ride = read_trace(
+            options.trace, {chosen: _COLUMNS[chosen]}, max_gap=longest, mapping=meaning
+        )
     _require_within_stop(ride, par, options.trace or "the built-in ride")
     if "pedal" not in ride:
         return ride
@@ -107,7 +111,10 @@ def _require_within_stop(ride: xr.Dataset, par: MotorcycleParameters, source: st
         if largest > limit * (1.0 + 1e-9):
             raise ParameterError(
                 f"{source}: {name} goes up to {shown(largest, unit)}, but the pedal meets its stop "
-                f"at {shown(limit, unit)} (pedal.x_max = {shown(x_max, 'm')}): change one of them"
+                f"at {shown(limit, unit)} (pedal.x_max = {shown(x_max, 'm')}): change one of them",
+                name=name,
+                value=shown(largest, unit),
+                valid=shown(limit, unit),
             )
 
 

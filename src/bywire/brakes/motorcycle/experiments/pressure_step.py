@@ -1,4 +1,4 @@
-"""Pressure step: the braking system's answer to a current step (Dardanelli 2010, Fig. 6)."""
+"""Pressure step: the braking system's response to a current step (Dardanelli 2010, Fig. 6)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import Any, Literal
 from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import effort, occupation, static_gain, step_response
 from bywire.bench.kpis.families import FamilyJudge, units_of
-from bywire.brakes.motorcycle.case import case_from_rest, smoothing, step_at_zero
-from bywire.brakes.motorcycle.operating_point import settled_start
+from bywire.brakes.motorcycle.case import case_from_rest, settled_start, smoothing, step_at_zero
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.parameters import ParameterSet
@@ -68,7 +67,7 @@ def step(options: Options) -> step_response.Setting:
 
 
 def settings(options: Options) -> dict[str, Any]:
-    """Return what the step is judged by."""
+    """Return the families of key figures of the step."""
     return {
         "static_gain": static_gain.Setting(
             "p_mc", 0.0, options.i_step, "A", smoothing=options.smoothing

@@ -14,18 +14,19 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from bywire.bench.experiment import Case, as_run
-from bywire.brakes.motorcycle.case import case_from_rest
-from bywire.brakes.motorcycle.linear.brake import Rational, theoretical, two_pole, with_slow_pair
-from bywire.brakes.motorcycle.methods.braking.fit import (
+from bywire.brakes.motorcycle.case import case_from_rest, settled_start
+from bywire.brakes.motorcycle.linear import Rational, theoretical, two_pole, with_slow_pair
+from bywire.brakes.motorcycle.methods.region_fit import (
     NAMES,
+    Region,
+    StepRecord,
     fit,
     five_of,
     over_frequency,
+    regions_of,
     response,
     unknowns_of,
 )
-from bywire.brakes.motorcycle.methods.braking.records import Region, StepRecord, regions_of
-from bywire.brakes.motorcycle.operating_point import settled_start
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current, travel_at
 from bywire.control.dither import breakaway_current
@@ -266,7 +267,7 @@ def sampled(model: Rational, interval: float) -> tuple[Array, Array]:
 
 
 def eq22_of(par: MotorcycleParameters, p: float, f_zero: float, f_pole: float) -> Rational:
-    """Return eq. (15)'s two slow poles at a pressure [Pa] with a slow pair [Hz] of its own."""
+    """Return eq. (15)'s two slow poles at a pressure [Pa] and an added slow pair [Hz]."""
     model = two_pole(par, p, travel_at(p, par))
     slow, fast = model.poles_hz
     T = [1.0 / (2.0 * math.pi * f) for f in (f_zero, slow, fast, f_pole)]
@@ -337,7 +338,7 @@ def identify(
     Raises
     ------
     ParameterError
-        When a region's records do not tell its unknowns.
+        When a region's records do not determine its unknowns.
 
     References
     ----------
@@ -377,13 +378,13 @@ def _without_pair(estimates: Mapping[str, Estimate]) -> tuple[str, ...]:
     if not names:
         return ()
     return (
-        f"at {' and '.join(names)} pressure a slow pair does not show: set model = 'eq-21', whose "
-        "T1 and T2 are then told better",
+        f"the data show no slow pair at {' and '.join(names)} pressure: set model = 'eq-21', "
+        "which determines T1 and T2 better",
     )
 
 
 def pair_shows(estimate: Estimate) -> bool:
-    """Return whether the slow pair's zero and pole differ by more than twice what noise makes."""
+    """Return whether zero and pole of the slow pair differ by more than two standard deviations."""
     names = [u.name for u in estimate.unknowns]
     if not {"tau_L", "T_L"} <= set(names):
         return not {"tau_L", "T_L"} & {k.unknown.name for k in estimate.kept}
@@ -430,7 +431,7 @@ def _checks(region: Region, estimate: Estimate) -> list[Check]:
             f"{name}.misfit_step",
             error / change,
             limit=_MISFIT_STEP,
-            note="step: rms of computed less measured over the change",
+            note="step: rms of computed minus measured over the change",
         ),
         Check(
             f"{name}.step_residual_over_noise",
@@ -446,7 +447,7 @@ def _checks(region: Region, estimate: Estimate) -> list[Check]:
                 f"{name}.misfit_sines",
                 float(np.sqrt(np.mean(size**2))),
                 limit=_MISFIT_SINES,
-                note="sines: rms of relative magnitude and phase [rad], computed less measured",
+                note="sines: rms of relative magnitude and phase [rad], computed minus measured",
             )
         )
     return checks
@@ -470,11 +471,13 @@ def _pressures(options: Options) -> dict[str, float]:
 
 
 def truth(par: MotorcycleParameters, options: Options) -> Mapping[str, float]:
-    """Return what the linear synthetic brake has; the whole brake is no eq. (22)."""
+    """Return the true values of the linear synthetic brake; the whole brake has none."""
     if options.plant == "brake":
         raise ParameterError(
-            "the whole brake has no true values of eq. (22): set plant = 'eq-22' to study what "
-            "the method gives back of what is put in"
+            "the whole brake has no true values of eq. (22): set plant = 'eq-22' to compare "
+            "estimates with the values of the simulation",
+            name="plant",
+            valid="'eq-22'",
         )
     values = {}
     for region, p in _pressures(options).items():

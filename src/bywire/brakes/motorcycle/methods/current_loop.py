@@ -23,7 +23,7 @@ from bywire.simulation.run import simulate
 
 
 class Options(LoopOptions):
-    """What is unknown, how the rotor is held, and the synthetic experiment."""
+    """Unknowns, torque that holds the rotor, and the synthetic experiment."""
 
     T_hold: Torque
     """torque by which the model's rotor is held: more than the motor has"""

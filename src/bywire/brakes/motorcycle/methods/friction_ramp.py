@@ -13,8 +13,9 @@ from pydantic import Field
 
 from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.experiments import friction_ramp
-from bywire.brakes.motorcycle.methods.stick_slip.shooting import Fitted, Shooting
-from bywire.brakes.motorcycle.methods.stick_slip.slips import (
+from bywire.brakes.motorcycle.methods.stick_slip import (
+    Fitted,
+    Shooting,
     Shot,
     cut_out,
     find_slips,
@@ -327,7 +328,7 @@ def identify(
                 "replay_nrmse",
                 nrmse,
                 limit=_LIMIT_REPLAY,
-                note="whole ramp, computed less measured, over the range",
+                note="whole ramp, computed minus measured, over the range",
             ),
             Check(
                 "zero_over_usual",
@@ -380,8 +381,9 @@ def _fitted(
     best = estimate(_problem(data, par, options, unknowns, at), start=at)
     if not any(name.startswith("seal.") for name in best.names):
         raise ParameterError(
-            "the slips tell nothing of the seal's friction with this current: check the units of "
-            "i and p_mc, and motor.K_e, gear and cylinder, which are taken as known"
+            "the slips do not determine the seal's friction with this current: check the units of "
+            "i and p_mc, and motor.K_e, gear and cylinder, which count as known",
+            name="i",
         )
     return led, best
 
@@ -428,8 +430,9 @@ def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:
     slips = find_slips(p, even_interval(t), options.least)
     if not slips:
         raise ParameterError(
-            f"the pressure shows no slip of more than {options.least / 1e5:g} bar: friction cannot "
-            "be learned from it; ramp the current slowly, up and down, without dither"
+            f"p_mc has no slip of more than least = {options.least / 1e5:g} bar, so that friction "
+            "cannot be estimated from it: ramp the current slowly, up and down, without dither",
+            name="p_mc",
         )
     return cut_out(t, p, i, slips, options.longest)
 

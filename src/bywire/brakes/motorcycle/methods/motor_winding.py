@@ -95,7 +95,9 @@ def identify(
     notes = (
         ()
         if turning
-        else ("the shaft does not turn: nothing tells K_e; let it turn, and measure its speed",)
+        else (
+            "the shaft does not turn, so that K_e is undetermined: turn it, and measure its speed",
+        )
     )
     return Identified(
         estimates={"winding": fit},
@@ -164,6 +166,6 @@ METHOD = Method(
     unknowns=_NAMES,
     several=True,
     simulated=tuple(Options.model_fields),
-    bench_note="the record was made with a voltage source, its rotor locked or at a speed of its "
-    "own; the bench's shaft is free, and does not replay it: take over the values alone",
+    bench_note="the record was made with a voltage source, its rotor locked or at a given speed; "
+    "the bench's shaft is free and cannot replay it: use only the values",
 )

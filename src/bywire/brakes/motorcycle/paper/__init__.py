@@ -1,1 +1,1 @@
-"""What the source states, beside what we compute."""
+"""Statements of the source, compared with our results."""

@@ -6,17 +6,27 @@ from collections.abc import Mapping
 from functools import cache
 
 from bywire.brakes.motorcycle.paper.facts import CITATION, FACTS
-from bywire.brakes.motorcycle.paper.measured.experiments import overshoots, stuck_at
-from bywire.brakes.motorcycle.paper.measured.misfit import Appraisal, appraised, predicted
-from bywire.brakes.motorcycle.paper.measured.statements import STATEMENTS, Statement, allowances
-from bywire.brakes.motorcycle.paper.measured.unknowns import FREE, HELD, PRIOR
+from bywire.brakes.motorcycle.paper.measured.estimation import (
+    FREE,
+    HELD,
+    PRIOR,
+    Appraisal,
+    appraised,
+    predicted,
+)
+from bywire.brakes.motorcycle.paper.measured.statements import (
+    STATEMENTS,
+    Statement,
+    allowances,
+    overshoots,
+    stuck_at,
+)
 from bywire.brakes.motorcycle.paper.runs import MAIN, PRINTED, Runs, parameters
 from bywire.identification.estimate import Kept
 from bywire.report.tables import Cell, Column, Table, text_table
 from bywire.report.wording import amount
-from bywire.reproduction.item import Item, compared, found
+from bywire.reproduction.item import Item, Quoted, RootCause, causes_of, compared, found
 from bywire.reproduction.reproduction import Part, Reproduction, Source, reproduced
-from bywire.reproduction.root_cause import Quoted, RootCause, causes_of
 
 NAME = "dardanelli2010-measured"
 SETS = {NAME: "", MAIN: "@calibrated", PRINTED: "@table1"}
@@ -37,7 +47,7 @@ def _best() -> Appraisal:
 
 
 def statements(runs: Runs) -> Part:
-    """Return every statement beside what the sets give."""
+    """Return every statement with the counterparts from the sets."""
     others = (MAIN, PRINTED)
     values: Values = {NAME: _best().computed}
     values |= dict(zip(others, predicted([parameters(name) for name in others]), strict=True))
@@ -60,7 +70,7 @@ def statements(runs: Runs) -> Part:
 
 
 def _item(s: Statement, name: str, value: float) -> Item:
-    """Return a statement beside what a set gives; what it was fitted to is no evidence for it."""
+    """Return a statement against a set; a statement that was fitted is no evidence for it."""
     r = s.residual(value)
     met = abs(r) <= 1.0
     fitted = name == NAME and met
@@ -102,7 +112,7 @@ def _side_by_side(values: Values) -> Table:
 
 
 def estimates(runs: Runs) -> Part:
-    """Return the parameters with intervals, what told them, and what nothing tells."""
+    """Return the parameters with intervals and deciding statements, and the undetermined ones."""
     best = _best()
     names = best.estimate.names
     ends = dict(zip(names, best.estimate.intervals().tolist(), strict=True))
@@ -113,7 +123,7 @@ def estimates(runs: Runs) -> Part:
             u.unit,
             best.estimate[u.name],
             f"95 % interval {ends[u.name][0]:.3g} to {ends[u.name][1]:.3g}; Table 1's set has "
-            f"{prior[u.name]:.3g}; told by {' and '.join(best.tellers(u.name))}",
+            f"{prior[u.name]:.3g}; told by {' and '.join(best.deciding_statements(u.name))}",
         )
         for u in best.estimate.unknowns
     ]
@@ -147,7 +157,7 @@ def _estimated(
             amount(prior[u.name], u.unit),
             amount(best.estimate[u.name], u.unit),
             f"{amount(ends[u.name][0], u.unit, 3)} to {amount(ends[u.name][1], u.unit, 3)}",
-            ", ".join(best.tellers(u.name)),
+            ", ".join(best.deciding_statements(u.name)),
             doubts.get(u.name, ""),
         )
         for u in best.estimate.unknowns

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bywire.brakes.motorcycle.linear.brake import Rational, first_orders
+from bywire.brakes.motorcycle.linear import Rational, first_orders
 from bywire.brakes.motorcycle.sets import dardanelli2010
 from bywire.reproduction.source_file import SourceFile
 

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from bywire.analysis.crossings import bandwidth
 from bywire.bench.running import Result
-from bywire.brakes.motorcycle.linear.pressure_loop import Rotor, current_loop
+from bywire.brakes.motorcycle.linear import Rotor, current_loop
 from bywire.brakes.motorcycle.paper.facts import FACTS
 from bywire.brakes.motorcycle.paper.runs import MAIN, PRINTED, Runs, parameters
 from bywire.report.step_response import step_response
 from bywire.reproduction.item import Item, compared, found
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import kpis
+from bywire.reproduction.reproduction import Exhibit, Part, kpis
 
 LOCKED = {"seal.T_pr": 10.0}
 """overrides that lock the rotor: no torque of this motor overcomes 10 N m"""

@@ -1,4 +1,4 @@
-"""Fig. 6: current step of 0.35 A at medium pressure; three models beside each other."""
+"""Fig. 6: current step of 0.35 A at medium pressure; three models compared."""
 
 from __future__ import annotations
 
@@ -8,18 +8,16 @@ import xarray as xr
 from bywire.bench.kpis import step_response
 from bywire.bench.kpis.families import evaluate
 from bywire.bench.running import Result
-from bywire.brakes.motorcycle.linear.brake import Rational, theoretical
-from bywire.brakes.motorcycle.methods.braking.records import averaged
+from bywire.brakes.motorcycle.linear import Rational, theoretical
+from bywire.brakes.motorcycle.methods.region_fit import averaged
 from bywire.brakes.motorcycle.paper.facts import FACTS, table4_model
-from bywire.brakes.motorcycle.paper.identified import identified_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, before, parameters
-from bywire.brakes.motorcycle.paper.table4 import step_peak
+from bywire.brakes.motorcycle.paper.table4 import identified_model, step_peak
 from bywire.core.typing import Array
 from bywire.report.panels import Panel, Role, Trace
 from bywire.report.time_traces import time_traces
 from bywire.reproduction.item import Fact, Item, compared, found
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import kpis, selected
+from bywire.reproduction.reproduction import Exhibit, Part, kpis, selected
 
 HEIGHT = FACTS["fig6_step"].value
 START = FACTS["fig6_start"].value * BAR
@@ -35,7 +33,7 @@ def part(runs: Runs) -> Part:
             "fig6.peak",
             FACTS["fig6_top"],
             (START + high) / BAR,
-            note="highest pressure of Table 4's medium model from 25 bar; paper beside paper, not "
+            note="highest pressure of Table 4's medium model from 25 bar; paper against paper, not "
             "judged",
         ),
         compared(
@@ -138,7 +136,7 @@ def _misfit(run: xr.Dataset, start: float) -> Item:
         "fig6.misfit.identified",
         "bar",
         float(np.sqrt(np.mean(means**2))) / BAR,
-        "rms over 4 s, dither averaged: nonlinear brake less the model identified on it",
+        "rms over 4 s, dither averaged: nonlinear brake minus the model identified on it",
     )
 
 

@@ -11,8 +11,7 @@ from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.report.energy_balance import energy_balance
 from bywire.reproduction.item import Fact, Item, compared, found
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import selected
+from bywire.reproduction.reproduction import Exhibit, Part, selected
 
 P_FROM = 37e5
 """pressure from which the brake is released [Pa], that of Fig. 7a"""
@@ -115,6 +114,6 @@ def _release(runs: Runs, name: str, law: str) -> xr.Dataset:
 
 
 def _energies(release: xr.Dataset) -> tuple[float, float]:
-    """Return the energy stored at the start less that at the end, and the work returned [J]."""
+    """Return the energy stored at the start minus that at the end, and the work returned [J]."""
     stored, work = release["E_stored"].values, release["W_shaft"].values
     return float(stored[0] - stored[-1]), float(work[0] - work[-1])

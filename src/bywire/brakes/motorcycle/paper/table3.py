@@ -57,7 +57,7 @@ def part(runs: Runs) -> Part:
     text = (
         "Table 3 is used as published; only the preload T_pr, which it omits, is ours. Where the "
         "curves are vertical the piston sticks: the torque is anything between both ends."
-    ) + _untold()
+    ) + _undetermined()
     exhibit = Exhibit(
         "fig4",
         lambda: stribeck_curve(curve),
@@ -109,7 +109,7 @@ def _identified() -> Identified:
 
 
 def _identified_items() -> list[Item]:
-    """Return Table 3's values, put in, beside what comes back."""
+    """Return the estimates against Table 3's values, with which the ramp was simulated."""
     estimate = _identified().estimates["seal friction"]
     ends = dict(zip(estimate.names, estimate.intervals().tolist(), strict=True))
     rows: list[Item] = []
@@ -124,7 +124,7 @@ def _identified_items() -> list[Item]:
                 fact,
                 estimate[label],
                 None,
-                "identified from our own ramp, where it was put in; 95 % interval "
+                "identified from our own ramp, which was simulated with it; 95 % interval "
                 f"{low:.4g} to {high:.4g}; the search began "
                 f"{100.0 * (OFF[name] - 1.0):+.0f} % off",
             )
@@ -132,13 +132,13 @@ def _identified_items() -> list[Item]:
     return rows
 
 
-def _untold() -> str:
-    """Return what the ramp does not tell."""
+def _undetermined() -> str:
+    """Return a sentence on the parameters that the ramp does not determine."""
     kept = _identified().estimates["seal friction"].kept
     if not kept:
         return ""
     names = " and ".join(k.unknown.name.removeprefix("seal.") for k in kept)
-    return f" The ramp of eq. (17), identified on our own brake, does not tell {names}."
+    return f" The ramp of eq. (17), identified on our own brake, does not determine {names}."
 
 
 def _identified_exhibit() -> Exhibit:

@@ -1,54 +1,353 @@
-"""Sizing of the motorcycle actuator: gear ratio and motor power for a bandwidth and a pressure."""
+"""Sizing of the motorcycle actuator: gear ratio and motor power for a bandwidth and a pressure.
+
+The pressure is given as a function of time; flow, travel, torque, current and voltage follow from
+the equations of the plant without any simulation.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import xarray as xr
 from pydantic import Field, model_validator
 
+from bywire.bench.experiment import Case, as_run
 from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.recording import record
+from bywire.brakes.motorcycle.case import case_from_rest
+from bywire.brakes.motorcycle.experiments import hard_braking
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
-from bywire.brakes.motorcycle.sizing import trial as actuator_trial
-from bywire.brakes.motorcycle.sizing.demand import (
-    Course,
-    Motion,
-    breakaway_current,
-    geared,
-    motion,
-    sine,
-    step,
-)
-from bywire.brakes.motorcycle.trim import highest_pressure
-from bywire.core.errors import ParameterError
+from bywire.brakes.motorcycle.trim import highest_pressure, travel_at
+from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Frequency, GearRatio, Pressure, Unit
 from bywire.core.typing import Array, Progress
 from bywire.data.labeled import labeled
+from bywire.plant import ball_screw_gear, brake_fluid, caliper, master_cylinder, pipeline
+from bywire.plant import seal_friction as seal
+from bywire.simulation.run import simulate
 from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, edge_warnings, require_ranges
 
-# Options and assumptions of the study of the motorcycle actuator's gear and motor.
+Par = MotorcycleParameters
+
+_POINTS = 721
+_DOUBLE_POLE = math.sqrt(math.sqrt(2.0) - 1.0)  # -3 dB frequency of 1/(1+s)^2, rad/s
+
+
+@dataclass(frozen=True)
+class Course:
+    """A demanded pressure p_mc, its derivatives, and the caliper pressure, shape (n,) each.
+
+    ``t``: times [s]; ``p``, ``rate``, ``bend``: pressure [Pa] and its first and second derivatives;
+    ``p_pd``: caliper pressure [Pa]; ``middle``: pressure [Pa] at which the compliances are taken.
+    """
+
+    t: Array
+    p: Array
+    rate: Array
+    bend: Array
+    p_pd: Array
+    middle: float
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Motion of the motor, shape (n,) each, SI.
+
+    ``omega``: speed [rad/s]; ``torque``: electromagnetic torque [N m]; ``inertia``: part of it that
+    accelerates rotor and piston [N m]; ``current``, ``voltage``: current [A] and voltage of the
+    winding [V], its inductance left out; ``available``: voltage that the bridge can give at this
+    current [V].
+    """
+
+    omega: Array
+    torque: Array
+    inertia: Array
+    current: Array
+    voltage: Array
+    available: Array
+
+    @property
+    def mechanical(self) -> Array:
+        """Mechanical power [W]."""
+        return self.torque * self.omega
+
+    @property
+    def electrical(self) -> Array:
+        """Electrical power at the motor [W]: copper loss and mechanical power."""
+        return self.voltage * self.current
+
+
+def sine(par: Par, top: float, amplitude: float, f: float) -> Course:
+    """Return one period of a sine of a frequency [Hz] whose crest is at a pressure ``top`` [Pa]."""
+    middle, w = top - amplitude, 2.0 * math.pi * f
+    t = np.linspace(0.0, 1.0 / f, _POINTS)
+    lagging = amplitude * np.exp(1j * w * t) / (1.0 + 1j * w * _lag(par, middle))
+    return Course(
+        t=t,
+        p=middle + amplitude * np.sin(w * t),
+        rate=amplitude * w * np.cos(w * t),
+        bend=-amplitude * w * w * np.sin(w * t),
+        p_pd=middle + lagging.imag,
+        middle=middle,
+    )
+
+
+def step(par: Par, p_from: float, p_to: float, bandwidth: float) -> Course:
+    r"""Return a step between two pressures [Pa] as a double pole of a bandwidth [Hz] answers it.
+
+    .. math:: p = p_0 + \Delta (1 - (1 + w t) e^{-w t}), \quad w = 2 \pi f / \sqrt{\sqrt 2 - 1}
+    """
+    middle, height = 0.5 * (p_from + p_to), p_to - p_from
+    w, a = 2.0 * math.pi * bandwidth / _DOUBLE_POLE, 1.0 / _lag(par, middle)
+    # The closed form divides by zero for a triple pole: keep lag and double pole apart.
+    w = w if abs(w / a - 1.0) > 1e-6 else w * (1.0 + 1e-6)
+    t = np.linspace(0.0, 10.0 / w, _POINTS)
+    slow, fast = np.exp(-w * t), np.exp(-a * t)
+    A, C = -(w * w) / (w - a) ** 2, -w * a / (a - w)
+    return Course(
+        t=t,
+        p=p_from + height * (1.0 - (1.0 + w * t) * slow),
+        rate=height * w * w * t * slow,
+        bend=height * w * w * (1.0 - w * t) * slow,
+        p_pd=p_from + height * (1.0 + A * fast + (C * t - 1.0 - A) * slow),
+        middle=middle,
+    )
+
+
+def motion(par: Par, course: Course) -> Motion:
+    r"""Return the motion of the motor while the pressure follows its course.
+
+    .. math::
+        A_{mc} v = C_{mc} \dot p_{mc} + q, \quad q = (p_{mc} - p_{pd})/K_{lf}, \quad
+        \eta_g T = k_g (A_{mc} p_{mc} + k_{damp} v) + T_{fr} + M' \dot\Omega
+
+    with eta_g = 1 for gear law "directional", whose loss is in T_fr. The compliances are those at
+    the middle of the course, the seals slide.
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eqs. (1), (8), (9), (11), (12) and (16).
+    """
+    k_g, cylinder = par.gear.k_g, par.master_cylinder
+    K_lf = pipeline.resistance(par.pipeline, par.fluid)
+    C_mc = _chamber_compliance(par, course.middle)
+    q_rate = (course.rate - _rate_of_caliper(par, course)) / K_lf
+    v = (C_mc * course.rate + (course.p - course.p_pd) / K_lf) / cylinder.A_mc
+    acceleration = (C_mc * course.bend + q_rate) / (cylinder.A_mc * k_g)
+    omega = v / k_g
+    force, rubbing = _load(par, course.p, v, omega)
+    limits = ball_screw_gear.friction_bounds(rubbing.T_p, rubbing.T_n, force, par.gear)
+    # Bounds are torques on the shaft; against its motion they add to what the motor must give.
+    friction = np.where(omega > 0, -np.asarray(limits.low), -np.asarray(limits.high))
+    friction = np.where(omega == 0, 0.0, friction)
+    efficiency = par.gear.eta_g if par.gear.law == "paper" else 1.0
+    inertia = ball_screw_gear.inertia(par.gear) * acceleration / efficiency
+    torque = (k_g * force + friction) / efficiency + inertia
+    current = torque / par.motor.K_e
+    D = par.bridge.D_max
+    return Motion(
+        omega=omega,
+        torque=torque,
+        inertia=inertia,
+        current=current,
+        voltage=par.motor.R_m * current + par.motor.K_e * omega,
+        available=D * (par.supply.V_bat - par.supply.R_bat * D * np.abs(current)),
+    )
+
+
+def breakaway_current(par: Par, p: float) -> float:
+    """Return the current [A] that holds a pressure [Pa] and moves the piston on from there."""
+    load, rest = _load(par, p, 0.0, 0.0)
+    limit = ball_screw_gear.friction_bounds(rest.T_p, rest.T_n, load, par.gear)
+    efficiency = par.gear.eta_g if par.gear.law == "paper" else 1.0
+    return float(par.gear.k_g * load - limit.low) / (efficiency * par.motor.K_e)
+
+
+def geared(par: Par, k_g: float) -> Par:
+    """Return the brake with another gear ratio [m/rad], seals and pistons unchanged.
+
+    The friction of the seals is stated as a torque at the shaft: as the force that it is, it grows
+    with the ratio, its viscous part with the square. The pressure controller's gains, current per
+    pressure, grow with the ratio too, so that the loop gain at low frequency stays.
+    """
+    r = k_g / par.gear.k_g
+    powers = {
+        "seal.T_pr": 1,
+        "seal.f_cfr_p": 1,
+        "seal.f_cfr_n": 1,
+        "seal.c": 1,
+        "seal.mu_T": 2,
+        "ecu.est_par.T_pr": 1,
+        "ecu.est_par.f_cfr_p": 1,
+        "ecu.pressure.k_p": 1,
+        "ecu.pressure.k_i": 1,
+        "ecu.pressure.k_d": 1,
+    }
+    values = par.flat()
+    return par.replace(
+        {name: values[name] * r**n for name, n in powers.items()} | {"gear.k_g": k_g}
+    )
+
+
+def _load(par: Par, p: Any, v: Any, omega: Any) -> tuple[Any, seal.Output]:
+    """Return the force on the piston and the friction of the seals, of numbers or of arrays."""
+    at = master_cylinder.Input(0.0, v, 0.0)
+    force = master_cylinder.output(master_cylinder.State(p), at, par.master_cylinder).force
+    return force, seal.output(seal.Input(omega, p), par.seal)
+
+
+def _lag(par: Par, p: float) -> float:
+    """Return the time constant of pipeline and caliper [s]."""
+    C_pd = caliper.mass(caliper.State(p), par.caliper, par.fluid)
+    return C_pd * pipeline.resistance(par.pipeline, par.fluid)
+
+
+def _rate_of_caliper(par: Par, course: Course) -> Array:
+    return (course.p - course.p_pd) / _lag(par, course.middle)
+
+
+def _chamber_compliance(par: Par, p: float) -> float:
+    at = master_cylinder.Input(x=travel_at(p, par), v=0.0, q=0.0)
+    volume = master_cylinder.volume(at, par.master_cylinder)
+    return brake_fluid.compliance(brake_fluid.Chamber(V=volume, p=p), par.fluid)
+
+
+# --- The sized actuator on the bench
+
+_WITHOUT_DITHER = {"ecu.dither.waveform": "off"}
+_STEP = 20e-6
+_SETTLE_PERIODS, _PERIODS = 10, 4
+_HARMONICS = 5  # of the recorded sine that the fit takes into account
+_ROUNDS, _CLOSE = 8, 0.01  # corrections of the demand's amplitude; relative error that ends them
+
+
+def sine_figures(label: str, par: Par, top: float, amplitude: float, f: float) -> list[Kpi]:
+    """Return key figures of a sine in pressure on the bench, relative to the calculation.
+
+    The loop may be slower than the frequency [Hz] of the sine. So mean and amplitude of the demand
+    are corrected until the pressure, without dither, has the required ones.
+    """
+    mean, swing = top - amplitude, amplitude
+    run, reached = _sine_run(par, mean, swing, f), 0.0
+    # The fundamental is nearly proportional to the demand: two or three corrections are enough.
+    for _ in range(_ROUNDS):
+        run = _sine_run(par, mean, swing, f)
+        middle, reached = _fitted(run, f)
+        offset = top - amplitude - middle
+        is_close = abs(reached / amplitude - 1.0) < _CLOSE and abs(offset) < _CLOSE * amplitude
+        if is_close or reached <= 0.0:
+            break
+        swing *= min(amplitude / reached, 3.0)
+        mean += offset
+    calculated = motion(par, sine(par, top, amplitude, f))
+    power = run["voltage"] * run["i"]
+    note = "" if abs(reached / amplitude - 1.0) < 3 * _CLOSE else "the amplitude is not reached"
+    text = "on the bench, dither off, over the calculated one"
+    return [
+        Kpi(f"{label}_bench_amplitude", reached, "Pa", "Amplitude of the pressure reached.", note),
+        Kpi(
+            f"{label}_bench_current",
+            float(run["i"].max()) / float(calculated.current.max()),
+            "1",
+            f"Largest current of that sine {text}.",
+            note,
+        ),
+        Kpi(
+            f"{label}_bench_speed",
+            float(np.abs(run["omega"]).max()) / float(np.abs(calculated.omega).max()),
+            "1",
+            f"Largest speed of that sine {text}.",
+            note,
+        ),
+        Kpi(
+            f"{label}_bench_power",
+            float(power.max()) / float(calculated.electrical.max()),
+            "1",
+            f"Largest electrical power of that sine {text}.",
+            note,
+        ),
+    ]
+
+
+def braking_figures(label: str, par: Par, p_from: float, p_to: float) -> list[Kpi]:
+    """Return key figures of experiment hard-braking between two pressures [Pa], dither as set."""
+    experiment = hard_braking.EXPERIMENT
+    following = {} if experiment.following is None else dict(experiment.following(par))
+    options = experiment.defaults.replace({"p_from": p_from, "p_to": p_to, **following})
+    (case,) = experiment.cases(par, options, None)
+    kpis = {kpi.name: kpi for kpi in experiment.judge({"run": _recorded(case)}, options)}
+    names = ("rise_time", "overshoot", "peak_current", "peak_power", "share_sat_current")
+    return [
+        Kpi(
+            f"{label}_braking_{name}",
+            kpis[name].value,
+            kpis[name].unit,
+            f"Hard braking: {kpis[name].definition}",
+            kpis[name].note,
+        )
+        for name in names
+    ]
+
+
+def _sine_run(par: Par, mean: float, swing: float, f: float) -> xr.Dataset:
+    w, settle = 2.0 * np.pi * f, _SETTLE_PERIODS / f + 0.5
+
+    def stimulus(t: Array) -> dict[str, Array]:
+        return {"p_set": mean + swing * np.sin(w * t)}
+
+    case = case_from_rest(
+        "sine",
+        par,
+        "pressure",
+        mean,
+        stimulus,
+        round(_PERIODS / f, 3),
+        _WITHOUT_DITHER,
+        settle=settle,
+    )
+    return _recorded(case)
+
+
+def _fitted(run: xr.Dataset, f: float) -> tuple[float, float]:
+    """Return mean and fundamental's amplitude of the pressure [Pa], by least squares."""
+    angle = 2.0 * np.pi * f * run["time"].values
+    waves = [wave(n * angle) for n in range(1, _HARMONICS + 1) for wave in (np.sin, np.cos)]
+    columns = np.column_stack([np.ones_like(angle), *waves])
+    coefficients = np.linalg.lstsq(columns, run["p_mc"].values, rcond=None)[0]
+    return float(coefficients[0]), float(np.hypot(coefficients[1], coefficients[2]))
+
+
+def _recorded(case: Case) -> xr.Dataset:
+    run = as_run(case, _STEP)
+    trajectory = simulate(run)
+    if trajectory.status == "interrupted":
+        raise KeyboardInterrupt
+    return record(run, trajectory, case.settle, case.keep, {})
+
+
+# --- The study
 
 Count = Annotated[int, Unit("1", 41.0), Field(ge=3, le=401)]
 
 ASSUMPTIONS = (
-    "The gear ratio varies; motor, rotor inertia, battery, pistons, fluid and efficiency stay.",
+    "The gear ratio varies; motor, rotor inertia, battery, pistons, fluid and efficiency do not.",
     "The seals' friction is a force at the piston: at the shaft it grows with the gear ratio.",
-    "The wanted pressure is reached exactly: flow through the pressure-volume curves of chamber, "
+    "The pressure follows its demand exactly: flow through the pressure-volume curves of chamber, "
     "pipeline and caliper gives the speed; pressure, friction, efficiency and inertia the torque.",
     "Compliances are those at the middle of the course; the winding's inductance is left out.",
-    "The seals slide; the current that breaks them away at the peak pressure must be there too.",
-    "Dither is left out of the calculation; its current at the peak pressure is listed.",
+    "The seals slide; the current that breaks them away at the peak pressure is also required.",
+    "The calculation neglects dither; its current at the peak pressure is listed.",
     "Limits: the pressure controller's current limit, and the bridge's voltage at that current.",
     "On the bench the pressure controller's gains grow with the gear ratio; they are not tuned.",
 )
 
 
 class Options(ParameterSet):
-    """What the actuator must do, and the designs to compare."""
+    """Requirements on the actuator, and the designs to compare."""
 
     bandwidth: Frequency
     """frequency at which a sine of the amplitude, or a step, is followed"""
@@ -57,9 +356,9 @@ class Options(ParameterSet):
     amplitude: Pressure
     """amplitude of the sine"""
     p_from: Pressure
-    """begin of the step"""
+    """start of the step"""
     demand: Literal["sine", "step"]
-    """what sizes the actuator"""
+    """demand that sizes the actuator"""
     k_g_min: GearRatio
     """smallest gear ratio"""
     k_g_max: GearRatio
@@ -85,10 +384,6 @@ class Options(ParameterSet):
         return self
 
 
-Par = MotorcycleParameters
-
-# Many gear ratios of the motorcycle actuator beside each other, as a dataset.
-
 SIZES = {
     "electrical": ("W", "largest electrical power"),
     "mechanical": ("W", "largest mechanical power"),
@@ -99,67 +394,7 @@ SIZES = {
     "current_share": ("1", "current over its limit"),
     "voltage_share": ("1", "voltage over what there is"),
 }
-"""unit and label of what a motion takes"""
-
-
-def sizes_of(par: Par, done: Motion, static: float) -> dict[str, float]:
-    """Return the largest values of a motion, SI.
-
-    Parameters
-    ----------
-    static
-        Current [A] that breaks the piston away at the peak pressure: torque, current and power
-        are at least what it takes.
-    """
-    torque = float(np.abs(done.torque).max())
-    current = max(torque / par.motor.K_e, static)
-    voltage = float(np.max(np.abs(done.voltage) / done.available))
-    return {
-        "electrical": max(float(done.electrical.max()), par.motor.R_m * static**2),
-        "mechanical": float(done.mechanical.max()),
-        "torque": max(torque, static * par.motor.K_e),
-        "speed": float(np.abs(done.omega).max()),
-        "current": current,
-        "inertia_share": float(np.abs(done.inertia).max()) / torque,
-        "current_share": current / par.ecu.pressure.i_max,
-        # Where no voltage is left at this current, the share would change its sign.
-        "voltage_share": voltage if bool((done.available > 0).all()) else np.inf,
-    }
-
-
-def mapped(
-    par: Par,
-    p_peak: float,
-    ratios: Array,
-    frequencies: Array,
-    course: Callable[[Par, float], Course],
-) -> xr.Dataset:
-    """Return what all designs take at all bandwidths.
-
-    Parameters
-    ----------
-    p_peak
-        Largest pressure [Pa], at which the seals must break away.
-    ratios, frequencies
-        Gear ratios [m/rad], shape (n,), and bandwidths [Hz], shape (m,).
-    course
-        ``course(par, f)``: the wanted pressure at a bandwidth.
-
-    Returns
-    -------
-    xarray.Dataset
-        Dimensions ``k_g`` and ``frequency``, the variables of `SIZES`.
-    """
-    rows: list[list[dict[str, float]]] = []
-    for k_g in ratios:
-        brake = geared(par, float(k_g))
-        static = breakaway_current(brake, p_peak)
-        rows.append(
-            [sizes_of(brake, motion(brake, course(brake, float(f))), static) for f in frequencies]
-        )
-    values = {name: [[sizes[name] for sizes in row] for row in rows] for name in SIZES}
-    axes = {"k_g": (ratios, "m/rad", "gear ratio"), "frequency": (frequencies, "Hz", "bandwidth")}
-    return labeled(axes, {name: (values[name], *SIZES[name]) for name in SIZES})
+"""unit and label of each size of a motion"""
 
 
 _ROWS = 13  # gear ratios of the table
@@ -169,7 +404,7 @@ _EXACT = 1e-12  # of the logarithm of a ratio or bandwidth that is searched
 
 
 def course(par: Par, options: Options, f: float, demand: str = "") -> Course:
-    """Return the wanted pressure at a bandwidth [Hz]."""
+    """Return the demanded pressure at a bandwidth [Hz]."""
     if (demand or options.demand) == "sine":
         return sine(par, options.p_peak, options.amplitude, f)
     return step(par, options.p_from, options.p_peak, f)
@@ -185,10 +420,12 @@ def compute(par: Par, options: Options, progress: Progress) -> Findings:
     """
     highest = highest_pressure(par)
     if not options.p_peak < highest:
-        raise ParameterError(
-            f"p_peak = {options.p_peak / 1e5:g} bar is not valid: it must be < "
-            f"{highest / 1e5:.4g} bar, where the piston meets its end stop: lower it, or move the "
-            "stop (master_cylinder.x_end)"
+        raise not_valid(
+            "p_peak",
+            f"{options.p_peak / 1e5:g} bar",
+            f"< {highest / 1e5:.4g} bar",
+            "where the piston meets its end stop: lower it, or move the stop "
+            "(master_cylinder.x_end)",
         )
     data = _mapped(
         par,
@@ -208,8 +445,8 @@ def compute(par: Par, options: Options, progress: Progress) -> Findings:
     warnings = _warnings(kpis, k_best, options)
     for n, (label, brake) in enumerate((("optimum", chosen), ("given", par))):
         progress("bench", 0.5 * n)
-        kpis += actuator_trial.sine_figures(label, brake, options.p_peak, options.amplitude, f)
-        kpis += actuator_trial.braking_figures(label, brake, options.p_from, options.p_peak)
+        kpis += sine_figures(label, brake, options.p_peak, options.amplitude, f)
+        kpis += braking_figures(label, brake, options.p_from, options.p_peak)
     progress("bench", 1.0)
     marks = (Mark("optimum", k_best, f), Mark("given gear ratio", par.gear.k_g, f))
     limits = {"current limit": ("current_share", 1.0), "voltage limit": ("voltage_share", 1.0)}
@@ -219,8 +456,28 @@ def compute(par: Par, options: Options, progress: Progress) -> Findings:
 
 
 def _at(par: Par, options: Options, f: float, demand: str = "") -> dict[str, float]:
-    done = motion(par, course(par, options, f, demand))
-    return sizes_of(par, done, breakaway_current(par, options.p_peak))
+    """Return the largest values of the motion at a bandwidth [Hz], SI, by the names of `SIZES`.
+
+    Torque, current and power include the breakaway of the piston at the peak pressure.
+    """
+    done, static = (
+        motion(par, course(par, options, f, demand)),
+        breakaway_current(par, options.p_peak),
+    )
+    torque = float(np.abs(done.torque).max())
+    current = max(torque / par.motor.K_e, static)
+    voltage = float(np.max(np.abs(done.voltage) / done.available))
+    return {
+        "electrical": max(float(done.electrical.max()), par.motor.R_m * static**2),
+        "mechanical": float(done.mechanical.max()),
+        "torque": max(torque, static * par.motor.K_e),
+        "speed": float(np.abs(done.omega).max()),
+        "current": current,
+        "inertia_share": float(np.abs(done.inertia).max()) / torque,
+        "current_share": current / par.ecu.pressure.i_max,
+        # Where no voltage is left at this current, the share would change its sign.
+        "voltage_share": voltage if bool((done.available > 0).all()) else np.inf,
+    }
 
 
 def _electrical(par: Par, options: Options) -> Array:
@@ -266,8 +523,8 @@ def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
         "inertia_share": "Largest torque of rotor and piston inertia over the largest torque.",
         "voltage_share": "Largest voltage over what the bridge gives at its current.",
     }
-    wanted = course(par, options, options.bandwidth)
-    copper = par.motor.R_m * np.mean(motion(par, wanted).current ** 2)
+    current = motion(par, course(par, options, options.bandwidth)).current
+    copper = par.motor.R_m * np.mean(current**2)
     dither = par.ecu.est_par
     A_dit = dither.k_brk_p * (dither.T_pr + dither.f_cfr_p * options.p_peak) / dither.K_e
     note = "" if par.ecu.dither.waveform != "off" else "dither is off"
@@ -296,13 +553,18 @@ def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
     ]
 
 
-def _mapped(par: Par, options: Options, ratios: int, frequencies: Array) -> xr.Dataset:
-    k_g = np.geomspace(options.k_g_min, options.k_g_max, ratios)
-    return mapped(par, options.p_peak, k_g, frequencies, lambda brake, f: course(brake, options, f))
+def _mapped(par: Par, options: Options, count: int, frequencies: Array) -> xr.Dataset:
+    """Return the variables of `SIZES` over so many gear ratios and bandwidths [Hz]."""
+    ratios = np.geomspace(options.k_g_min, options.k_g_max, count)
+    brakes = [geared(par, float(k_g)) for k_g in ratios]
+    rows = [[_at(brake, options, float(f)) for f in frequencies] for brake in brakes]
+    axes = {"k_g": (ratios, "m/rad", "gear ratio"), "frequency": (frequencies, "Hz", "bandwidth")}
+    values = {name: [[sizes[name] for sizes in row] for row in rows] for name in SIZES}
+    return labeled(axes, {name: (values[name], *SIZES[name]) for name in SIZES})
 
 
 def _cut(par: Par, options: Options) -> Cut:
-    """Return what changes along the gear ratio at the bandwidth wanted."""
+    """Return the sizes over the gear ratio at the required bandwidth."""
     row = _mapped(par, options, _ROWS, np.array([options.bandwidth])).isel(frequency=0)
     names = (
         "electrical",

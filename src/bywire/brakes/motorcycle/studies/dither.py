@@ -12,38 +12,34 @@ import xarray as xr
 from pydantic import Field, model_validator
 
 from bywire.bench.kpis.kpi import Kpi
-from bywire.brakes.motorcycle.dither.dithered_plant import dithered_plant
-from bywire.brakes.motorcycle.dither.map import (
+from bywire.brakes.motorcycle.dither import (
+    FIGURES,
     NAMES,
     Candidate,
     Grid,
-    best_of,
-    by_frequency,
-    by_pressure,
-    candidates,
-    figures_of,
-    law,
-    mapped,
-)
-from bywire.brakes.motorcycle.dither.trial import (
-    FIGURES,
     Trial,
     admissible_frequencies,
     area_ratios,
     attenuation,
+    best_of,
+    by_frequency,
+    by_pressure,
+    candidates,
+    dithered_plant,
+    figures_of,
+    law,
+    mapped,
     reach,
     tried,
     waveform,
 )
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import highest_pressure
-from bywire.core.errors import InputError, ParameterError, RunError
+from bywire.core.errors import InputError, RunError, not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Factor, Fraction, Frequency, Pressure, Unit
 from bywire.core.typing import Progress
 from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, require_ranges, variable
-
-# What a dither must do, and the dithers to compare.
 
 Count = Annotated[int, Unit("1", 8.0), Field(ge=3, le=101)]
 Node = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -54,12 +50,12 @@ ASSUMPTIONS = (
     "pressure to the set point from below and from above.",
     "The amplitude is the gain times the ECU's own eqs. (18) and (19): it follows the pressure.",
     "Friction counts as overcome when the share of the time stuck and the dead band left (mean "
-    "current from above less that from below, over the band in which the piston may rest) stay "
+    "current from above minus that from below, over the band in which the piston may rest) stay "
     "within their limits, at this gain and at all higher ones.",
-    "The price is the copper power beside that of the mean current, mean over the pressures; "
+    "The price is the copper power in excess of that of the mean current, mean over pressures; "
     "figures between two gains of the grid are interpolated.",
     "Periods are even numbers of the ECU's sample times.",
-    "Wear, noise and heat of motor and seals are left out.",
+    "Wear, noise and heat of motor and seals are neglected.",
 )
 
 
@@ -97,7 +93,7 @@ class Options(ParameterSet):
     def _ordered(self) -> Options:
         require_ranges(self, (("gain_min", "gain_max", "1"), ("f_min", "f_max", "Hz")))
         if any(not a < b for a, b in pairwise(self.pressures)):
-            raise ValueError("pressures must be given in ascending order, none twice")
+            raise ValueError("pressures must increase, without repetition")
         lowest = min(self.pressures)
         if not self.approach < lowest:
             raise ValueError(
@@ -136,7 +132,7 @@ _UNITS = {"distortion": "%", "copper": "W", "ripple_caliper": "Pa"}
 def compared(
     par: Par, grid: Grid, f: float, limits: Mapping[str, float], report: Callable[[float], None]
 ) -> Cut:
-    """Return what each waveform takes to overcome the friction at one frequency [Hz].
+    """Return the least gain of each waveform that overcomes the friction at one frequency [Hz].
 
     Each has the least gain that is enough at every pressure; copper power is the mean over the
     pressures, ripple the worst.
@@ -251,29 +247,32 @@ def limits_of(options: Options) -> dict[str, float]:
 
 
 def _require_reachable(par: Par, options: Options) -> None:
-    highest, wanted = highest_pressure(par), max(options.pressures) + options.approach
-    if not wanted < highest:
-        raise ParameterError(
-            f"pressures: {max(options.pressures) / 1e5:g} bar, approached from {wanted / 1e5:g} "
-            f"bar, is not valid: the piston meets its end stop at {highest / 1e5:.4g} bar"
+    highest, largest = highest_pressure(par), max(options.pressures)
+    if not largest + options.approach < highest:
+        raise not_valid(
+            "pressures",
+            f"{largest / 1e5:g} bar",
+            f"< {(highest - options.approach) / 1e5:.4g} bar",
+            f"so that the piston, which meets its end stop at {highest / 1e5:.4g} bar, is free "
+            f"when it approaches from {options.approach / 1e5:g} bar above",
         )
 
 
 def _kpis(
     par: Par, options: Options, grid: Grid, designs: dict[str, tuple[float, float]]
 ) -> list[Kpi]:
-    """Return what each design does on the bench: not interpolated."""
+    """Return the key figures of each design on the bench, not interpolated."""
     ratios = area_ratios(par, list(designs.values()))
     kpis = []
     for (label, (gain, f)), ratio in zip(designs.items(), ratios, strict=True):
-        each = [tried(par, p, (gain,), (f,), grid.trial) for p in grid.pressures]
+        figures_of_design = [tried(par, p, (gain,), (f,), grid.trial) for p in grid.pressures]
         kpis += [
             Kpi(f"{label}_gain", gain, "1", "Gain of the dither's law, eqs. (18) and (19)."),
             Kpi(f"{label}_frequency", f, "Hz", "Frequency of the dither."),
         ]
         limits = limits_of(options)
         for name, (unit, text) in FIGURES.items():
-            values = [float(figures[name][0, 0]) for figures in each]
+            values = [float(figures[name][0, 0]) for figures in figures_of_design]
             mean = name in ("copper", "current_rms")
             value = float(np.mean(values)) if mean else max(values)
             over = name in limits and value > limits[name] * 1.02  # interpolated designs scatter
@@ -300,7 +299,7 @@ def _kpis(
 
 
 def _plant(par: Par, label: str, gain: float, f: float, p: float) -> list[Kpi]:
-    """Return what friction under dither leaves of the plant's gain and speed."""
+    """Return gain and slowest pole of the plant under dither."""
     dithered = par.replace({"ecu.dither.gain": gain, "ecu.dither.f_dit": f})
     values, note = (math.nan, math.nan), ""
     try:
@@ -353,12 +352,12 @@ def _maps(
 
 
 def _limits(grid: Grid, each: list[Candidate], best: int | None) -> tuple[str, ...]:
-    """Return what binds."""
+    """Return the limits that decide."""
     if best is None:
         return ()
     chosen = each[best]
     texts = [
-        f"the gain of {chosen.gain:.3g} is asked for by the {NAMES[chosen.binding]} at "
+        f"the gain of {chosen.gain:.3g} is required by the {NAMES[chosen.binding]} at "
         f"{grid.pressures[chosen.decisive] / 1e5:g} bar"
     ]
     out = [

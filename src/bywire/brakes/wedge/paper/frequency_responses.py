@@ -20,8 +20,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
 from bywire.report.response_figures import Response, bode
 from bywire.reproduction.item import Item, compared, found
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs
+from bywire.reproduction.reproduction import Exhibit, Part, Runs
 from bywire.simulation.run import simulate
 
 if TYPE_CHECKING:

@@ -16,8 +16,7 @@ from bywire.brakes.wedge.paper.statements import (
     tan_alpha,
 )
 from bywire.reproduction.item import Fact, Item, compared, found
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs, kpis
+from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
 
 _AWAY = 0.2
 """friction coefficient far from the neutral point"""

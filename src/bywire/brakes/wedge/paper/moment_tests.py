@@ -22,8 +22,7 @@ from bywire.brakes.wedge.paper.statements import (
     standby,
 )
 from bywire.reproduction.item import Fact, Item, compared, found, reading
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs, kpis, peak
+from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis, peak
 
 _TURNS = 20
 """revolutions of the analysis of the oscillation"""

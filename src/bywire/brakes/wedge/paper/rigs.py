@@ -12,8 +12,7 @@ from bywire.brakes.wedge.paper.statements import FACTS, MAIN, parameters
 from bywire.plant import roller_screw
 from bywire.report.time_traces import time_traces
 from bywire.reproduction.item import Fact, Item, compared, found
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs, kpis
+from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
 
 _MICRON = 1e6
 """[N/m] in one N/um"""

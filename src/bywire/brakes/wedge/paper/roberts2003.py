@@ -6,10 +6,8 @@ from collections.abc import Iterable
 
 from bywire.brakes.wedge.paper import frequency_responses, hold, moment_tests, rigs, stability
 from bywire.brakes.wedge.paper.statements import ALLOWANCES, CITATION, MAIN
-from bywire.reproduction.item import Item
-from bywire.reproduction.reproduction import Reproduction, Source, reproduced
-from bywire.reproduction.root_cause import Quoted, RootCause, causes_of
-from bywire.reproduction.runs import Runs
+from bywire.reproduction.item import Item, Quoted, RootCause, causes_of
+from bywire.reproduction.reproduction import Reproduction, Runs, Source, reproduced
 
 PARTS = {
     "neutral point": stability.part,

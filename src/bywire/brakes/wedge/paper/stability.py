@@ -22,8 +22,7 @@ from bywire.brakes.wedge.paper.statements import (
 )
 from bywire.brakes.wedge.plants import MECHANICAL_STATES
 from bywire.reproduction.item import Fact, Item, compared, found, reading
-from bywire.reproduction.reproduction import Exhibit, Part
-from bywire.reproduction.runs import Runs, kpis
+from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

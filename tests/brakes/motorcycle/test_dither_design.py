@@ -7,14 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from bywire.brakes.motorcycle.dither.map import best_of, candidates, crossing, least
-from bywire.brakes.motorcycle.dither.trial import (
+from bywire.brakes.motorcycle.dither import (
     Trial,
     admissible_frequencies,
     area_ratios,
     attenuation,
+    best_of,
     breakaway_torques,
+    candidates,
+    crossing,
     dead_band,
+    least,
     needed_gain,
     reach,
     tried,
@@ -25,6 +28,7 @@ from bywire.control.dither import breakaway_current
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
 from bywire.report.range_figures import contour
+from raising import raises
 
 PAR = PARAMETER_SETS.find("dardanelli2010").parameters()
 SHORT = Trial(settle=2.0, window=0.5)
@@ -87,7 +91,7 @@ def test_periods_hold_even_numbers_of_samples() -> None:
     counts = [1.0 / (f * PAR.ecu.T_s) for f in found]
     assert counts == pytest.approx([2 * round(n / 2) for n in counts])
     assert 50.0 in [pytest.approx(f) for f in found]
-    with pytest.raises(ParameterError, match="even number of sample times"):
+    with raises(ParameterError, name="f_min"):
         admissible_frequencies(PAR, 51.0, 55.0, 3)
 
 
@@ -168,7 +172,7 @@ def test_what_no_dither_can_do_is_said() -> None:
     found = dither.compute(PAR, small, lambda label, share: None)
     assert "ripple at the caliper" in found.warnings[0]
     assert "optimum_gain" not in {one.name for one in found.kpis}
-    with pytest.raises(ParameterError, match="end stop"):
+    with raises(ParameterError, name="pressures", valid="< "):
         dither.compute(PAR, SMALL.replace({"pressures": (50e5,)}), lambda label, share: None)
     with pytest.raises(ParameterError, match="approach = 2 bar"):
         SMALL.replace({"pressures": (1e5,)})

@@ -1,1 +1,0 @@
-"""Dither: what it must do, what it costs, and the choice."""

@@ -1,1 +1,0 @@
-"""Dynamics of the braking system: records by pressure region, and the transfer function in them."""

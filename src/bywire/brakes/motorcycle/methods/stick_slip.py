@@ -1,0 +1,582 @@
+"""Stick-slip in a measured signal: every slip, shot from its own rest and laid over the record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import memory_at, state_at
+from bywire.core.callers import option
+from bywire.core.errors import ParameterError, not_valid
+from bywire.core.typing import Array
+from bywire.identification.equation import Equation, EquationError
+from bywire.identification.measured import noise_of
+from bywire.identification.unknown import Unknown
+from bywire.simulation.run import Run, simulate
+from bywire.simulation.sensitivity import simulate_with_sensitivities
+
+_WINDOW = 0.02  # s: over which a change counts as motion
+_SURE = 6.0  # standard deviations of that change
+_OVER_NOISE = 6.0  # standard deviations of the rest before: smaller changes are its noise
+_PAUSE = 0.05  # s: shorter rests belong to the slip around them
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A stretch of motion between two rests.
+
+    ``begin``, ``end``: samples at which the motion begins and ends (or the record does);
+    ``direction``: 1 for rising, -1 for falling; ``rest``: level at which the signal rested before.
+    """
+
+    begin: int
+    end: int
+    direction: int
+    rest: float
+
+
+def find_slips(values: Array, interval: float, least: float) -> list[Slip]:
+    """Return the slips of a signal.
+
+    ``values``: shape (n,); ``interval``: sample time [s]; ``least``: smallest change that counts,
+    if it also exceeds the noise of the rest before.
+    """
+    width = max(round(_WINDOW / interval), 1)
+    smooth = _moving_mean(values, width)
+    change = np.zeros(values.size)
+    change[width:-width] = smooth[2 * width :] - smooth[: -2 * width]
+    threshold = max(_SURE * noise_of(values) * np.sqrt(2.0 / width), 0.01 * least)
+    moving = np.abs(change) > threshold
+    slips = []
+    for begin, end in _stretches(moving, int(_PAUSE / interval)):
+        for first, last in _one_way(smooth, begin, end, least):
+            before = values[max(first - 5 * width, 0) : max(first - width, 1)]
+            if before.size < width:
+                continue  # the record does not show the level of the rest
+            travel = smooth[min(last, values.size - 1)] - before.mean()
+            if abs(travel) >= max(least, _OVER_NOISE * float(before.std())):
+                direction = 1 if travel > 0 else -1
+                slips.append(Slip(first, last, direction, float(before.mean())))
+    return slips
+
+
+def _moving_mean(values: Array, width: int) -> Array:
+    """Return the moving mean over a number of samples, shape (n,)."""
+    padded = np.pad(values, (width // 2, width - 1 - width // 2), mode="edge")
+    return np.convolve(padded, np.ones(width) / width, mode="valid")
+
+
+def _stretches(moving: NDArray[np.bool_], pause: int) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], moving.astype(int), [0]))))
+    stretches: list[tuple[int, int]] = []
+    for begin, end in edges.reshape(-1, 2).tolist():
+        if stretches and begin - stretches[-1][1] <= pause:
+            stretches[-1] = (stretches[-1][0], end)
+        else:
+            stretches.append((begin, end))
+    return stretches
+
+
+def _one_way(values: Array, begin: int, end: int, least: float) -> list[tuple[int, int]]:
+    """Split a stretch where it turns back by more than a slip's smallest change."""
+    part = values[begin:end]
+    top, low = int(np.argmax(part)), int(np.argmin(part))
+    rise, fall = part[top] - part[0], part[0] - part[low]
+    if top > 0 and rise > least and part[top] - part[-1] > least:
+        return [(begin, begin + top), *_one_way(values, begin + top, end, least)]
+    if low > 0 and fall > least and part[-1] - part[low] > least:
+        return [(begin, begin + low), *_one_way(values, begin + low, end, least)]
+    return [(begin, end)]
+
+
+# --- Shots: slips with their surroundings in the record
+
+_LEAD = 0.05
+"""rest before the measured onset [s]"""
+BEFORE = 0.01
+"""rest before the model breaks away [s]"""
+_LEAST = 8  # samples
+_COARSEST = 4e-3  # s
+_RESTED = 1.0  # s of rest from which its pressure and the ramp of the current are read
+_COMPARED = 0.9  # of a slip's way: its end, like its beginning, is up to the current's ripple
+_SMOOTHED = 0.02  # s
+_SEEN = 0.016  # s: over which the current is read, short as its ripple moves it
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A measured slip.
+
+    Parameters
+    ----------
+    slip
+        Where it lies.
+    time, pressure, current
+        Measured around it, from a little before its onset; shape (n,), SI.
+    rate
+        Of the current's ramp while the piston rested [A/s].
+    unrest
+        Standard deviation of the current from that ramp [A].
+    before, slope
+        Level [A] and rate [A/s] of the current at each time, from a line through what was
+        measured shortly before it; shape (n,).
+    seen
+        How many samples that line goes through.
+    steep
+        Rows in which the first half of the way is made.
+    """
+
+    slip: Slip
+    time: Array
+    pressure: Array
+    current: Array
+    rate: float
+    unrest: float
+    before: Array
+    slope: Array
+    seen: int
+    steep: int
+
+    @property
+    def interval(self) -> float:
+        """Sample time [s]."""
+        return float(f"{self.time[1] - self.time[0]:.9g}")
+
+    @property
+    def clock(self) -> Array:
+        """Time since the first row [s], shape (n,)."""
+        return np.arange(self.time.size, dtype=float) * self.interval
+
+
+def cut_out(
+    time: Array, pressure: Array, current: Array, slips: Sequence[Slip], longest: float
+) -> list[Shot]:
+    """Return the measured slips with their surroundings, up to the next onset.
+
+    Slips of too few samples, without a rest before, or without a ramp of the current toward them
+    are left out.
+
+    Raises
+    ------
+    ParameterError
+        When no slip remains, or the sample time is too long.
+    """
+    interval = float(time[1] - time[0])
+    if interval > _COARSEST:
+        raise not_valid(
+            "sample time",
+            f"{1e3 * interval:.3g} ms",
+            f"<= {1e3 * _COARSEST:g} ms",
+            "so that the record shows how slips begin",
+        )
+    shots = []
+    lead, most, rested = (int(span / interval) for span in (_LEAD, longest, _RESTED))
+    seen = max(round(_SEEN / interval), 4)
+    smooth = _moving_mean(pressure, max(round(_SMOOTHED / interval), 1))
+    for k, slip in enumerate(slips):
+        first = max(slip.begin - lead, 0)
+        until = slips[k + 1].begin - lead if k + 1 < len(slips) else time.size
+        compared, half = (_passed(smooth, slip, 2 * lead, share) for share in (_COMPARED, 0.5))
+        last = min(compared, slip.begin + most, until)
+        rest = slice(max(slip.begin - rested, slips[k - 1].end + lead if k else 0), slip.begin)
+        if min(last - first, rest.stop - rest.start) < _LEAST:
+            continue
+        rows = slice(first, last)
+        level, slope = _lines_before(current, first, last, seen)
+        line = np.polynomial.Polynomial.fit(time[rest], current[rest], 1)
+        unrest = float(np.std(current[rest] - line(time[rest])))
+        rate = float(line.deriv()(time[first]))
+        if rate * slip.direction <= 0.0:
+            continue
+        from_rest = replace(slip, rest=float(pressure[rest].mean()))
+        shot = Shot(
+            from_rest,
+            time[rows],
+            pressure[rows],
+            current[rows],
+            rate,
+            unrest,
+            level,
+            slope / interval,
+            seen,
+            min(half, last) - first,
+        )
+        shots.append(shot)
+    if not shots:
+        raise ParameterError(
+            f"none of the {len(slips)} slips has {_LEAST} samples, a rest before it, and a current "
+            "that ramps toward it: they are noise, or the signal's unit is wrong; check the unit, "
+            f"and raise the smallest rise of a slip ({option('options', {'least': '...'})})",
+            name="least",
+        )
+    return shots
+
+
+def _passed(values: Array, slip: Slip, rest: int, share: float) -> int:
+    """Return the sample at which a slip has covered a share of its way.
+
+    The values must be smooth: the first noisy sample beyond would be early.
+    """
+    end = float(values[slip.end : slip.end + rest].mean())
+    beyond = slip.direction * (values[slip.begin :] - slip.rest) > share * abs(end - slip.rest)
+    return slip.begin + int(np.argmax(beyond))
+
+
+def _lines_before(values: Array, first: int, last: int, seen: int) -> tuple[Array, Array]:
+    """Return level, and change per sample, at each sample of a line through those before it."""
+    at = np.arange(1 - seen, 1, dtype=float)
+    centered = at - at.mean()
+    slope = centered / (centered @ centered)
+    level = 1.0 / seen - at.mean() * slope
+    padded = np.concatenate((np.full(max(seen - 1 - first, 0), values[0]), values[:last]))
+    windows = np.lib.stride_tricks.sliding_window_view(padded[-(last - first + seen - 1) :], seen)
+    return np.asarray(windows @ level), np.asarray(windows @ slope)
+
+
+def onset_of(shot: Shot, shift: float) -> tuple[float, float]:
+    """Return level [A] and rate [A/s] of the measured current at an instant of a shot.
+
+    The rate is at least the ramp's, which drives the piston to breakaway and on.
+    """
+    level, slope = (float(np.interp(shift, shot.clock, v)) for v in (shot.before, shot.slope))
+    way = float(np.sign(shot.rate)) or float(shot.slip.direction)
+    return level, way * max(way * slope, way * shot.rate)
+
+
+def require_calm(shots: Sequence[Shot], noise: float, most: float) -> None:
+    """Refuse a current that does not follow its ramp while the piston rests.
+
+    ``noise``: standard deviation of the current's measurement [A]; ``most``: largest standard
+    deviation of the current itself [A].
+    """
+    unrest = float(np.median([np.sqrt(max(s.unrest**2 - noise**2, 0.0)) for s in shots]))
+    if unrest > most:
+        raise ParameterError(
+            f"between the slips the current varies by {unrest:.3g} A (standard deviation) around "
+            f"its ramp: it must be <= {most:.3g} A; switch the dither off, and check the unit of i",
+            name="i",
+            value=f"{unrest:.3g} A",
+            valid=f"<= {most:.3g} A",
+        )
+
+
+def require_reachable(shots: Sequence[Shot], par: MotorcycleParameters) -> None:
+    """Refuse rests at a pressure that the brake of these parameters cannot hold."""
+    highest = max(shot.slip.rest for shot in shots)
+    try:
+        state_at(max(highest, 0.0), par)
+    except ParameterError as error:
+        raise ParameterError(
+            f"the measured pressure rests at {highest / 1e5:.4g} bar, which this brake cannot "
+            f"hold: check the unit of p_mc, and the parameters ({error})",
+            name="p_mc",
+            value=f"{highest / 1e5:.4g} bar",
+            valid=error.valid,
+        ) from None
+
+
+# --- Shooting
+
+_ROUNDS = 12  # of Newton
+
+
+def overlaid(shot: Shot, p: Array) -> tuple[Array, Array, float]:
+    """Return computed minus measured pressure, the computed speed, and the shift between them.
+
+    Parameters
+    ----------
+    p
+        Computed pressure [Pa], shape (n,); moved in time to where it lies best.
+    """
+    shift = _best_shift(shot, p, shot.time.size)
+    r, v = _laid_over(shot, p, shift)
+    return r, v, shift
+
+
+def _best_shift(shot: Shot, p: Array, rows: int) -> float:
+    """Return by how much later the computed slip lies on the measured one [s] (Gauss, Newton).
+
+    Compared are the first rows.
+    """
+    t = shot.clock
+    shift = _half_way(t, shot.pressure, shot.slip) - _half_way(t, p, shot.slip)
+    for _ in range(_ROUNDS):
+        r, v = (part[:rows] for part in _laid_over(shot, p, shift))
+        size = float(v @ v)
+        if size == 0.0:
+            break
+        change = float(v @ r) / size
+        shift += float(np.clip(change, -_LEAD, _LEAD))
+        if abs(change) < 1e-9:
+            break
+    return shift
+
+
+def _laid_over(shot: Shot, p: Array, shift: float) -> tuple[Array, Array]:
+    """Return computed minus measured pressure with the computed one later, and its speed."""
+    t = shot.clock
+    at = t - shift
+    v = np.interp(at, t, np.gradient(p, shot.interval))
+    v[(at <= 0.0) | (at >= t[-1])] = 0.0
+    return np.interp(at, t, p) - shot.pressure, v
+
+
+def _half_way(t: Array, p: Array, slip: Slip) -> float:
+    """Return when a slip has gone half of its way [s]."""
+    middle = 0.5 * (p[0] + p[-1])
+    beyond = np.flatnonzero(slip.direction * (p - middle) > 0.0)
+    return float(t[beyond[0]]) if beyond.size else float(t[-1])
+
+
+# --- Shooting
+# A fit to the whole pressure curve fails from starts a few percent off: a slip that begins too
+# early or too late costs as much as one that is not there. So each slip is run by itself, from the
+# rest that was measured, beginning where the model breaks away, and moved in time to where it lies
+# best on the measured one. The current at breakaway is a separate residual.
+#
+# The run's demand ramps through the model's own breakaway current, and the modeled control answers
+# to the motor's induced voltage: the current dips as it did on the bench, at the right time. From
+# where the slip has begun, the demand is corrected by how far the measured current lies beside
+# that.
+
+_SMOOTHED_SHOT = 0.01  # s: over which the measured current is
+_BEGUN = 0.02  # of a slip: before, the current's noise would decide when the model breaks away
+_BEGUN_AT = 2e3  # Pa: of a long one
+_ALIGNED = 2  # times that the measured current is laid over the slip which it drives
+_DIP = 0.1  # s: how long the current dips as a slip begins
+_LEAST_LATE = 20  # samples that a line is laid through
+_I_SET = MotorcycleBrake().Stimulus._fields.index("i_set")
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A slip's runs with the measured current.
+
+    Parameters
+    ----------
+    calm
+        Driven by a line through the current once it no longer dips: its derivatives do not know
+        the current's noise, which would bias what they estimate.
+    sampled
+        Driven by the current as it was measured.
+    first
+        Row from which both are driven.
+    onset
+        When the model breaks away [s].
+    """
+
+    calm: Run
+    sampled: Run
+    first: int
+    onset: float
+
+
+def _driven_by(ramp: Run, shot: Shot, current: float, zero: float) -> Driven:
+    """Return a slip's run, driven by its ramp, as the measured current drives it.
+
+    ``ramp``: its demand ramps through the current that breaks the model away; ``shot``: the
+    measured slip; ``current``: that breaks the model away [A]; ``zero``: reading of the current's
+    sensor without current [A].
+    """
+    middle = shot.clock + 0.5 * shot.interval
+    width = 2 * int(0.5 * _SMOOTHED_SHOT / shot.interval) + 1
+    measured = _moving_mean(shot.current - zero, width)
+    sampled, more, first, onset = ramp, np.zeros(middle.size), 0, BEFORE
+    for _ in range(_ALIGNED):
+        computed = simulate(sampled, ("p_mc", "i", "omega"))
+        p, i = computed["p_mc"], _moving_mean(computed["i"], width)
+        shift = _best_shift(shot, p, shot.steep)
+        rests = max(int(np.argmax(computed["omega"] != 0.0)) - 1, 0)
+        onset = float(shot.clock[rests] + (current - computed["i"][rests]) / shot.rate)
+        travel = np.abs(p - p[0])
+        first = int(np.argmax(travel > min(_BEGUN * travel.max(), _BEGUN_AT)))
+        target = np.interp(np.asarray(middle + shift), shot.clock, measured)
+        more = more + target - np.interp(middle, shot.clock, i)
+        more[:first] = 0.0
+        sampled = replace(ramp, stimulus=_with_more(ramp, more))
+    dipped = first + round(_DIP / shot.interval)
+    calm, late = sampled, slice(dipped, int((shot.clock[-1] - shift) / shot.interval))
+    if late.stop - late.start >= _LEAST_LATE:
+        line = np.polynomial.Polynomial.fit(middle[late], more[late], 1)
+        more[dipped:] = line(middle[dipped:])
+        calm = replace(ramp, stimulus=_with_more(ramp, more))
+    return Driven(calm, sampled, first, onset)
+
+
+def _with_more(run: Run, more: Array) -> Callable[[Array], Array]:
+    """Return the run's stimulus with more demand at each of its intervals."""
+    interval = run.record
+    demand = run.stimulus(np.arange(more.size, dtype=np.float64) * interval)[:, _I_SET]
+    return partial(held, demand + more, interval)
+
+
+def held(ramp: Array, interval: float, at: Array) -> Array:
+    """Return the stimulus whose demand is held over each interval."""
+    fields = MotorcycleBrake().Stimulus._fields
+    rows = np.zeros((at.size, len(fields)))
+    index = np.clip(np.floor(at / interval + 1e-6).astype(int), 0, ramp.size - 1)
+    rows[:, _I_SET] = ramp[index]
+    return rows
+
+
+_MORE = 1e-3  # A: with which the answer to an offset is computed
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A slip of the model, laid over the measured one.
+
+    Parameters
+    ----------
+    residuals
+        Computed minus measured pressure [Pa], shape (n,).
+    slopes
+        Their derivatives by the unknowns with the shift at its best, shape (n, p).
+    by_current
+        Derivative of the residuals by an offset of the current along the slip [Pa/A], shape (n,).
+    answer, speed
+        The same with the shift kept [Pa/A], and how fast the pressure moves [Pa/s], shape (n,).
+    breakaway, breakaway_slopes
+        Measured minus computed current at the instant of breaking away [A], and its
+        derivatives, shape (p,).
+    """
+
+    residuals: Array
+    slopes: Array
+    by_current: Array
+    answer: Array
+    speed: Array
+    breakaway: float
+    breakaway_slopes: Array
+
+
+class Shooting:
+    """Runs slips of the motorcycle brake for values of the unknowns.
+
+    ``par``: everything that is known; ``unknowns``: friction parameters; ``step``: substep [s].
+    """
+
+    def __init__(
+        self,
+        par: MotorcycleParameters,
+        unknowns: Sequence[Unknown],
+        step: float = 20e-6,
+    ) -> None:
+        self.par = par.replace(
+            {
+                "drive.mode": "current",
+                "ecu.dither.waveform": "off",
+                "adc.law": "ideal",
+                "adc.noise": 0.0,
+            }
+        )
+        self._source = par.replace({"drive.mode": "current-source"})
+        self.names = tuple(u.name for u in unknowns)
+        self.count = len(self.names)
+        self.model, self.step = MotorcycleBrake(), step
+        self._error = EquationError(Equation(self.model, "omega", "alpha"), self._source, unknowns)
+
+    def breakaway(self, rest: float, direction: int, values: Array) -> tuple[float, Array]:
+        """Return the current [A] that breaks away from a rest [Pa], and its derivatives.
+
+        Where motor, pressure and breakaway torque balance: the equation of motion without
+        motion, which is affine in the current.
+        """
+        columns = self._error.at(
+            state_at(max(rest, 0.0), self._source)._replace(omega=direction * 1e-12),
+            memory_at(max(rest, 0.0), self._source),
+            "i_source",
+            (0.0, 1.0),
+        )
+        e, slopes = self._error(columns, values)
+        per_ampere = e[1] - e[0]
+        return -e[0] / per_ampere, -slopes[0] / per_ampere
+
+    def run(self, shot: Shot, values: Array) -> tuple[Run, float, Array]:
+        """Return the run of one slip, the current [A] it breaks away at, and its derivatives.
+
+        The demand ramps past that current as the measured one did; the control answers to what
+        the motor induces, as it did on the bench.
+        """
+        slip, interval = shot.slip, shot.interval
+        current, current_slopes = self.breakaway(slip.rest, slip.direction, values)
+        par = self.par.replace(dict(zip(self.names, values.tolist(), strict=True)))
+        after = shot.clock + 0.5 * interval - BEFORE  # what is held over an interval, without lag
+        demand = current + shot.rate * after
+        rest, start = max(slip.rest, 0.0), float(demand[0])
+        run = Run(
+            self.model,
+            par,
+            state_at(rest, par, start),
+            memory_at(rest, par, start),
+            partial(held, demand, interval),
+            (demand.size - 1) * interval,
+            self.step,
+            interval,
+        )
+        return run, current, current_slopes
+
+    def fit(self, shot: Shot, values: Array, zero: float | None = None) -> Fitted:
+        """Run one slip and lay it over the measured one.
+
+        Parameters
+        ----------
+        values
+            Of the unknowns.
+        zero
+            Reading of the current's sensor without current [A]. The slip is then driven by the
+            measured current once it has begun; without, by its ramp alone.
+        """
+        run, current, current_slopes = self.run(shot, values)
+        driven = None if zero is None else _driven_by(run, shot, current, zero)
+        if driven is not None:
+            run = driven.calm
+        state, memory = self._start_slopes(run, shot)
+        computed = simulate_with_sensitivities(
+            run, [*self.names, "stimulus.i_set"], ("p_mc",), state, memory
+        )
+        p = computed.trajectory["p_mc"]
+        answer = np.zeros(p.size)
+        if driven is not None:
+            offset = np.where(np.arange(p.size) >= driven.first, _MORE, 0.0)
+            more = simulate(replace(run, stimulus=_with_more(run, offset)), ("p_mc",))["p_mc"]
+            answer = (more - p) / _MORE
+            p = simulate(driven.sampled, ("p_mc",))["p_mc"]
+        r, v, shift = overlaid(shot, p)
+        # the demand begins at the breakaway current, and goes on as measured
+        by_parameters, all_along = computed.derivatives[:, 0, :-1], computed.derivatives[:, 0, -1]
+        slopes = by_parameters + np.outer(all_along - answer, current_slopes)
+        at = shot.clock - shift
+        kept = np.column_stack([np.interp(at, shot.clock, c) for c in (*slopes.T, answer)])
+        kept[at < 0.0] = 0.0
+        shift_slopes = (v @ kept) / max(float(v @ v), 1e-300)
+        J = kept - np.outer(v, shift_slopes)
+        onset = shift + (BEFORE if driven is None else driven.onset)
+        level, rate = onset_of(shot, onset)
+        return Fitted(
+            residuals=r,
+            slopes=J[:, :-1],
+            by_current=J[:, -1],
+            answer=kept[:, -1],
+            speed=v,
+            breakaway=level - current,
+            breakaway_slopes=rate * shift_slopes[:-1] - current_slopes,
+        )
+
+    def _start_slopes(self, run: Run, shot: Shot) -> tuple[Array, Array]:
+        """Return derivatives of the start by the unknowns, and by an offset of the demand."""
+        rest, start = max(shot.slip.rest, 0.0), float(run.state.i)
+
+        def at(current: float) -> Array:
+            both = (*state_at(rest, self.par, current), *memory_at(rest, self.par, current))
+            return np.array(both)
+
+        slopes = np.zeros((len(run.state) + len(run.memory), self.count + 1))
+        slopes[:, -1] = (at(start + _MORE) - at(start - _MORE)) / (2.0 * _MORE)
+        return slopes[: len(run.state)], slopes[len(run.state) :]

@@ -1,1 +1,0 @@
-"""Friction from stick and slip: slips found, shot one by one, and the curve that they give."""
