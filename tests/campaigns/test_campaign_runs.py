@@ -414,3 +414,23 @@ def test_harm_done_by_the_reaction_is_counted_run_by_run(campaign):
     calm = FaultCampaign(CampaignFindings(plan, campaign.findings.healthy, faults[1:3]))
     assert not calm.warnings
     assert "headline" not in calm.as_object()
+
+
+def test_a_campaign_warns_of_what_its_runs_warn_of(campaign, tmp_path):
+    text = SMALL.replace('"motor.R_m" = "+-10 %"\n', "", 1)
+    text = text.replace("[vary]", '"pressure_sensor.p_high" = "34 bar"\n[vary]', 1)
+    text = text.replace(
+        'only = ["pressure.stuck", "battery.lost", "motor.hot",', 'only = ["motor.hot",'
+    )
+    text = text[: text.index("[values]")] + text[text.index("[[criteria]]") :]
+    text = text.replace('["motor.hot", "ecu.frozen", "bridge.late", "fluid.cold"]', '["motor.hot"]')
+    (tmp_path / "clipped.toml").write_text(text.replace("healthy = 8", "healthy = 4"))
+    found = bywire.run_faults(tmp_path / "clipped.toml")
+    assert any(
+        "healthy run: the pressure leaves the sensor's range" in each for each in found.warnings
+    )
+    assert not campaign.warnings or "healthy run" not in " ".join(campaign.warnings)
+    doubtful = replace(campaign.findings.faults[0], doubts=("3 substeps hit the cap",))
+    findings = replace(campaign.findings, faults=(doubtful, *campaign.findings.faults[1:]))
+    assert findings.doubts == ("runs with 1 of the faults: 3 substeps hit the cap",)
+    assert findings.doubts[0] in FaultCampaign(findings).warnings

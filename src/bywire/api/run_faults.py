@@ -35,6 +35,8 @@ from bywire.report.wording import amount, clean
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from bywire.bench.running import Result
+
 R = TypeVar("R")
 
 
@@ -121,10 +123,13 @@ class FaultCampaign(Answer):
         Of every fault: what it does, when it is too much, when it is seen; times in s.
     folder
         Where its outcomes lie; None where they are not kept.
+    nominal
+        The bench without faults, run; None for what is not read from a run.
     """
 
     findings: CampaignFindings
     folder: Path | None = None
+    nominal: Result | None = None
 
     def __repr__(self) -> str:
         plan = self.findings.plan
@@ -132,8 +137,14 @@ class FaultCampaign(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """What the reaction makes worse."""
-        return list(self.findings.harm_of_reaction())
+        """Harm of the reaction, and warnings of the healthy run and of the solver."""
+        healthy = [] if self.nominal is None else self.nominal.warnings
+        return [
+            *self.findings.harm_of_reaction(),
+            *self.findings.plan.bench.outdated,
+            *(f"healthy run: {text}" for text in healthy),
+            *self.findings.doubts,
+        ]
 
     @property
     def notes(self) -> list[str]:
@@ -188,11 +199,11 @@ class FaultCampaign(Answer):
             banner=self._banner(),
             record="report.json",
             changes=subject.changes,
-            headline=_sentences(self.warnings),
+            headline=_sentences(self.findings.harm_of_reaction()),
         )
 
     def _banner(self) -> Banner:
-        coverage, harm = self.findings.coverage, self.warnings
+        coverage, harm = self.findings.coverage, self.findings.harm_of_reaction()
         text = (
             "no fault is dangerous in this maneuver"
             if math.isnan(coverage)

@@ -130,7 +130,7 @@ def watch(recording: xr.Dataset, run: Run, trajectory: Trajectory) -> list[str]:
     """Return warnings on a recording: ranges of validity, end stops, solver problems, energies."""
     if not recording.sizes["time"]:  # interrupted before the first row
         return []
-    doubts = _solver_doubts(trajectory.doubt, trajectory.unsettled)
+    doubts = solver_doubts(trajectory.doubt, trajectory.unsettled)
     return [*doubts, *energy_doubts(recording, [run]), *run.model.watch(recording, run.par)]
 
 
@@ -142,7 +142,7 @@ def watch_cases(
     ``rows``: rows of all runs; ``unsettled``: substeps of each that hit the cap of the contacts;
     ``books``: `energy_doubts` of each.
     """
-    solver = map(_solver_doubts, doubts_of(runs), unsettled)
+    solver = map(solver_doubts, doubts_of(runs), unsettled)
     model, pars = runs[0].model, [run.par for run in runs]
     rows.silent = model.silent(rows, pars)
     asked = set(model.may_warn(rows, pars))
@@ -152,7 +152,8 @@ def watch_cases(
     ]
 
 
-def _solver_doubts(doubt: str, unsettled: int) -> list[str]:
+def solver_doubts(doubt: str, unsettled: int) -> list[str]:
+    """Return warnings of a run's solver; ``unsettled``: substeps that hit the contacts' cap."""
     doubts = [doubt.replace("; ", ", ")] if doubt else []  # semicolons separate warnings
     if unsettled:
         doubts.append(

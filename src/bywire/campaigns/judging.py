@@ -13,6 +13,7 @@ import numpy as np
 from bywire.bench.experiment import Case, FaultyCase, as_run
 from bywire.bench.faults.fault_section import Injection
 from bywire.bench.faults.injected import injected
+from bywire.bench.recording import solver_doubts
 from bywire.campaigns.plan import CampaignPlan, Failing, touch_alike
 from bywire.campaigns.residual import NEVER, detected, threshold
 from bywire.core.errors import ParameterError
@@ -36,10 +37,13 @@ class Traces:
         Of the rows [s], shape (rows,).
     signals
         By name, shape (cases, rows) each.
+    doubts
+        Warnings of the solver, each once.
     """
 
     time: Array
     signals: dict[str, Array]
+    doubts: tuple[str, ...] = ()
 
     def of(self, cases: Sequence[int]) -> Traces:
         """Return the signals of some of the runs."""
@@ -126,7 +130,8 @@ def _traces(plan: CampaignPlan, cases: Sequence[Case], samples: Sequence[int]) -
     time = np.round(time[begin:], 12)
     for task in plan.taps[1]:
         signals[f"missed_{task}"] = np.array([_missed(each, task, time) for each in cases])
-    return Traces(time, signals)
+    doubts = (text for each in computed for text in solver_doubts(each.doubt, each.unsettled))
+    return Traces(time, signals, tuple(dict.fromkeys(doubts)))
 
 
 def _computed(runs: Sequence[Run], signals: Sequence[str], engine: str) -> Sequence[Trajectory]:
@@ -213,6 +218,7 @@ def judge_fault(plan: CampaignPlan, failing: Failing, healthy: Healthy) -> Outco
         "reached": _reached(plan, traces, beside, onsets),
         "extremes": _extremes(plan, traces, beside, onsets),
         "detected": {name: _plain(np.array(column)) for name, column in seen.items()},
+        "doubts": list(traces.doubts),
     }
     if plan.reaction is not None:
         outcome["reacted"] = _with_reaction(plan, failing, samples, earliest, beside)

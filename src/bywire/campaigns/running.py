@@ -47,6 +47,8 @@ class FaultFinding:
         Which runs these are.
     delay
         From detection until the reaction takes effect [s]; 0 where there is none.
+    doubts
+        Warnings of the solver in these runs.
     """
 
     failing: Failing
@@ -56,6 +58,7 @@ class FaultFinding:
     reacted: Mapping[str, Array]
     answered: Sequence[int] = ()
     delay: float = 0.0
+    doubts: Sequence[str] = ()
 
     @property
     def cases(self) -> int:
@@ -198,6 +201,15 @@ class CampaignFindings:
         plan = self.plan
         return share(self.healthy.any_alarm, plan.healthy - plan.tuning, CONFIDENCE)
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Warnings of the solver, with the number of faults in whose runs it gave them."""
+        counts = Counter(text for each in self.faults for text in dict.fromkeys(each.doubts))
+        return (
+            *(f"healthy runs: {text}" for text in self.healthy.traces.doubts),
+            *(f"runs with {n} of the faults: {text}" for text, n in counts.items()),
+        )
+
     def kinds(self) -> Counter[Class]:
         """Return how many faults are of each class."""
         return Counter(each.kind for each in self.faults)
@@ -256,6 +268,7 @@ def finding(plan: CampaignPlan, number: int, outcome: Mapping[str, Any]) -> Faul
         {name: _numbers(times) for name, times in reacted.items()},
         outcome.get("reacted", {}).get("cases", ()),
         0.0 if plan.reaction is None else plan.reaction.delay,
+        tuple(map(str, outcome.get("doubts", ()))),
     )
 
 

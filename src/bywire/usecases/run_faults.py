@@ -80,6 +80,7 @@ def run_faults(
         When interrupted; finished faults stay in the folder.
     """
     from bywire.api.run_faults import FaultCampaign
+    from bywire.bench import running
     from bywire.campaigns.running import CampaignStore, run_campaign
     from bywire.core.typing import silent
 
@@ -94,4 +95,5 @@ def run_faults(
         raise KeyboardInterrupt(
             f"{kept} of {len(plan.faults)} faults are kept: the same command goes on"
         ) from None
-    return FaultCampaign(findings, None if store is None else store.folder)
+    nominal = running.run(plan.bench, estimate_error=False)
+    return FaultCampaign(findings, None if store is None else store.folder, nominal)
