@@ -366,7 +366,7 @@ def _coverage_class(coverage: float) -> str:
 
     Examples
     --------
-    >>> coverage_class(0.993), coverage_class(0.61), coverage_class(0.2)
+    >>> _coverage_class(0.993), _coverage_class(0.61), _coverage_class(0.2)
     ('high', 'low', 'none')
     """
     return next((name for least, name in _CLASSES if coverage >= least), "none")
