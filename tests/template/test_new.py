@@ -148,7 +148,7 @@ def test_existing_folders_stay_as_they_are(tmp_path: Path) -> None:
         new(NAME, tmp_path)
     assert os.listdir(tmp_path / NAME) == []
     (tmp_path / "file").touch()
-    with pytest.raises(FileError, match="is no folder"):
+    with pytest.raises(FileError, match="is not a folder"):
         new(NAME, tmp_path / "file")
 
 

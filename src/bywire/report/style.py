@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.figure import Figure
 
 from bywire.bench.kpis.samples import smoothed
 from bywire.core.quantities import display_unit
@@ -23,8 +21,10 @@ from bywire.report.panels import Role
 from bywire.report.wording import clean, duration, in_display_unit, unit_text
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
 
 _FASTEST = 3 * COLUMNS
 """points of a thinned line beyond which most pixel columns hold a whole wave of the ripple"""
